@@ -31,7 +31,6 @@ from brachis.optimise.refine import Refined
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
 _OPTIONS = SolverOptions(tolerance=1e-8)
-_OPTIMAL = 1e-5
 _FEASIBLE = 1e-7
 _EXACT = 1e-9
 """An answer that violates no row and leaves no gradient beyond this is not solved again."""
@@ -177,10 +176,10 @@ def check_sensitivities(
     with ThreadpoolController().limit(
         limits=1, user_api="blas"
     ):  # as in `plan`: batches are small
-        return _checked(refined, predictions or sensitivities(refined), step)
+        return _check_limits(refined, predictions or sensitivities(refined), step)
 
 
-def _checked(
+def _check_limits(
     refined: Refined, predictions: Sensitivities, step: float
 ) -> SensitivityCheck:
     """Compare limit by limit."""
@@ -188,21 +187,21 @@ def _checked(
     program = refined.program
     base = refined.reports[-1].x
     t_end = program.end_time
-    if residual(program, base) > _EXACT or _unbalanced(program, base) > _EXACT:
-        base, _ = _solved_again(program, base)
+    if residual(program, base) > _EXACT or _stationarity(program, base) > _EXACT:
+        base, _ = _solve_again(program, base)
     checked = []
     for entry in predictions.limits:
         if abs(entry.change(step)) <= _NO_CHANGE * t_end(base):
             checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
         else:
             raised = program.relaxed(entry.limit, entry.bound, step * entry.bound.whole)
-            checked.append(_compared(entry, entry.change(step), program, raised, base))
+            checked.append(_compare(entry, entry.change(step), program, raised, base))
     return SensitivityCheck(
         step, t_end(base), tuple(checked), time.perf_counter() - began
     )
 
 
-def _compared(
+def _compare(
     entry: Sensitivity,
     predicted: float,
     program: Program,
@@ -211,12 +210,12 @@ def _compared(
 ) -> CheckedSensitivity:
     """Solve with one limit raised, and back where the change is suspicious."""
     linearised = linearised_change(raised, base)
-    answer, optimal = _solved_again(raised, base)
+    answer, optimal = _solve_again(raised, base)
     t_end = program.end_time
     before = base
     off = abs(predicted - (t_end(answer) - t_end(base)))
     if off > _SUSPICIOUS * abs(predicted) and off > _SAME * t_end(base):
-        before, sure = _solved_again(program, answer)
+        before, sure = _solve_again(program, answer)
         optimal = optimal and sure
         if abs(t_end(before) - t_end(base)) <= _SAME * t_end(base):
             before = base
@@ -230,7 +229,7 @@ def _compared(
     )
 
 
-def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
+def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     """Solve to a tight tolerance from x with one backend after the other; tell whether it is an optimum.
 
     Raises
@@ -247,7 +246,7 @@ def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
             continue
         if report.violation > _FEASIBLE:
             continue
-        if _unbalanced(program, report.x) <= _OPTIMAL:
+        if _stationarity(program, report.x) <= 1e-5:
             return report.x, True
         answers.append(report.x)
     if residual(program, x) <= _FEASIBLE:
@@ -260,7 +259,7 @@ def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     return min(answers, key=program.end_time), False
 
 
-def _unbalanced(program: Program, x: np.ndarray) -> float:
+def _stationarity(program: Program, x: np.ndarray) -> float:
     try:
         return multipliers_of(program, x).residual
     except UnreachableError:

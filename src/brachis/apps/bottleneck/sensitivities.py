@@ -49,7 +49,6 @@ _NEAR = 0.1
 """Rows farther from their bounds are left out at first; dimensionless."""
 _LARGEST_STEP = 1.0
 """Of any variable: directions that change nothing to first order are not followed without end."""
-_TOUCHED = 1e-9
 
 
 def rows_and_jacobian(
@@ -108,7 +107,7 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     kept = room < _NEAR
     gradient = program.gradient(x)
     while True:
-        step = _solved(
+        step = _solve_linear_program(
             gradient,
             slopes[np.flatnonzero(kept)].toarray(),
             room[kept],
@@ -117,13 +116,13 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
         )
         if step is None:
             return None
-        overrun = slopes @ step > room + _TOUCHED
+        overrun = slopes @ step > room + 1e-9
         if not (overrun & ~kept).any():
             return float(gradient @ step)
         kept |= overrun
 
 
-def _solved(
+def _solve_linear_program(
     gradient: np.ndarray,
     slopes: np.ndarray,
     room: np.ndarray,
@@ -144,7 +143,6 @@ counts: solvers differ in how near they come, and a row that is near its bound w
 that takes over within any step."""
 _GOOD = 1e-5
 """The solver's multipliers with a smaller residual are taken as they are."""
-_DEPENDENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,9 +190,7 @@ class ActiveSet(Summary):
     @property
     def dependent(self) -> bool:
         """True where several sets of multipliers may balance a gradient."""
-        return bool(
-            np.linalg.matrix_rank(self.slopes, tol=_DEPENDENT) < len(self.slopes)
-        )
+        return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < len(self.slopes))
 
     def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
         """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
@@ -346,7 +342,6 @@ def multipliers_of_answer(refined: Refined) -> Multipliers:
 
 STATIONARY = 1e-3
 """With a larger residual the answer is not an optimum, and its multipliers say little."""
-_SMALLEST = 1e-9
 
 
 @dataclass(frozen=True)
@@ -500,7 +495,7 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
             rates[rows[:, bound.column]] = bound.per_unit
             if limit.role is not Role.SAFEGUARD:
                 found.append(_sensitivity(limit, bound, rates, multipliers))
-            elif (slope := -multipliers.change(rates)) > _SMALLEST:
+            elif (slope := -multipliers.change(rates)) > 1e-9:
                 boundaries.append(
                     BranchBoundary(
                         limit.labels[bound.column].subject, bound.figure, slope

@@ -18,11 +18,8 @@ from brachis.robot.joints import shown_unit
 _FRACTION = 0.1
 _NOTHING = 1e-5
 """Of t_E; what saves less for `_FRACTION`, and a boundary that costs less, is not worth a line."""
-_TAKEN_BACK = 0.02
 _KNOTS = 0.01
 """Of t_E; what the knots cost is known to 0.2 % or so, and `intervals: auto` leaves 0.1 %."""
-_MOMENT = 5e-4
-"""Smallest share of the time that is worth a line."""
 
 
 def in_words(
@@ -49,7 +46,7 @@ def in_words(
             else _costs(sensitivities, t_end, degrees=degrees)
         ),
         *([] if knots is None else _knots(knots, t_end)),
-        *([] if check is None else _checked(check)),
+        *([] if check is None else _check_lines(check)),
         *active_in_words(saturations),
     ]
     if reference is not None:
@@ -134,7 +131,7 @@ def _boundary(entry: BranchBoundary) -> str:
     )
 
 
-def _checked(check: SensitivityCheck) -> list[str]:
+def _check_lines(check: SensitivityCheck) -> list[str]:
     """Sentences on the predictions beside solving again."""
     percent = f"{100.0 * check.step:g} %"
     lines = []
@@ -175,7 +172,7 @@ def _checked(check: SensitivityCheck) -> list[str]:
 
 def _taken_back(entry: CheckedSensitivity) -> str:
     """Say how much of a promise other limits take back within the step, where it is worth saying."""
-    if abs(entry.linearised - entry.predicted) <= _TAKEN_BACK * abs(entry.predicted):
+    if abs(entry.linearised - entry.predicted) <= 0.02 * abs(entry.predicted):
         return ""
     return f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
 
@@ -184,7 +181,7 @@ def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
     """Sentences on the limits that are active for some time."""
     lines = []
     for entry in found:
-        if entry.share >= _MOMENT:
+        if entry.share >= 5e-4:
             times = (
                 "once"
                 if len(entry.active) == 1

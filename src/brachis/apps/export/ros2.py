@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
-from brachis.apps.export.rows import JointRows, needed, rows_of
+from brachis.apps.export.rows import JointRows, require_library, rows_of
 from brachis.common.files import atomic_write
 from brachis.trajectory import Trajectory
 
@@ -88,7 +88,7 @@ def export_mcap(
 
     Its metadata ``brachis`` name joints that move and are left out.
     """
-    writers = needed("mcap_ros2.writer", "an MCAP bag")
+    writers = require_library("mcap_ros2.writer", "an MCAP bag")
     rows = rows_of(trajectory, dt, last, joints)
     message = message_of(rows)
     with atomic_write(path) as stream, writers.Writer(stream) as writer:

@@ -129,7 +129,7 @@ def _list_missing(
             yield f"joint {joint} moves by {travel} and is not in this file"
 
 
-def needed(name: str, what: str) -> ModuleType:
+def require_library(name: str, what: str) -> ModuleType:
     """Import a library of the extra ``export``.
 
     Parameters

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brachis.apps.export.rows import needed, rows_of
+from brachis.apps.export.rows import require_library, rows_of
 from brachis.common.files import atomic_write
 from brachis.trajectory import Trajectory
 from brachis.trajectory.samples import COLUMNS
@@ -70,8 +70,8 @@ def export_parquet(
     The file's metadata have a key ``brachis``: joints with their units, the end time in s, and sentences about joints
     that move and are left out.
     """
-    pyarrow = needed("pyarrow", "a Parquet file")
-    parquet = needed("pyarrow.parquet", "a Parquet file")
+    pyarrow = require_library("pyarrow", "a Parquet file")
+    parquet = require_library("pyarrow.parquet", "a Parquet file")
     rows = rows_of(trajectory, dt, last, joints)
     units = dict(zip(rows.joints, rows.units, strict=True))
     about = {"joints": units, "t_end_s": trajectory.t_end, "left_out": rows.left_out}

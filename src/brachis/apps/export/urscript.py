@@ -12,7 +12,6 @@ from brachis.common.files import atomic_write
 from brachis.errors import InputError
 from brachis.trajectory import Trajectory
 
-_JOINTS = 6
 _LOOKAHEAD = 0.03
 _GAIN = 300
 """s, the shortest that servoj takes; proportional gain, the manual's default."""
@@ -39,7 +38,7 @@ def export_urscript(
         rail, which its own controller moves at the same time, in another format.
     """
     rows = rows_of(trajectory, dt, last, joints)
-    if rows.units != ("rad",) * _JOINTS:
+    if rows.units != ("rad",) * 6:
         raise InputError(
             "servoj takes the angles of six joints",
             where="joints",

@@ -25,16 +25,9 @@ if TYPE_CHECKING:
 
     from brachis.task import FitReport
 
-_BARS_PER_PANEL = 48
-_GROUP_WIDTH = 0.84
-_HEADROOM = 1.27
-
 
 Case = float | str
 """What is planned: a number that is varied, or a name."""
-
-_ROW = 3
-"""Case, choice, end time."""
 
 
 def plot_comparison(
@@ -75,12 +68,10 @@ def plot_comparison(
     if not any(isinstance(case, str) for case in cases):
         cases.sort(key=float)
     choices = list(dict.fromkeys(choice for _, choice in cells))
-    panels = math.ceil(len(cases) / max(1, _BARS_PER_PANEL // len(choices)))
+    panels = math.ceil(len(cases) / max(1, 48 // len(choices)))
     per_panel = math.ceil(len(cases) / panels)
     figure = style.new_figure(style.PAGE_WIDTH, 12.0 + 58.0 * panels)
-    height = _HEADROOM * max(
-        (t_end for t_end in cells.values() if t_end > 0.0), default=1.0
-    )
+    height = 1.27 * max((t_end for t_end in cells.values() if t_end > 0.0), default=1.0)
     for panel in range(panels):
         ax = figure.add_subplot(panels, 1, panel + 1)
         _draw(
@@ -113,7 +104,7 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
     cells: dict[tuple[Case, str], float] = {}
     for number, row in enumerate(rows):
         where = f"rows[{number}]"
-        if not isinstance(row, Sequence) or len(row) != _ROW or isinstance(row, str):
+        if not isinstance(row, Sequence) or len(row) != 3 or isinstance(row, str):
             raise InputError(
                 "wrong type",
                 where=where,
@@ -155,7 +146,7 @@ def _draw(
     unit: str,
 ) -> None:
     """Draw one panel of grouped bars with their values; pairs without a row leave a gap."""
-    width = _GROUP_WIDTH / len(choices)
+    width = 0.84 / len(choices)
     found = {pair: t_end for pair, t_end in cells.items() if not math.isnan(t_end)}
     for column, choice in enumerate(choices):
         shift = (column - 0.5 * (len(choices) - 1)) * width
@@ -204,8 +195,6 @@ def _write(ax: Axes, place: float, value: float, *, bold: bool) -> None:
     )
 
 
-_ROW_MM = 5.0
-_FRAME_MM = 24.0
 _MARKS: dict[str, dict[str, Any]] = {
     "planned": {
         "marker": "o",
@@ -286,7 +275,7 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
         if math.isfinite(time)
     ]
     edge = 1.05 * max(known, default=1.0)
-    figure = style.new_figure(style.PAGE_WIDTH, _FRAME_MM + _ROW_MM * len(rows))
+    figure = style.new_figure(style.PAGE_WIDTH, 24.0 + 5.0 * len(rows))
     ax = figure.add_subplot()
     drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
     for number, candidate in enumerate(candidates):
@@ -335,7 +324,6 @@ def _kind(candidate: Attempt, *, first: bool) -> str:
     )
 
 
-_HEIGHT = 45.0
 _ROOM = 1.15
 
 
@@ -354,7 +342,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
         that was not fitted gives a figure that says so.
     """
     fits = [fit for fit in trajectory.task.fits if fit.profile]
-    figure = style.new_figure(style.COLUMN_WIDTH, _HEIGHT * max(len(fits), 1))
+    figure = style.new_figure(style.COLUMN_WIDTH, 45.0 * max(len(fits), 1))
     if not fits:
         figure.text(
             0.5,

@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_PANEL_MM = 34.0
-_FRAME_MM = 24.0
-_RANGE = 1.15
-
 
 @of_motion
 def plot_limits(
@@ -59,7 +55,7 @@ def plot_limits(
     """
     ratios = limit_ratios(trajectory, limits)
     shown = list(dict.fromkeys(label.axis for label in ratios.labels))
-    figure = style.new_figure(style.COLUMN_WIDTH, _FRAME_MM + _PANEL_MM * len(shown))
+    figure = style.new_figure(style.COLUMN_WIDTH, 24.0 + 34.0 * len(shown))
     panels = [figure.add_subplot(len(shown), 1, row + 1) for row in range(len(shown))]
     draw_ratios(panels, trajectory, ratios, shown)
     handles = {
@@ -98,7 +94,7 @@ def draw_ratios(
                 ratios.t, ratios.values[:, column], label=style.plain(subject), **look
             )
         values = ratios.values[:, columns]
-        top = _RANGE * max(1.0, float(np.abs(values).max()))
+        top = 1.15 * max(1.0, float(np.abs(values).max()))
         for level in (-1.0, 1.0) if values.min() < 0.0 else (1.0,):
             ax.axhline(level, color=style.GREY, **style.LIMIT)
             ax.axhspan(
@@ -118,8 +114,6 @@ _SHOWN = 0.5
 """Limits that the motion never comes this near to are left out."""
 _COLOURS = "Blues"
 _ACTIVE = "#D55E00"
-_ROW_MM = 5.0
-_FRAME_MM_TIMELINE = 26.0
 _THICK = 0.84
 
 
@@ -156,9 +150,7 @@ def plot_timeline(
         for column, label in enumerate(ratios.labels)
         if found[label].peak > _SHOWN
     ]
-    figure = style.new_figure(
-        style.PAGE_WIDTH, _FRAME_MM_TIMELINE + _ROW_MM * max(len(shown), 1)
-    )
+    figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * max(len(shown), 1))
     ax = figure.add_subplot()
     for row, column in enumerate(shown):
         _draw_row(ax, row, ratios, column, found[ratios.labels[column]])

@@ -41,11 +41,7 @@ def dense_samples(trajectory: Trajectory) -> Samples:
 
 _REACH = 0.3  # of the range of all data
 _LEAST_RANGE = 1e-9
-_JOINT_MM = 38.0
 _PROGRESS_MM = 26.0
-_FRAME_MM = 17.0
-_FEW_JOINTS = 2
-_LOW = 0.6
 
 
 @of_motion
@@ -63,17 +59,13 @@ def plot_motion(trajectory: Trajectory) -> Figure:
         them; the faint ticks are the knots of the splines.
     """
     samples = dense_samples(trajectory)
-    found = [
-        part
-        for kind in ("position", "velocity")
-        for part in quantities(trajectory, samples, kind)
-    ]
+    found = quantities(trajectory, samples, "position", "velocity")
     heights = [
-        *(_JOINT_MM * height_of(part) for part in found),
+        *(38.0 * height_of(part) for part in found),
         _PROGRESS_MM,
         _PROGRESS_MM,
     ]
-    figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + _FRAME_MM)
+    figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + 17.0)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     panels = [figure.add_subplot(grid[row]) for row in range(len(heights))]
     for ax, part in zip(panels, found, strict=False):
@@ -91,12 +83,12 @@ def plot_motion(trajectory: Trajectory) -> Figure:
 
 def height_of(part: Quantity) -> float:
     """Height of a panel, relative to one with many joints."""
-    return 1.0 if len(part.joints) > _FEW_JOINTS else _LOW
+    return 1.0 if len(part.joints) > 2 else 0.6
 
 
 def draw_quantity(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
     """Draw one quantity of its joints, with their limits."""
-    draw_joints(ax, trajectory, part, part.values)
+    draw_joints(ax, trajectory, part)
     _draw_limits(ax, part)
     _dress(ax, trajectory, f"${part.symbol}$ ({part.unit})")
 
@@ -108,11 +100,9 @@ def label_time_once(panels: Sequence[Axes]) -> None:
         ax.set_xlabel("")
 
 
-def draw_joints(
-    ax: Axes, trajectory: Trajectory, part: Quantity, values: np.ndarray
-) -> None:
-    """Draw values, (K, j), of a quantity's joints: one labelled line for each."""
-    for joint, column in zip(part.joints.tolist(), values.T, strict=True):
+def draw_joints(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
+    """Draw one labelled line for each joint of a quantity."""
+    for joint, column in zip(part.joints.tolist(), part.values.T, strict=True):
         ax.plot(
             part.t,
             column,
@@ -186,10 +176,6 @@ def _draw_limits(ax: Axes, part: Quantity) -> None:
             )
 
 
-_RANGE = 1.15
-_WHAT = "torque"
-
-
 @of_motion
 def plot_torques(trajectory: Trajectory) -> Figure:
     """Plot the normalised joint torques, and forces, with the band of what is allowed (Fig. 2 of the paper).
@@ -220,13 +206,9 @@ def plot_torques(trajectory: Trajectory) -> Figure:
 
 def shown_torques(trajectory: Trajectory, samples: Samples) -> list[list[Quantity]]:
     """Torques and forces by panels: those with limits in one, all of them apart by unit where no joint has a limit."""
-    found = [part.limited() for part in quantities(trajectory, samples, _WHAT)]
-    limited = [part for part in found if part is not None]
-    return (
-        [limited]
-        if limited
-        else [[part] for part in quantities(trajectory, samples, _WHAT)]
-    )
+    parts = quantities(trajectory, samples, "torque")
+    limited = [ratios for part in parts if (ratios := part.over_limits()) is not None]
+    return [limited] if limited else [[part] for part in parts]
 
 
 def draw_torques(
@@ -234,7 +216,7 @@ def draw_torques(
 ) -> None:
     """Draw what `shown_torques` found into as many axes; one labelled line per joint."""
     for ax, parts in zip(panels, found, strict=True):
-        if parts[0].limited() is None:
+        if not parts[0].is_limited.all():
             draw_quantity(ax, trajectory, parts[0])
         else:
             _draw_ratios(ax, trajectory, parts)
@@ -245,8 +227,8 @@ def draw_torques(
 def _draw_ratios(ax: Axes, trajectory: Trajectory, parts: Sequence[Quantity]) -> None:
     """Draw torques and forces over their limits, which may differ in both directions."""
     for part in parts:
-        draw_joints(ax, trajectory, part, part.ratios)
-    _draw_band(ax, max(float(np.abs(part.ratios).max()) for part in parts))
+        draw_joints(ax, trajectory, part)
+    _draw_band(ax, max(float(np.abs(part.values).max()) for part in parts))
     labels = (rf"${part.symbol} / {part.symbol}_\mathrm{{max}}$" for part in parts)
     style.dress(ax, r"$t$ (s)", ", ".join(labels))
     style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
@@ -254,7 +236,7 @@ def _draw_ratios(ax: Axes, trajectory: Trajectory, parts: Sequence[Quantity]) ->
 
 def _draw_band(ax: Axes, largest: float) -> None:
     """Shade what is forbidden, so that the band stands out and the lines do not."""
-    top = _RANGE * max(1.0, largest)
+    top = 1.15 * max(1.0, largest)
     for sign in (-1.0, 1.0):
         ax.axhline(sign, **style.LIMIT, color=style.GREY)
         ax.axhspan(

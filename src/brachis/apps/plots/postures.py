@@ -104,7 +104,6 @@ _GROUND = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
 _WORLD = "xyz"
 _ROOM = 0.78
 """Part of the frame that the box of axes in space takes; their labels take the rest."""
-_LEAST_SPAN = 1e-3
 _VIEWS = tuple(
     itertools.product(
         (15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)
@@ -266,11 +265,11 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     ax.tick_params(pad=-2.0)
     ax.set_proj_type("ortho")
     spans = [
-        max(np.ptp(limits), _LEAST_SPAN)
+        max(np.ptp(limits), 1e-3)
         for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())
     ]
     ax.set_box_aspect(spans)
-    elevation, azimuth = max(_VIEWS, key=lambda view: _filled(ax, points, *view))
+    elevation, azimuth = max(_VIEWS, key=lambda view: _fill_factor(ax, points, *view))
     ax.view_init(elevation, azimuth)
     ax.set_box_aspect(spans, zoom=_ROOM / _extent(ax))
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
@@ -296,7 +295,9 @@ def _draw_floor(ax: Any, z: float) -> None:
     ax.set(xlim=x, ylim=y)
 
 
-def _filled(ax: Any, points: np.ndarray, elevation: float, azimuth: float) -> float:
+def _fill_factor(
+    ax: Any, points: np.ndarray, elevation: float, azimuth: float
+) -> float:
     """Tell how much of the frame points take when the axes' box just fits into it; dimensionless."""
     ax.view_init(elevation, azimuth)
     return float(np.prod(_spans(ax, points)) / _extent(ax) ** 2)

@@ -92,9 +92,6 @@ def check_suffix(path: str | os.PathLike[str]) -> str:
     return suffix
 
 
-_DPI_NOTEBOOK = 110
-
-
 @cache
 def figure_class() -> type[Figure]:
     """Return a class of Matplotlib's figures that notebooks show without further ado."""
@@ -117,7 +114,7 @@ def as_html(figure: Figure) -> str:
 
 def _png(figure: Figure) -> bytes:
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=_DPI_NOTEBOOK)
+    figure.savefig(stream, format="png", dpi=110)
     return stream.getvalue()
 
 

@@ -30,18 +30,15 @@ Figure = dict[str, Any]
 
 _REACH = 0.3
 """Limits are in view where the motion comes as near to them as this part of its range."""
-_PANEL_PX = 210
 _SMALL_PX = 130
-_ROW_PX = 26
 _FRAME_PX = 110
-_FEW_JOINTS = 2
 _SHOWN = 0.5
 """Limits that the motion never comes this near to have no row."""
 _MOST = 1.1
 """Ratio at the upper end of the colours."""
 
 
-def encoded(values: np.ndarray) -> dict[str, Any]:
+def encode(values: np.ndarray) -> dict[str, Any]:
     """Write an array as Plotly reads it: single precision, base64."""
     data = np.ascontiguousarray(values, dtype="<f4")
     shape = {"shape": ",".join(map(str, data.shape))} if data.ndim > 1 else {}
@@ -55,21 +52,16 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     """
     trajectory = motion.trajectory
     samples = motion.samples
-    kinds = kinds_of(trajectory)
-    panels = [
-        [part]
-        for kind in kinds
-        for part in quantities(trajectory, samples, kind, degrees=motion.degrees)
-    ]
-    panels += (
-        [parts]
-        if (parts := _over_their_limits(quantities(trajectory, samples, "torque")))
-        else []
+    parts = quantities(
+        trajectory, samples, *kinds_of(trajectory), degrees=motion.degrees
     )
-    heights = [
-        _PANEL_PX if len(parts[0].joints) > _FEW_JOINTS else _SMALL_PX
-        for parts in panels
-    ] + [_SMALL_PX]
+    panels = [[part] for part in parts]
+    shares = _over_their_limits(quantities(trajectory, samples, "torque"))
+    if shares:
+        panels.append(shares)
+    heights = [210 if len(parts[0].joints) > 2 else _SMALL_PX for parts in panels] + [
+        _SMALL_PX
+    ]
     data = []
     named = set()
     last = len(heights)
@@ -120,21 +112,10 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 
 
 def _over_their_limits(parts: Sequence[Quantity]) -> list[Quantity]:
-    """Give torques and forces as parts of their limits: those of a wrist are small beside those of a shoulder."""
-    found = [part.limited() for part in parts]
-    names = ", ".join(part.name for part in found if part is not None)
-    ones = ((part, np.ones(len(part.joints))) for part in found if part is not None)
-    return [
-        replace(
-            part,
-            name=names,
-            unit="of the limit",
-            values=part.ratios,
-            lower=-one,
-            upper=one,
-        )
-        for part, one in ones
-    ]
+    """Divide torques and forces by their limits: a wrist's are smaller than a shoulder's."""
+    found = [ratios for part in parts if (ratios := part.over_limits()) is not None]
+    names = ", ".join(part.name for part in found)
+    return [replace(part, name=names) for part in found]
 
 
 def _joint_traces(
@@ -154,7 +135,7 @@ def _joint_traces(
     hover = f"%{{y:.4g}} {part.unit}"
     share = {}
     if np.isfinite(levels).all():
-        share = {"customdata": encoded(100.0 * np.abs(part.ratios[:, column]))}
+        share = {"customdata": encode(100.0 * np.abs(part.ratios[:, column]))}
         hover += f", %{{customdata:.1f}} % of {part.of}"
     curve = {
         **_curve(part.t, values, row),
@@ -163,7 +144,7 @@ def _joint_traces(
         "line": line,
         "showlegend": shown,
     }
-    traces = [{**curve, "hovertemplate": f"{hover}<extra>{_escaped(name)}</extra>"}]
+    traces = [{**curve, "hovertemplate": f"{hover}<extra>{_escape(name)}</extra>"}]
     ends = part.t[[0, -1]]
     for level in levels:
         if np.isfinite(level):
@@ -197,18 +178,16 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
             colours[row, inside] = np.maximum(colours[row, inside], THRESHOLD)
     active = THRESHOLD / _MOST
     beyond = (1.0 + tolerance) / _MOST
-    layout = _layout(
-        motion.trajectory.t_end, _ROW_PX * max(len(entries), 1) + _FRAME_PX
-    )
+    layout = _layout(motion.trajectory.t_end, 26 * max(len(entries), 1) + _FRAME_PX)
     layout["xaxis"] |= {"title": {"text": "t (s)"}}
     layout["yaxis"] = {"automargin": True, "fixedrange": True, "ticks": ""}
     layout["hovermode"] = "closest"
     heat = {
         "type": "heatmap",
-        "x": encoded(t),
+        "x": encode(t),
         "y": [f"{entry.label}" for entry in entries],
-        "z": encoded(np.minimum(colours, _MOST)),
-        "customdata": encoded(100.0 * part),
+        "z": encode(np.minimum(colours, _MOST)),
+        "customdata": encode(100.0 * part),
         "zmin": 0.0,
         "zmax": _MOST,
         "ygap": 3,
@@ -235,8 +214,8 @@ def _curve(t: np.ndarray, values: np.ndarray, row: int) -> dict[str, Any]:
     return {
         "type": "scatter",
         "mode": "lines",
-        "x": encoded(t),
-        "y": encoded(values),
+        "x": encode(t),
+        "y": encode(values),
         "yaxis": f"y{row}",
     }
 
@@ -301,12 +280,9 @@ def _dash(linestyle: object) -> str:
     return ",".join(f"{1.8 * length:.1f}px" for length in linestyle[1])
 
 
-def _escaped(name: str) -> str:
+def _escape(name: str) -> str:
     """Keep Plotly from reading names as markup."""
     return name.replace("&", "&amp;").replace("<", "&lt;").replace("%{", "% {")
-
-
-_FRAMES = 240
 
 
 def scene(motion: ReportedMotion) -> dict[str, Any]:
@@ -320,7 +296,7 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         with their unit and parts of their limits; ``levels``, the parts of a limit from which on values are marked.
     """
     trajectory = motion.trajectory
-    samples = trajectory.at(np.linspace(0.0, trajectory.t_end, _FRAMES))
+    samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 240))
     robot = trajectory.robot
     joints: list[dict[str, Any]] = [
         {
@@ -332,18 +308,17 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         for name, unit in zip(robot.joint_names, robot.position_units, strict=True)
     ]
     kinds = kinds_of(trajectory)
-    for kind in kinds:
-        for part in quantities(trajectory, samples, kind, degrees=motion.degrees):
-            for column, joint in enumerate(part.joints.tolist()):
-                entry = {"unit": part.unit, "values": encoded(part.values[:, column])}
-                if part.is_limited[column]:
-                    entry["ratios"] = encoded(np.abs(part.ratios[:, column]))
-                joints[joint]["quantities"].append(entry)
+    for part in quantities(trajectory, samples, *kinds, degrees=motion.degrees):
+        for column, joint in enumerate(part.joints.tolist()):
+            entry = {"unit": part.unit, "values": encode(part.values[:, column])}
+            if part.is_limited[column]:
+                entry["ratios"] = encode(np.abs(part.ratios[:, column]))
+            joints[joint]["quantities"].append(entry)
     return {
-        "t": encoded(samples.t),
-        "s": encoded(samples.s),
-        "speed": encoded(samples.tool_speed),
-        "bones": encoded(skeleton(robot, samples.q).bones),
+        "t": encode(samples.t),
+        "s": encode(samples.s),
+        "speed": encode(samples.tool_speed),
+        "bones": encode(skeleton(robot, samples.q).bones),
         "plane": plane_of(trajectory),
         "joints": joints,
         "kinds": kinds,

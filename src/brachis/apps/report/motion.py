@@ -68,7 +68,7 @@ def reported_motion(
 ) -> ReportedMotion:
     """Gather what there is to say of a planned or a saved motion; a saved one is verified again."""
     if isinstance(motion, Trajectory):
-        return _gathered(
+        return _gather(
             motion,
             motion,
             verify_trajectory(motion),
@@ -89,7 +89,7 @@ def reported_motion(
         if motion.interrupted
         else ()
     )
-    return _gathered(
+    return _gather(
         motion,
         motion.trajectory,
         motion.verification,
@@ -97,12 +97,12 @@ def reported_motion(
         remarks=motion.warnings,
         left_undone=(*early, *motion.undone),
         candidates=motion.candidates,
-        planned=_planned(motion),
+        planned=_describe_plan(motion),
         degrees=degrees,
     )
 
 
-def _gathered(
+def _gather(
     source: PlannedMotion | Trajectory,
     trajectory: Trajectory,
     verification: Verification,
@@ -141,7 +141,7 @@ def _held_back(
         return (*active_in_words(found), f"What the limits cost is not known: {error}")
 
 
-def _planned(result: PlannedMotion) -> dict[str, str]:
+def _describe_plan(result: PlannedMotion) -> dict[str, str]:
     """Say how a motion was planned."""
     report = result.solver_report
     least = result.least_motion

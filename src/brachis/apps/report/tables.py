@@ -25,8 +25,6 @@ from brachis.verify import Check
 _LIBRARIES = ("pin", "numpy", "scipy", "plotly")
 NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
-_SMALL = 1e-9
-_LARGE = 1e4
 _LISTED = 6
 """Segments of a path, and numbers of one, that are named."""
 
@@ -202,13 +200,11 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     tolerance = motion.trajectory.task.refinement.tolerance
     peaks: dict[int, list[Row]] = {joint: [] for joint in range(trajectory.robot.n)}
     positions: dict[int, tuple[np.ndarray, str]] = {}
-    for kind in kinds_of(trajectory):
-        for part in quantities(
-            trajectory, motion.samples, kind, degrees=motion.degrees
-        ):
-            for column, joint in enumerate(part.joints.tolist()):
-                positions.setdefault(joint, (part.values[:, column], part.unit))
-                peaks[joint].append(_peak(part, column, tolerance))
+    kinds = kinds_of(trajectory)
+    for part in quantities(trajectory, motion.samples, *kinds, degrees=motion.degrees):
+        for column, joint in enumerate(part.joints.tolist()):
+            positions.setdefault(joint, (part.values[:, column], part.unit))
+            peaks[joint].append(_peak(part, column, tolerance))
     rows = []
     for joint, name in enumerate(trajectory.joint_names):
         q, unit = positions[joint]
@@ -233,7 +229,7 @@ def _peak(part: Quantity, column: int, tolerance: float) -> Row:
     limited = bool(part.is_limited[column])
     ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
     at = int(np.argmax(ratios if limited else np.abs(values)))
-    value = values[at] if abs(values[at]) > _SMALL else 0.0
+    value = values[at] if abs(values[at]) > 1e-9 else 0.0
     low = _write_number(lower)
     high = _write_number(upper)
     limit = f"{high} {part.unit}" if upper == -lower else f"{low} to {high} {part.unit}"
@@ -247,7 +243,7 @@ def _peak(part: Quantity, column: int, tolerance: float) -> Row:
 
 def _write_number(value: float) -> str:
     """Write a number with four significant figures, large ones without an exponent."""
-    return f"{value:.0f}" if _LARGE <= abs(value) < np.inf else f"{value:.4g}"
+    return f"{value:.0f}" if 1e4 <= abs(value) < np.inf else f"{value:.4g}"
 
 
 def _level(share: float, tolerance: float) -> str:

@@ -160,8 +160,8 @@ def _meshes(
     import yourdfpy
 
     robot = etree.Element("robot", name="robot")
-    robot.extend([_copied(each) for each in materials])
-    etree.SubElement(robot, "link", name=name).append(_copied(visual))
+    robot.extend([_copy(each) for each in materials])
+    etree.SubElement(robot, "link", name=name).append(_copy(visual))
     read = yourdfpy.URDF.load(
         io.BytesIO(etree.tostring(robot)),
         load_meshes=True,
@@ -174,7 +174,7 @@ def _meshes(
         mesh = read.scene.geometry[geometry]
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
             found.append(
-                _placed(
+                _place(
                     trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual),
                     placement,
                 )
@@ -187,11 +187,11 @@ def _meshes(
     return found
 
 
-def _copied(element: Element) -> Element:
+def _copy(element: Element) -> Element:
     return etree.fromstring(etree.tostring(element))
 
 
-def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
+def _place(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
     """Place a mesh, and see to its colour where it has no picture on it."""
     look = getattr(
         mesh.visual, "material", mesh.visual
@@ -200,14 +200,14 @@ def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
         getattr(look, "baseColorTexture", None) is None
         and getattr(look, "image", None) is None
     ):
-        mesh = coloured(
+        mesh = with_colour(
             mesh, tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL
         )
     mesh.apply_transform(placement)
     return mesh
 
 
-def coloured(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
+def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
     """Give a mesh one material that is no metal, RGBA from 0 to 255, and sharp edges unless it has too many faces."""
     import trimesh
 
@@ -263,10 +263,6 @@ def placements(robot: Robot, q: np.ndarray) -> Placements:
 _BONE = (72, 101, 129, 255)
 _JOINT = (230, 159, 0, 255)
 _AXIS = (120, 130, 140, 255)
-_THICKNESS = 0.012
-"""Radius of a skeleton's links as a part of the robot's size."""
-_POSTURES = 33
-"""At which a motion is looked at to find its extent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,10 +307,10 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         for mesh in meshes:
             mesh.apply_transform(frame.placement.homogeneous)
         links.setdefault(int(frame.parentJoint), []).extend(meshes)
-    q = trajectory.position(np.linspace(0.0, trajectory.t_end, _POSTURES))
+    q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     found = placements(robot, q)
     size = float(np.ptp(found.positions.reshape(-1, 3), axis=0).max())
-    skeleton = _skeleton(trajectory, max(size, 1e-3) * _THICKNESS)
+    skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
     drawn = links or skeleton
     moving = {joint: meshes for joint, meshes in drawn.items() if joint}
     return Bodies(
@@ -410,7 +406,7 @@ def _rod(
     if np.linalg.norm(end - begin) < 1e-9:
         return []
     return [
-        coloured(
+        with_colour(
             trimesh.creation.cylinder(radius, segment=[begin, end], sections=24), colour
         )
     ]
@@ -419,4 +415,4 @@ def _rod(
 def _block(size: float, colour: tuple[int, ...]) -> list[trimesh.Trimesh]:
     import trimesh
 
-    return [coloured(trimesh.creation.box((size, size, size)), colour)]
+    return [with_colour(trimesh.creation.box((size, size, size)), colour)]

@@ -224,13 +224,6 @@ class Playback:
             self.time = 0.0
 
 
-_STOPS = 9
-_SLIDER_STEPS = 200
-_CONTROLS_WIDTH = 400
-_PLOTS_WIDTH = 350
-"""Pixels."""
-
-
 class Panel:
     """What is beside the scene.
 
@@ -276,7 +269,7 @@ class Panel:
         self._add_controls()
         stops = [
             f"rgb({red},{green},{blue})"
-            for red, green, blue in speed_colours(np.linspace(0.0, 1.0, _STOPS))
+            for red, green, blue in speed_colours(np.linspace(0.0, 1.0, 9))
         ]
         self._gui.add_html(
             tables.speed_legend(stops, float(motion.samples.tool_speed.max()))
@@ -305,7 +298,7 @@ class Panel:
     def _add_controls(self) -> None:
         """Add slider, button and speed."""
         t_end = self._playback.t_end
-        step = float(10.0 ** np.floor(np.log10(t_end / _SLIDER_STEPS)))
+        step = float(10.0 ** np.floor(np.log10(t_end / 200)))
         self._digits = max(0, round(-np.log10(step)))
         ends = ((0.0, "0"), (t_end, f"{t_end:.4g}"))
         self._slider = self._gui.add_slider(
@@ -385,9 +378,9 @@ class Panel:
         ):
             self._gui.add_html(tables.candidates_table(candidates))
         panel.dock_left()
-        panel.set_width(_PLOTS_WIDTH)
+        panel.set_width(350)
         self._gui.main_panel.dock_right()
-        self._gui.main_panel.set_width(_CONTROLS_WIDTH)
+        self._gui.main_panel.set_width(400)
         return charts
 
 

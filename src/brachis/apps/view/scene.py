@@ -29,7 +29,6 @@ LAYERS = (
 """What can be shown and hidden."""
 _GHOST_FIRST = np.array([190.0, 214.0, 235.0])
 _GHOST_LAST = np.array([25.0, 75.0, 125.0])
-_GHOST_OPACITY = 0.13
 _SHADES = 32
 """Colours of the trace."""
 _FINE = 2000
@@ -157,7 +156,7 @@ class Scene:
                 batched_wxyzs=ghosts.quaternions[:, joint],
                 batched_positions=ghosts.positions[:, joint],
                 batched_colors=shades,
-                opacity=_GHOST_OPACITY,
+                opacity=0.13,
                 cast_shadow=False,
                 receive_shadow=False,
             )
