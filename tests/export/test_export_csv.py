@@ -85,7 +85,7 @@ def test_an_unusable_period_leaves_the_old_file(line_trajectory, tmp_path, dt):
 TOO_LARGE = """
 import resource, sys
 from brachis import InputError, Trajectory
-from brachis.export import export_csv
+from brachis.apps.export import export_csv
 trajectory = Trajectory.load(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.RLIM_INFINITY))
 try:

@@ -125,13 +125,13 @@ def test_a_dollar_in_a_joint_name_is_no_mathematics(line_trajectory, monkeypatch
 
 LAZY = """
 import sys
-import brachis.plots, brachis.export
+import brachis.apps.plots, brachis.apps.export
 assert "matplotlib" not in sys.modules, "imported with the package"
 import matplotlib
 before = dict(dict.items(matplotlib.rcParams))  # whose own items would choose a backend
 from brachis.trajectory import Trajectory
-from brachis.plots import PLOTS, plot_comparison, save, save_figure
-save._DPI = 30
+from brachis.apps.plots import PLOTS, plot_comparison, save_figure, style
+style._DPI = 30
 trajectory = Trajectory.load(sys.argv[1])
 for name, plot in PLOTS.items():
     save_figure(plot(trajectory), f"{sys.argv[2]}/{name}.png")

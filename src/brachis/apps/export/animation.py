@@ -64,7 +64,7 @@ def frames(
     draw_postures(ax, trajectory, samples)
     panels = draw_holding(figure, grid[1], trajectory, samples)
     lines = joint_lines(panels, trajectory)
-    style.legend_below(figure, width - 10.0, list(lines.values()), list(lines))
+    style.legend_below(figure, width - 10.0, lines)
     view = list(plane_of(trajectory) or (0, 1, 2))
     bones = skeleton(trajectory.robot, trajectory.position(times)).bones[:, :, view]
     (links,) = ax.plot(

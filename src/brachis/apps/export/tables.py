@@ -39,7 +39,7 @@ def export_csv(
     Examples
     --------
     >>> from brachis import plan
-    >>> from brachis.export import export_csv
+    >>> from brachis.apps.export import export_csv
     >>> trajectory = plan("examples/01_scara_line.yaml").trajectory
     >>> export_csv(trajectory, "motion.csv", dt=0.004)  # doctest: +SKIP
     """

@@ -59,7 +59,7 @@ def plot_comparison(
 
     Examples
     --------
-    >>> from brachis.plots import plot_comparison
+    >>> from brachis.apps.plots import plot_comparison
     >>> rows = [("seam", "rail", 2.1), ("seam", "joint_1", 2.4), ("hem", "rail", 2.3), ("hem", "joint_1", 2.5)]
     >>> figure = plot_comparison(rows, "path")
     """

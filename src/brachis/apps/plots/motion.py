@@ -90,7 +90,7 @@ def draw_quantity(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
     """Draw one quantity of its joints, with their limits."""
     draw_joints(ax, trajectory, part)
     _draw_limits(ax, part)
-    _dress(ax, trajectory, f"${part.symbol}$ ({part.unit})")
+    dress(ax, trajectory, f"${part.symbol}$ ({part.unit})")
 
 
 def label_time_once(panels: Sequence[Axes]) -> None:
@@ -113,25 +113,20 @@ def draw_joints(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
 
 def joint_lines(panels: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
     """Collect one line of every joint that the panels show, in chain order, by its label."""
-    found = {
-        label: line
-        for ax in panels
-        for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
+    found = style.labelled(panels)
     names = map(style.plain, trajectory.joint_names)
     return {name: found[name] for name in names if name in found}
 
 
 def legend_joints(panels: Sequence[Axes], trajectory: Trajectory, width: float) -> None:
     """Put a legend of all joints above the first panel; `width` is its room, mm."""
-    lines = joint_lines(panels, trajectory)
-    style.legend_above(panels[0], width, list(lines.values()), list(lines))
+    style.legend_above(panels[0], width, joint_lines(panels, trajectory))
 
 
 def draw_progress(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw the path coordinate."""
     ax.plot(samples.t, samples.s, color="black", linewidth=style.LINE_WIDTH)
-    _dress(ax, trajectory, "$s$")
+    dress(ax, trajectory, "$s$")
     ax.set_ylim(-0.04, 1.04)
 
 
@@ -149,11 +144,12 @@ def draw_tool_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
         near = np.where(allowed < reach, allowed, np.nan)
         if np.isfinite(near).any():
             ax.plot(samples.t, near, color=style.GREY, **style.LIMIT)
-    _dress(ax, trajectory, "tool speed (m/s)")
+    dress(ax, trajectory, "tool speed (m/s)")
     ax.set_ylim(bottom=0.0)
 
 
-def _dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
+def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
+    """Set the labels, with time to the right and the knots of the splines as faint ticks."""
     style.dress(ax, r"$t$ (s)", ylabel)
     style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
 
@@ -193,12 +189,12 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     Examples
     --------
     >>> from brachis import plan
-    >>> from brachis.plots import plot_torques, save_figure
+    >>> from brachis.apps.plots import plot_torques, save_figure
     >>> save_figure(plot_torques(plan("examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
     """
     found = shown_torques(trajectory, dense_samples(trajectory))
     figure = style.new_figure(style.COLUMN_WIDTH, 22.0 + 36.0 * len(found))
-    panels = [figure.add_subplot(len(found), 1, row + 1) for row in range(len(found))]
+    panels = style.stack_panels(figure, len(found))
     draw_torques(panels, trajectory, found)
     legend_joints(panels, trajectory, style.COLUMN_WIDTH - 15.0)
     return figure
@@ -228,19 +224,11 @@ def _draw_ratios(ax: Axes, trajectory: Trajectory, parts: Sequence[Quantity]) ->
     """Draw torques and forces over their limits, which may differ in both directions."""
     for part in parts:
         draw_joints(ax, trajectory, part)
-    _draw_band(ax, max(float(np.abs(part.values).max()) for part in parts))
-    labels = (rf"${part.symbol} / {part.symbol}_\mathrm{{max}}$" for part in parts)
-    style.dress(ax, r"$t$ (s)", ", ".join(labels))
-    style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
-
-
-def _draw_band(ax: Axes, largest: float) -> None:
-    """Shade what is forbidden, so that the band stands out and the lines do not."""
+    largest = max(float(np.abs(part.values).max()) for part in parts)
     top = 1.15 * max(1.0, largest)
-    for sign in (-1.0, 1.0):
-        ax.axhline(sign, **style.LIMIT, color=style.GREY)
-        ax.axhspan(
-            sign, sign * top, facecolor=style.FORBIDDEN, edgecolor="none", zorder=0.0
-        )
+    for level in (-1.0, 1.0):
+        style.draw_limit(ax, level, top)
     ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(-top, top)
+    labels = (rf"${part.symbol} / {part.symbol}_\mathrm{{max}}$" for part in parts)
+    dress(ax, trajectory, ", ".join(labels))

@@ -72,9 +72,7 @@ def plot_overview(trajectory: Trajectory) -> Figure:
         figure.align_ylabels(panels)
         joints += panels[:-1]
     lines = joint_lines(joints, trajectory)
-    style.legend_below(
-        figure, style.PAGE_WIDTH - 10.0, list(lines.values()), list(lines)
-    )
+    style.legend_below(figure, style.PAGE_WIDTH - 10.0, lines)
     return figure
 
 

@@ -178,14 +178,13 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
     from matplotlib.lines import Line2D
 
     first, *_, last = _shades()
-    handles: list[Artist] = [
-        Line2D([], [], color=tuple(first), linewidth=2.2),
-        Line2D([], [], color=tuple(last), linewidth=2.2),
-        Line2D([], [], color=_PATH_COLOUR, linewidth=1.4),
-    ]
-    labels = ["start", "end", "tool path"]
+    lines: dict[str, Artist] = {
+        "start": Line2D([], [], color=tuple(first), linewidth=2.2),
+        "end": Line2D([], [], color=tuple(last), linewidth=2.2),
+        "tool path": Line2D([], [], color=_PATH_COLOUR, linewidth=1.4),
+    }
     if trajectory.redundant_joints:
-        circle = Line2D(
+        lines["redundant"] = Line2D(
             [],
             [],
             linestyle="",
@@ -194,9 +193,7 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
             markerfacecolor=_REDUNDANT_COLOUR,
             markeredgecolor=tuple(last),
         )
-        handles.append(circle)
-        labels.append("redundant")
-    style.legend_above(ax, width, handles, labels)
+    style.legend_above(ax, width, lines)
 
 
 def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:

@@ -104,7 +104,7 @@ def make_report(
     Examples
     --------
     >>> import brachis
-    >>> from brachis.report import make_report
+    >>> from brachis.apps.report import make_report
     >>> page = make_report(brachis.Trajectory.load("out/result.npz"))  # doctest: +SKIP
     >>> page.save("out/report.html")  # doctest: +SKIP
     """
