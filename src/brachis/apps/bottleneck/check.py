@@ -3,7 +3,7 @@
 Knots, collocation points and branch margins stay; every solve begins at the answer and is held to a tighter tolerance.
 An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself. Where a
 change is not as predicted, the unchanged problem is solved again from the new answer: a step into the valley of another
-local optimum is no change that the limit makes.
+local optimum is not an effect of the limit.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class SensitivityCheck(Summary):
     wall_time: float
 
     def worst_deviation(self, above: float = 1e-4) -> float:
-        """Largest deviation among `larger` changes that were solved to an optimum; 0 where there are none."""
+        """Largest deviation among `larger` changes that were solved to an optimum; 0 if there are none."""
         return max(
             (entry.deviation for entry in self.larger(above) if entry.optimal),
             default=0.0,
@@ -235,7 +235,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     Raises
     ------
     PlanningError
-        No backend found a feasible point, and x is none.
+        No backend found a feasible point, and x is not feasible either.
     """
     answers: list[np.ndarray] = []
     curved = any(limit.where == "whole" for limit in program.limits)

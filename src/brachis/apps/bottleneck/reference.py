@@ -1,17 +1,16 @@
-"""The best value known: the same problem with discontinuous torque allowed, on a fine mesh.
+"""Two comparisons that show what a motion loses: the best value known, and the knots.
 
-Rest means zero velocity only, and the splines have many more intervals than the answer, so that torques may leave
-their static values at once and switch as fast as the mesh allows. Cubic splines are tried on the answer's own mesh and
-then on finer ones, each from the motion before, at last parabolas, whose torques jump at every knot; the fastest motion
-within the limits counts. Redundant joints and branch stay. It is the best value known for them and no proven bound: it
-is another local optimum, on a mesh that is finite still.
+The reference is the same problem with discontinuous torque, on a fine mesh. Rest means
+zero velocity only, so that torques may leave their static values at once. Cubic splines
+are tried on the answer's own mesh and then on finer ones, and finally parabolas, whose
+torques jump at every knot. Each begins at the best motion so far; redundant joints and
+branch stay. The result is a local optimum on a finite mesh, not a proven bound.
 
-What the knots cost: the motion beside the fastest timing of its own joint path.
-
-A spline can only ramp from one limit to another, so that few knot intervals cost time that no limit accounts
-for. The phase plane (`brachis.search.phase_plane`) times the same joint path with torques that may jump; with ever more
-intervals splines come as near to that as one likes. The motion that it finds counts only if it keeps to all limits,
-also to those that it leaves out (friction, power, means).
+The cost of the knots compares the motion with the fastest timing of its own joint path.
+A spline can only ramp from one limit to another, so few knot intervals cost time. The
+phase plane (`brachis.search.phase_plane`) times the same joint path with torques that
+may jump. Its motion counts only if it also keeps the limits that the phase plane leaves
+out (friction, power, means).
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Which limit is active when, and for how much of the time, from the trajectory alone.
-
-How near a motion is to its limits over time.
-"""
+"""Ratios of a motion to its limits over time, and when each limit is active."""
 
 from __future__ import annotations
 

@@ -5,8 +5,6 @@ of them gives way (`brachis.limits.Bound`): with the multipliers w of these rows
 
     dt_E / d(figure) = -sum w d.
 
-See `multipliers` for w, and for what holds where it is not unique.
-
 Multipliers of a solved program: the solver's where they balance the gradient, otherwise least squares.
 
 At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
@@ -26,7 +24,7 @@ Multipliers are derivatives: they hold for steps so small that the same rows sta
 
     minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
 
-with the raised limit lets other rows take over within the step. Its optimum is no lower than what the multipliers
+with the raised limit lets other rows take over within the step. Its optimum is not lower than what the multipliers
 promise, since they are feasible for its dual; it tells how much of the promise other limits take back.
 """
 
@@ -446,7 +444,7 @@ class Sensitivities(Summary):
         return self.residual <= STATIONARY
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
-        """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError where there is none."""
+        """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
         for entry in self.limits:
             if (entry.label.subject, entry.label.kind, entry.bound.end) == (
                 subject,

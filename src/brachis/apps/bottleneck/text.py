@@ -34,21 +34,15 @@ def in_words(
     degrees: bool,
 ) -> list[str]:
     """Say what a report found, a line each; see `BottleneckReport` for its parts."""
-    lines = [
-        *(
-            ["the motion was not planned: what a limit costs is not known"]
-            if sensitivities is None
-            else []
-        ),
-        *(
-            []
-            if sensitivities is None
-            else _costs(sensitivities, t_end, degrees=degrees)
-        ),
-        *([] if knots is None else _knots(knots, t_end)),
-        *([] if check is None else _check_lines(check)),
-        *active_in_words(saturations),
-    ]
+    if sensitivities is None:
+        lines = ["the motion was not planned: what a limit costs is not known"]
+    else:
+        lines = _costs(sensitivities, t_end, degrees=degrees)
+    if knots is not None:
+        lines += _knots(knots, t_end)
+    if check is not None:
+        lines += _check_lines(check)
+    lines += active_in_words(saturations)
     if reference is not None:
         lines.append(_reference(reference, t_end))
     elif reference_sought:
@@ -78,11 +72,12 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     lines.append(
         f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})"
     )
-    return lines + [
-        _boundary(e)
-        for e in found.boundaries
-        if e.derivative * e.margin > _NOTHING * t_end
+    lines += [
+        _boundary(entry)
+        for entry in found.boundaries
+        if entry.derivative * entry.margin > _NOTHING * t_end
     ]
+    return lines
 
 
 def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:

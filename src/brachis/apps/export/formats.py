@@ -90,9 +90,9 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
     Raises
     ------
     UnknownNameError
-        There is no such format.
+        The format does not exist.
     InputError
-        The suffix is none of a format.
+        The suffix does not belong to a format.
     """
     if name is not None:
         if name not in FORMATS:
@@ -149,7 +149,7 @@ def write(
         The format is unknown or cannot hold the motion, `dt` or `last` cannot be used, a library is missing, or the
         file cannot be written.
     UnknownNameError
-        There is no such format or joint.
+        A format or a joint does not exist.
 
     Examples
     --------

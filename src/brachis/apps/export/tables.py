@@ -1,8 +1,8 @@
-"""CSV: one row per sample, SI units, the shortest digits that read back exactly.
+"""Tables of samples in SI units: CSV, Parquet and JSON.
 
-Parquet: the columns of the CSV table as doubles, with units and the robot's name as metadata.
-
-JSON that names its schema.
+CSV has one row per sample, with the shortest digits that read back exactly. Parquet has
+the same columns as doubles, with units and the robot's name as metadata. JSON names its
+schema.
 """
 
 from __future__ import annotations

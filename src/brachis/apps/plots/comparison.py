@@ -1,9 +1,4 @@
-"""End times of many plans side by side.
-
-The end times of all that a search looked at.
-
-How far the points of a path are from the curve that was fitted to them.
-"""
+"""End times of plans and of candidates side by side, and how well a path fits its points."""
 
 from __future__ import annotations
 
@@ -55,7 +50,7 @@ def plot_comparison(
     Raises
     ------
     InputError
-        There are no rows, a case is not finite, a time is not positive, or a pair of case and choice comes twice.
+        `rows` is empty, a case is not finite, a time is not positive, or a pair of case and choice comes twice.
 
     Examples
     --------
@@ -239,7 +234,7 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     Raises
     ------
     InputError
-        There are no candidates, or they are something else.
+        `candidates` is empty, or has other entries than candidates.
     """
     if not isinstance(candidates, Sequence) or not all(
         isinstance(each, Attempt) for each in candidates

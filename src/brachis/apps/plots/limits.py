@@ -1,7 +1,4 @@
-"""How much of every limit is used over time, a panel for each kind.
-
-Which limit is near or active when.
-"""
+"""How much of every limit is used over time: a panel for each kind, or a timeline."""
 
 from __future__ import annotations
 

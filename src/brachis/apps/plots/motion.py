@@ -1,9 +1,4 @@
-"""Joint positions, joint velocities, progress along the path and the tool's speed over time.
-
-Joint torques and forces over time, as fractions of their limits.
-
-Samples that are dense enough for a smooth line and miss no corner.
-"""
+"""Joint quantities, torques, path coordinate and tool speed over time."""
 
 from __future__ import annotations
 

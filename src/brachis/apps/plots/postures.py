@@ -1,7 +1,4 @@
-"""Postures of the robot along the path.
-
-A robot as a stick figure: positions of its joints by forward kinematics.
-"""
+"""Postures of the robot along the path, as stick figures by forward kinematics."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Quantity:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Values over the limits of their directions, both from the centre, (K, j); NaN where there is no limit."""
+        """Values over the limits of their directions, both from the centre, (K, j); NaN without a limit."""
         away = self.values - self.centre
         room = np.where(away > 0.0, self.upper - self.centre, self.centre - self.lower)
         return np.where(self.is_limited, away / room, np.nan)
@@ -217,6 +217,17 @@ def quantities(
     return found
 
 
+def joint_quantities(
+    trajectory: Trajectory, samples: Samples, *kinds: str, degrees: bool = False
+) -> list[list[Quantity]]:
+    """As `quantities`, but a list for each joint; every entry has this joint alone."""
+    parts = quantities(trajectory, samples, *kinds, degrees=degrees)
+    return [
+        [one for part in parts if (one := part.of_joints(part.joints == joint))]
+        for joint in range(trajectory.robot.n)
+    ]
+
+
 def limits_of(limits: Limits, kind: str) -> np.ndarray:
     """Lower and upper limits of one of `KINDS`, (2, n)."""
     if kind == "position":
@@ -225,7 +236,7 @@ def limits_of(limits: Limits, kind: str) -> np.ndarray:
 
 
 def allowed_tool_speeds(trajectory: Trajectory, samples: Samples) -> np.ndarray:
-    """Largest speeds of the tool that the task allows, (c, K), m/s; infinite where there is no limit."""
+    """Largest speeds of the tool that the task allows, (c, K), m/s; infinite without a limit."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
     if limit is None:
         return np.empty((0, len(samples.t)))

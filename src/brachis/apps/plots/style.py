@@ -1,10 +1,6 @@
-"""What all figures share: sizes, fonts, colours, axes and legends.
+"""What all figures share: sizes, fonts, colours, axes, legends, files, notebooks.
 
 Everything is set on the figure at hand; Matplotlib's own settings are left alone.
-
-Figures to files.
-
-Figures in notebooks, which know those of pyplot alone.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The interactive figures of a report, as data and layout of Plotly.
-
-The motion as an animation: stick figures, the tool's trace and the figures of every joint at some times.
-"""
+"""The interactive figures of a report for Plotly, and its animation of stick figures."""
 
 from __future__ import annotations
 
@@ -19,6 +16,7 @@ from brachis.apps.plots.postures import plane_of, skeleton
 from brachis.apps.plots.quantities import (
     Quantity,
     allowed_tool_speeds,
+    joint_quantities,
     kinds_of,
     quantities,
 )
@@ -298,22 +296,27 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
     trajectory = motion.trajectory
     samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 240))
     robot = trajectory.robot
-    joints: list[dict[str, Any]] = [
-        {
+    kinds = kinds_of(trajectory)
+    joints: list[dict[str, Any]] = []
+    for name, unit, parts in zip(
+        robot.joint_names,
+        robot.position_units,
+        joint_quantities(trajectory, samples, *kinds, degrees=motion.degrees),
+        strict=True,
+    ):
+        entries = []
+        for part in parts:
+            entry = {"unit": part.unit, "values": encode(part.values[:, 0])}
+            if part.is_limited[0]:
+                entry["ratios"] = encode(np.abs(part.ratios[:, 0]))
+            entries.append(entry)
+        joint = {
             "name": name,
             "redundant": name in trajectory.redundant_joints,
             "prismatic": unit == "m",
-            "quantities": [],
+            "quantities": entries,
         }
-        for name, unit in zip(robot.joint_names, robot.position_units, strict=True)
-    ]
-    kinds = kinds_of(trajectory)
-    for part in quantities(trajectory, samples, *kinds, degrees=motion.degrees):
-        for column, joint in enumerate(part.joints.tolist()):
-            entry = {"unit": part.unit, "values": encode(part.values[:, column])}
-            if part.is_limited[column]:
-                entry["ratios"] = encode(np.abs(part.ratios[:, column]))
-            joints[joint]["quantities"].append(entry)
+        joints.append(joint)
     return {
         "t": encode(samples.t),
         "s": encode(samples.s),

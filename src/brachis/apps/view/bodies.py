@@ -1,8 +1,6 @@
-"""What is drawn of a robot: for every joint what moves with it, and for joint 0, the world, what stands still.
+"""What is drawn of a robot: the shapes of its URDF or a skeleton, and where they are.
 
-What a URDF says its links look like: primitives and meshes, with their colours.
-
-Where links and tool are.
+Shapes belong to the joint that moves them; joint 0 is the world, which stands still.
 """
 
 from __future__ import annotations
@@ -208,7 +206,7 @@ def _place(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
 
 
 def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
-    """Give a mesh one material that is no metal, RGBA from 0 to 255, and sharp edges unless it has too many faces."""
+    """Give a mesh a matt material, RGBA from 0 to 255, and sharp edges if it has few faces."""
     import trimesh
 
     if len(mesh.faces) <= _PRIMITIVE:

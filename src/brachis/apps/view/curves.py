@@ -1,7 +1,4 @@
-"""The curves of the viewer's plots: joint quantities over their limits, the tool's speed, the use of all limits.
-
-What the viewer draws of a motion, evaluated once.
-"""
+"""What the viewer shows of a motion, evaluated once: frames, path, curves of the plots."""
 
 from __future__ import annotations
 

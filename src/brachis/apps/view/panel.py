@@ -1,9 +1,4 @@
-"""The viewer's controls, tables and plots.
-
-Plots beside the scene, with a line at the instant that is shown.
-
-The clock of the viewer: which instant of the motion is shown.
-"""
+"""The viewer's controls, tables, clock, and plots with a line at the instant shown."""
 
 from __future__ import annotations
 
