@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.apps.plots import style
-from brachis.apps.plots.quantities import Quantity, allowed_tool_speeds, quantities
+from brachis.apps.plots.quantities import REACH, Quantity, near_tool_speeds, quantities
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -34,8 +34,6 @@ def dense_samples(trajectory: Trajectory) -> Samples:
     )
 
 
-_REACH = 0.3  # of the range of all data
-_LEAST_RANGE = 1e-9
 _PROGRESS_MM = 26.0
 
 
@@ -134,11 +132,8 @@ def draw_tool_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
         color="black",
         linewidth=style.LINE_WIDTH,
     )
-    reach = (1.0 + _REACH) * max(float(samples.tool_speed.max()), _LEAST_RANGE)
-    for allowed in allowed_tool_speeds(trajectory, samples):
-        near = np.where(allowed < reach, allowed, np.nan)
-        if np.isfinite(near).any():
-            ax.plot(samples.t, near, color=style.GREY, **style.LIMIT)
+    for allowed in near_tool_speeds(trajectory, samples):
+        ax.plot(samples.t, allowed, color=style.GREY, **style.LIMIT)
     dress(ax, trajectory, "tool speed (m/s)")
     ax.set_ylim(bottom=0.0)
 
@@ -151,7 +146,7 @@ def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
 
 def _draw_limits(ax: Axes, part: Quantity) -> None:
     """Draw every joint's own limits where it comes near them; joints that share a level share its dashes."""
-    reach = _REACH * max(float(np.ptp(part.values)), _LEAST_RANGE)
+    reach = REACH * max(float(np.ptp(part.values)), 1e-9)
     levels = np.array([part.lower, part.upper])
     near = (levels >= part.values.min(axis=0) - reach) & (
         levels <= part.values.max(axis=0) + reach

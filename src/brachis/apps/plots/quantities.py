@@ -235,6 +235,20 @@ def limits_of(limits: Limits, kind: str) -> np.ndarray:
     return limits.both_ways(kind)
 
 
+REACH = 0.3
+"""Limits are shown if the motion comes as near to them as this part of its range."""
+
+
+def near_tool_speeds(trajectory: Trajectory, samples: Samples) -> list[np.ndarray]:
+    """Select the `allowed_tool_speeds`, (K,), that the motion comes near; NaN elsewhere."""
+    reach = (1.0 + REACH) * max(float(samples.tool_speed.max()), 1e-9)
+    found = [
+        np.where(allowed < reach, allowed, np.nan)
+        for allowed in allowed_tool_speeds(trajectory, samples)
+    ]
+    return [near for near in found if np.isfinite(near).any()]
+
+
 def allowed_tool_speeds(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Largest speeds of the tool that the task allows, (c, K), m/s; infinite without a limit."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)

@@ -284,7 +284,11 @@ def _legend_look(lines: Mapping[str, Artist], width: float) -> dict[str, Any]:
 def draw_limit(ax: Axes, level: float, top: float) -> None:
     """Draw a limit, and shade what is beyond it, up to `top`."""
     ax.axhline(level, color=GREY, **LIMIT)
-    beyond = {"facecolor": FORBIDDEN, "edgecolor": "none", "zorder": 0.0}
+    beyond: dict[str, Any] = {
+        "facecolor": FORBIDDEN,
+        "edgecolor": "none",
+        "zorder": 0.0,
+    }
     ax.axhspan(level, np.sign(level) * top, **beyond)
 
 

@@ -14,10 +14,11 @@ from brachis.apps.plots import style
 from brachis.apps.plots.motion import knot_times
 from brachis.apps.plots.postures import plane_of, skeleton
 from brachis.apps.plots.quantities import (
+    REACH,
     Quantity,
-    allowed_tool_speeds,
     joint_quantities,
     kinds_of,
+    near_tool_speeds,
     quantities,
 )
 from brachis.apps.report.motion import ReportedMotion
@@ -26,8 +27,6 @@ from brachis.apps.report.tables import NEAR
 Figure = dict[str, Any]
 """``data`` and ``layout`` of Plotly."""
 
-_REACH = 0.3
-"""Limits are in view where the motion comes as near to them as this part of its range."""
 _SMALL_PX = 130
 _FRAME_PX = 110
 _SHOWN = 0.5
@@ -77,29 +76,19 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     layout[_axis("yaxis", last)] = _value_axis(
         "tool speed (m/s)", _domains(heights)[-1], None
     )
-    look = {
-        "line": {"color": style.COLOURS[-1], "width": 1.6},
-        "name": "tool",
-        "showlegend": False,
-    }
-    hover = {"hovertemplate": "%{y:.4g} m/s<extra>tool</extra>"}
-    data.append({**_curve(samples.t, samples.tool_speed, last), **look, **hover})
-    for allowed in allowed_tool_speeds(trajectory, samples):
-        near = np.where(
-            allowed < (1.0 + _REACH) * samples.tool_speed.max(), allowed, np.nan
-        )
-        thin = {"color": style.GREY, "width": 1, "dash": "4px,4px"}
-        limit = {
-            **_curve(samples.t, near, last),
-            "line": thin,
-            "name": "limit of the tool speed",
-            "showlegend": False,
-        }
-        data += (
-            [{**limit, "hoverinfo": "skip", "meta": "limit"}]
-            if np.isfinite(near).any()
-            else []
-        )
+    speed = _curve(
+        samples.t,
+        samples.tool_speed,
+        last,
+        line={"color": style.COLOURS[-1], "width": 1.6},
+        name="tool",
+        showlegend=False,
+        hovertemplate="%{y:.4g} m/s<extra>tool</extra>",
+    )
+    data.append(speed)
+    for allowed in near_tool_speeds(trajectory, samples):
+        name = "limit of the tool speed"
+        data.append(_limit_line(samples.t, allowed, last, style.GREY, name=name))
     layout["xaxis"] |= {"anchor": f"y{last}", "title": {"text": "t (s)"}}
     layout["xaxis"]["minor"] = {
         "tickvals": knot_times(trajectory).tolist(),
@@ -123,38 +112,25 @@ def _joint_traces(
     joint = style.joint_style(int(part.joints[column]))
     values = part.values[:, column]
     levels = (part.lower[column], part.upper[column])
-    line = {
+    group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
+    hover = f"%{{y:.4g}} {part.unit}"
+    look: dict[str, Any] = {**group, "showlegend": shown}
+    if np.isfinite(levels).all():
+        look["customdata"] = encode(100.0 * np.abs(part.ratios[:, column]))
+        hover += f", %{{customdata:.1f}} % of {part.of}"
+    look["hovertemplate"] = f"{hover}<extra>{_escape(name)}</extra>"
+    look["line"] = {
         "color": joint["color"],
         "width": 1.8,
         "dash": _dash(joint["linestyle"]),
         "simplify": False,
     }
-    group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
-    hover = f"%{{y:.4g}} {part.unit}"
-    share = {}
-    if np.isfinite(levels).all():
-        share = {"customdata": encode(100.0 * np.abs(part.ratios[:, column]))}
-        hover += f", %{{customdata:.1f}} % of {part.of}"
-    curve = {
-        **_curve(part.t, values, row),
-        **group,
-        **share,
-        "line": line,
-        "showlegend": shown,
-    }
-    traces = [{**curve, "hovertemplate": f"{hover}<extra>{_escape(name)}</extra>"}]
-    ends = part.t[[0, -1]]
-    for level in levels:
-        if np.isfinite(level):
-            thin = {"color": joint["color"], "width": 1, "dash": "4px,4px"}
-            limit = {
-                **_curve(ends, np.full(2, level), row),
-                **group,
-                "line": thin,
-                "showlegend": False,
-            }
-            traces.append({**limit, "hoverinfo": "skip", "meta": "limit"})
-    return traces
+    limits = [
+        _limit_line(part.t[[0, -1]], np.full(2, level), row, joint["color"], **group)
+        for level in levels
+        if np.isfinite(level)
+    ]
+    return [_curve(part.t, values, row, **look), *limits]
 
 
 def timeline_figure(motion: ReportedMotion) -> Figure:
@@ -208,14 +184,25 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     return {"data": [heat] if entries else [], "layout": layout}
 
 
-def _curve(t: np.ndarray, values: np.ndarray, row: int) -> dict[str, Any]:
+def _curve(t: np.ndarray, values: np.ndarray, row: int, **look: Any) -> dict[str, Any]:
+    """Return a curve of the panel with this number."""
     return {
         "type": "scatter",
         "mode": "lines",
         "x": encode(t),
         "y": encode(values),
         "yaxis": f"y{row}",
+        **look,
     }
+
+
+def _limit_line(
+    t: np.ndarray, values: np.ndarray, row: int, colour: str, **look: Any
+) -> dict[str, Any]:
+    """Return a thin dashed line, without an entry in the legend."""
+    line = {"color": colour, "width": 1, "dash": "4px,4px"}
+    look |= {"line": line, "showlegend": False, "hoverinfo": "skip", "meta": "limit"}
+    return _curve(t, values, row, **look)
 
 
 def _layout(t_end: float, height: float) -> dict[str, Any]:
@@ -238,14 +225,16 @@ def _value_axis(
         "anchor": "x",
         "zeroline": True,
     }
-    return axis if view is None else {**axis, "range": view}
+    if view is not None:
+        axis["range"] = view
+    return axis
 
 
 def _view(parts: Sequence[Quantity]) -> tuple[float, float]:
     """Range of values in view: the motion, and the limits that it comes near."""
     low = min(float(part.values.min()) for part in parts)
     high = max(float(part.values.max()) for part in parts)
-    reach = _REACH * max(high - low, 1e-9)
+    reach = REACH * max(high - low, 1e-9)
     levels = np.concatenate(
         [level for part in parts for level in (part.lower, part.upper)]
     )
