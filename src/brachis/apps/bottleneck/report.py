@@ -231,14 +231,12 @@ class BottleneckReport:
         """Return the figures as plain data for JSON."""
         return {
             "t_end_s": self.t_end,
-            "sensitivities": None
-            if self.sensitivities is None
-            else self.sensitivities.to_dict(),
+            "sensitivities": self.sensitivities and self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
-            "knots": None if self.knots is None else self.knots.to_dict(),
-            "check": None if self.check is None else self.check.to_dict(),
-            "reference": None if self.reference is None else self.reference.to_dict(),
+            "knots": self.knots and self.knots.to_dict(),
+            "check": self.check and self.check.to_dict(),
+            "reference": self.reference and self.reference.to_dict(),
         }
 
 

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Protocol
 
 from brachis.apps.export.animation import export_gif, export_mp4
-from brachis.apps.export.ros2 import export_mcap, export_ros2_yaml
+from brachis.apps.export.controllers import (
+    export_mcap,
+    export_ros2_yaml,
+    export_urscript,
+)
 from brachis.apps.export.tables import export_csv, export_json, export_parquet
-from brachis.apps.export.urscript import export_urscript
 from brachis.errors import InputError, UnknownNameError
 from brachis.trajectory import Motion, Trajectory, motion_of
 

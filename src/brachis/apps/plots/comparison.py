@@ -143,6 +143,13 @@ def _draw(
     """Draw one panel of grouped bars with their values; pairs without a row leave a gap."""
     width = 0.84 / len(choices)
     found = {pair: t_end for pair, t_end in cells.items() if not math.isnan(t_end)}
+    best = {
+        case: min(
+            (found[case, choice] for choice in choices if (case, choice) in found),
+            default=math.nan,
+        )
+        for case in cases
+    }
     for column, choice in enumerate(choices):
         shift = (column - 0.5 * (len(choices) - 1)) * width
         places = [
@@ -158,16 +165,8 @@ def _draw(
         )
         for place, case in enumerate(cases):
             if (case, choice) in cells:
-                best = min(
-                    (found[case, other] for other in choices if (case, other) in found),
-                    default=math.nan,
-                )
-                _write(
-                    ax,
-                    place + shift,
-                    cells[case, choice],
-                    bold=cells[case, choice] == best,
-                )
+                t_end = cells[case, choice]
+                _write(ax, place + shift, t_end, bold=t_end == best[case])
     style.dress(ax, "", r"$t_\mathrm{E}$ (s)")
     ax.set_xticks(
         range(len(cases)), [style.plain(f"{_name(case)}{unit}") for case in cases]
@@ -258,18 +257,12 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
         *(each for each in candidates[1:] if each.status != SAME_MOTION),
     ]
     rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
-    refining = (
-        candidates[0].t_end / candidates[0].coarse
-        if math.isfinite(candidates[0].t_end)
-        else 1.0
-    )
-    known = [
-        time
-        for each in candidates
-        for time in [_time(each, refining, math.inf)]
-        if math.isfinite(time)
-    ]
-    edge = 1.05 * max(known, default=1.0)
+    fastest = candidates[0]
+    refining = 1.0
+    if math.isfinite(fastest.t_end):
+        refining = fastest.t_end / fastest.coarse
+    times = [_time(candidate, refining, math.inf) for candidate in candidates]
+    edge = 1.05 * max(filter(math.isfinite, times), default=1.0)
     figure = style.new_figure(style.PAGE_WIDTH, 24.0 + 5.0 * len(rows))
     ax = figure.add_subplot()
     drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}

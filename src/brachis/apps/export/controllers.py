@@ -1,4 +1,8 @@
-"""ROS 2's ``JointTrajectory``: YAML for ``ros2 topic pub``, and an MCAP bag."""
+"""Formats of controllers: ROS 2's ``JointTrajectory`` and URScript.
+
+The message of ROS 2 is written as YAML for ``ros2 topic pub``, or in an MCAP bag. A
+URScript program gives Universal Robots' arms one ``servoj`` command a period.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ import yaml
 
 from brachis.apps.export.rows import JointRows, require_library, rows_of
 from brachis.common.files import atomic_write
+from brachis.errors import InputError
 from brachis.trajectory import Trajectory
 
 MESSAGE: Final = "trajectory_msgs/msg/JointTrajectory"
@@ -95,3 +100,74 @@ def export_mcap(
         schema = writer.register_msgdef(MESSAGE, _DEFINITION)
         writer.write_message(TOPIC, schema, message, log_time=0, publish_time=0)
         writer.add_metadata("brachis", {"left_out": "; ".join(rows.left_out)})
+
+
+_LOOKAHEAD = 0.03
+"""The shortest lookahead time of servoj, s."""
+_GAIN = 300
+"""Proportional gain of servoj, the default of its manual."""
+_NEAR = 0.005
+"""Distance of a joint from the start posture at which the program still begins, rad."""
+
+
+def export_urscript(
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    dt: float,
+    *,
+    last: str = "hold",
+    joints: Sequence[str] | None = None,
+) -> None:
+    """Write a program with one ``servoj`` a period; see `brachis.export.write` for the parameters.
+
+    The program halts with a message where the arm is not at the start posture, and moves nothing then.
+
+    Raises
+    ------
+    InputError
+        There are other joints than six revolute ones; an arm on a rail is written with its six as `joints`, and the
+        rail, which its own controller moves at the same time, in another format.
+    """
+    rows = rows_of(trajectory, dt, last, joints)
+    if rows.units != ("rad",) * 6:
+        raise InputError(
+            "servoj takes the angles of six joints",
+            where="joints",
+            found=", ".join(
+                f"{name} ({unit})"
+                for name, unit in zip(rows.joints, rows.units, strict=True)
+            ),
+            allowed="six revolute joints, from the base on",
+            hint="Name the arm's six as joints, and write others, such as a rail, in another format",
+        )
+    with atomic_write(path) as stream:
+        stream.write(("\n".join(_lines(rows, trajectory.t_end)) + "\n").encode())
+
+
+def _lines(rows: JointRows, t_end: float) -> list[str]:
+    """Return the program's lines; a command leads to its row's posture within the period before it."""
+    first, *postures = (f"[{', '.join(map(repr, row))}]" for row in rows.q.tolist())
+    periods = np.diff(rows.t).round(12).tolist()
+    moves = [
+        f"  servoj({posture}, 0, 0, {period!r}, {_LOOKAHEAD}, {_GAIN})"
+        for posture, period in zip(postures, periods, strict=True)
+    ]
+    return [
+        "def brachis_motion():",
+        f"  # {len(postures)} periods, {t_end:.6g} s; joints {', '.join(rows.joints)}, rad",
+        *(f"  # {sentence}" for sentence in rows.left_out),
+        f"  start = {first}",
+        "  now = get_actual_joint_positions()",
+        "  i = 0",
+        "  while i < 6:",
+        f"    if norm(now[i] - start[i]) > {_NEAR}:",
+        '      popup("The arm is not at the start posture of the motion", error=True, blocking=True)',
+        "      halt",
+        "    end",
+        "    i = i + 1",
+        "  end",
+        *moves,
+        "  stopj(10)",
+        "end",
+        "brachis_motion()",
+    ]
