@@ -103,8 +103,9 @@ class Quantity:
 class _Kind:
     """A kind of quantity.
 
-    Symbols and names are those of revolute and of prismatic joints. A kind with
-    `if_limited` is shown only if the robot limits it.
+    Symbols and names are those of revolute and of prismatic joints. With `in_range` the
+    limits are a range, and ratios count from its middle. A kind with `if_limited` is
+    shown only if the robot limits it.
     """
 
     values: Callable[[Trajectory, Samples], np.ndarray]
@@ -112,6 +113,7 @@ class _Kind:
     names: tuple[str, str]
     share: str = ""
     of: str = "its limit"
+    in_range: bool = False
     if_limited: bool = False
 
 
@@ -122,6 +124,7 @@ KINDS = {
         ("position", "position"),
         share="position in its range",
         of="the way from the middle of its range to an end",
+        in_range=True,
     ),
     "velocity": _Kind(
         lambda _, samples: samples.qdot,
@@ -196,7 +199,7 @@ def quantities(
             low = factor * lower[joints]
             high = factor * upper[joints]
             centre = np.zeros(len(joints))
-            if name == "position":
+            if kind.in_range:
                 is_range = np.isfinite(low) & np.isfinite(high)
                 centre[is_range] = 0.5 * low[is_range] + 0.5 * high[is_range]
             found.append(
@@ -230,9 +233,8 @@ def joint_quantities(
 
 def limits_of(limits: Limits, kind: str) -> np.ndarray:
     """Lower and upper limits of one of `KINDS`, (2, n)."""
-    if kind == "position":
-        return np.array([limits.position_lower, limits.position_upper])
-    return limits.both_ways(kind)
+    ranges = {"position": np.array([limits.position_lower, limits.position_upper])}
+    return ranges[kind] if kind in ranges else limits.both_ways(kind)
 
 
 REACH = 0.3
