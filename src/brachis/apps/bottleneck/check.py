@@ -4,6 +4,15 @@ Knots, collocation points and branch margins stay; every solve begins at the ans
 An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself. Where a
 change is not as predicted, the unchanged problem is solved again from the new answer: a step into the valley of another
 local optimum is not an effect of the limit.
+
+The change of t_E for a limit that rises by a finite step, from the problem linearised at its answer.
+
+Multipliers are derivatives: they hold for steps so small that the same rows stay active. The linear program
+
+    minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
+
+with the raised limit lets other rows take over within the step. Its optimum is not lower than what the multipliers
+promise, since they are feasible for its dual; it tells how much of the promise other limits take back.
 """
 
 from __future__ import annotations
@@ -18,8 +27,8 @@ from threadpoolctl import ThreadpoolController
 from brachis.apps.bottleneck.sensitivities import (
     Sensitivities,
     Sensitivity,
-    linearised_change,
     multipliers_of,
+    rows_and_jacobian,
     sensitivities,
 )
 from brachis.common.summary import Summary
@@ -28,6 +37,10 @@ from brachis.optimise.backends import SolverOptions, residual, solver_named
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Refined
 
+_NEAR = 0.1
+"""Rows farther from their bounds are left out at first; dimensionless."""
+_LARGEST_STEP = 1.0
+"""Of any variable: directions that change nothing to first order are not followed without end."""
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
 _OPTIONS = SolverOptions(tolerance=1e-8)
@@ -227,6 +240,73 @@ def _compare(
         other_optimum=t_end(before) - t_end(base),
         optimal=optimal,
     )
+
+
+def linearised_change(program: Program, x: np.ndarray) -> float | None:
+    """Predict the change of t_E from the answer to a problem with less strict limits.
+
+    Parameters
+    ----------
+    program : Program
+        With the raised limit.
+    x : (v,) ndarray
+        Answer to the problem before.
+
+    Returns
+    -------
+    float or None
+        s; None where the linear program has no answer.
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    from scipy import sparse
+
+    rows, jacobian = rows_and_jacobian(program, x)
+    below = np.isfinite(program.lower)
+    above = np.isfinite(program.upper)
+    slopes = sparse.vstack(
+        [-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]],
+        format="csr",
+    )
+    room = np.concatenate(
+        [(rows - program.lower)[below], (program.upper - rows)[above]]
+    )
+    lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
+    highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
+    kept = room < _NEAR
+    gradient = program.gradient(x)
+    while True:
+        step = _solve_linear_program(
+            gradient,
+            slopes[np.flatnonzero(kept)].toarray(),
+            room[kept],
+            lowest,
+            highest,
+        )
+        if step is None:
+            return None
+        overrun = slopes @ step > room + 1e-9
+        if not (overrun & ~kept).any():
+            return float(gradient @ step)
+        kept |= overrun
+
+
+def _solve_linear_program(
+    gradient: np.ndarray,
+    slopes: np.ndarray,
+    room: np.ndarray,
+    lowest: np.ndarray,
+    highest: np.ndarray,
+) -> np.ndarray | None:
+    """Solve the linear program over some of the rows; None where it has no answer."""
+    from scipy.optimize import linprog
+
+    bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
+    found = linprog(gradient, A_ub=slopes, b_ub=room, bounds=bounds, method="highs")
+    return np.asarray(found.x) if found.success else None
 
 
 def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:

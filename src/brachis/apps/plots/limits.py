@@ -55,7 +55,7 @@ def plot_limits(
     figure = style.new_figure(style.COLUMN_WIDTH, 24.0 + 34.0 * len(shown))
     panels = style.stack_panels(figure, len(shown))
     draw_ratios(panels, trajectory, ratios, shown)
-    style.legend_below(figure, style.COLUMN_WIDTH - 10.0, style.labelled(panels))
+    style.legend_below(figure, style.COLUMN_WIDTH - 10.0, style.lines_by_label(panels))
     style.mark_end(panels[-1], trajectory.t_end)
     figure.align_ylabels(panels)
     return figure

@@ -106,7 +106,7 @@ def draw_joints(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
 
 def joint_lines(panels: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
     """Collect one line of every joint that the panels show, in chain order, by its label."""
-    found = style.labelled(panels)
+    found = style.lines_by_label(panels)
     names = map(style.plain, trajectory.joint_names)
     return {name: found[name] for name in names if name in found}
 

@@ -239,7 +239,7 @@ def legend_above(
     lines : mapping of str to Artist, optional
         What the legend shows; by default the labelled artists of the axes.
     """
-    lines = labelled([ax]) if lines is None else lines
+    lines = lines_by_label([ax]) if lines is None else lines
     if lines:
         ax.legend(
             list(lines.values()),
@@ -262,7 +262,7 @@ def legend_below(figure: Figure, width: float, lines: Mapping[str, Artist]) -> N
     )
 
 
-def labelled(panels: Sequence[Axes]) -> dict[str, Artist]:
+def lines_by_label(panels: Sequence[Axes]) -> dict[str, Artist]:
     """Artists of some axes by their labels."""
     return {
         label: line
