@@ -261,8 +261,8 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     refining = 1.0
     if math.isfinite(fastest.t_end):
         refining = fastest.t_end / fastest.coarse
-    times = [_time(candidate, refining, math.inf) for candidate in candidates]
-    edge = 1.05 * max(filter(math.isfinite, times), default=1.0)
+    end_times = [_time(candidate, refining, math.inf) for candidate in candidates]
+    edge = 1.05 * max(filter(math.isfinite, end_times), default=1.0)
     figure = style.new_figure(style.PAGE_WIDTH, 24.0 + 5.0 * len(rows))
     ax = figure.add_subplot()
     drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
