@@ -130,7 +130,7 @@ def test_linearised_changes_promise_no_more_than_multipliers(scara, joint):
 
 def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch):
     refined = scara("j3").attempt.refined
-    honest, valley = check._solved_again, 2e-3
+    honest, valley = check._solve_again, 2e-3
 
     def wandering(program, x):
         """Find an optimum that is faster by `valley`, whatever the limits, once a limit has been raised."""
@@ -144,7 +144,7 @@ def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch
         entry.sensitivity: entry.re_solved
         for entry in check_sensitivities(refined).entries
     }
-    monkeypatch.setattr(check, "_solved_again", wandering)
+    monkeypatch.setattr(check, "_solve_again", wandering)
     for entry in check_sensitivities(refined).entries:
         if entry.predicted:
             assert entry.other_optimum == pytest.approx(-valley, rel=1e-3)

@@ -130,9 +130,8 @@ assert "matplotlib" not in sys.modules, "imported with the package"
 import matplotlib
 before = dict(dict.items(matplotlib.rcParams))  # whose own items would choose a backend
 from brachis.trajectory import Trajectory
-from brachis.apps.plots import PLOTS, plot_comparison, save_figure
-from brachis.apps.plots import style as save
-save._DPI = 30
+from brachis.apps.plots import PLOTS, plot_comparison, save_figure, style
+style._DPI = 30
 trajectory = Trajectory.load(sys.argv[1])
 for name, plot in PLOTS.items():
     save_figure(plot(trajectory), f"{sys.argv[2]}/{name}.png")

@@ -3,7 +3,16 @@
 Knots, collocation points and branch margins stay; every solve begins at the answer and is held to a tighter tolerance.
 An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself. Where a
 change is not as predicted, the unchanged problem is solved again from the new answer: a step into the valley of another
-local optimum is no change that the limit makes.
+local optimum is not an effect of the limit.
+
+The change of t_E for a limit that rises by a finite step, from the problem linearised at its answer.
+
+Multipliers are derivatives: they hold for steps so small that the same rows stay active. The linear program
+
+    minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
+
+with the raised limit lets other rows take over within the step. Its optimum is not lower than what the multipliers
+promise, since they are feasible for its dual; it tells how much of the promise other limits take back.
 """
 
 from __future__ import annotations
@@ -18,8 +27,8 @@ from threadpoolctl import ThreadpoolController
 from brachis.apps.bottleneck.sensitivities import (
     Sensitivities,
     Sensitivity,
-    linearised_change,
     multipliers_of,
+    rows_and_jacobian,
     sensitivities,
 )
 from brachis.common.summary import Summary
@@ -28,10 +37,13 @@ from brachis.optimise.backends import SolverOptions, residual, solver_named
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Refined
 
+_NEAR = 0.1
+"""Rows farther from their bounds are left out at first; dimensionless."""
+_LARGEST_STEP = 1.0
+"""Of any variable: directions that change nothing to first order are not followed without end."""
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
 _OPTIONS = SolverOptions(tolerance=1e-8)
-_OPTIMAL = 1e-5
 _FEASIBLE = 1e-7
 _EXACT = 1e-9
 """An answer that violates no row and leaves no gradient beyond this is not solved again."""
@@ -126,7 +138,7 @@ class SensitivityCheck(Summary):
     wall_time: float
 
     def worst_deviation(self, above: float = 1e-4) -> float:
-        """Largest deviation among `larger` changes that were solved to an optimum; 0 where there are none."""
+        """Largest deviation among `larger` changes that were solved to an optimum; 0 if there are none."""
         return max(
             (entry.deviation for entry in self.larger(above) if entry.optimal),
             default=0.0,
@@ -177,31 +189,32 @@ def check_sensitivities(
     with ThreadpoolController().limit(
         limits=1, user_api="blas"
     ):  # as in `plan`: batches are small
-        return _checked(refined, predictions or sensitivities(refined), step)
+        return _check_limits(refined, predictions or sensitivities(refined), step)
 
 
-def _checked(
+def _check_limits(
     refined: Refined, predictions: Sensitivities, step: float
 ) -> SensitivityCheck:
     """Compare limit by limit."""
     began = time.perf_counter()
     program = refined.program
-    base, t_end = refined.reports[-1].x, program.end_time
-    if residual(program, base) > _EXACT or _unbalanced(program, base) > _EXACT:
-        base, _ = _solved_again(program, base)
+    base = refined.reports[-1].x
+    t_end = program.end_time
+    if residual(program, base) > _EXACT or _stationarity(program, base) > _EXACT:
+        base, _ = _solve_again(program, base)
     checked = []
     for entry in predictions.limits:
         if abs(entry.change(step)) <= _NO_CHANGE * t_end(base):
             checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
         else:
             raised = program.relaxed(entry.limit, entry.bound, step * entry.bound.whole)
-            checked.append(_compared(entry, entry.change(step), program, raised, base))
+            checked.append(_compare(entry, entry.change(step), program, raised, base))
     return SensitivityCheck(
         step, t_end(base), tuple(checked), time.perf_counter() - began
     )
 
 
-def _compared(
+def _compare(
     entry: Sensitivity,
     predicted: float,
     program: Program,
@@ -210,11 +223,12 @@ def _compared(
 ) -> CheckedSensitivity:
     """Solve with one limit raised, and back where the change is suspicious."""
     linearised = linearised_change(raised, base)
-    answer, optimal = _solved_again(raised, base)
+    answer, optimal = _solve_again(raised, base)
     t_end = program.end_time
-    before, off = base, abs(predicted - (t_end(answer) - t_end(base)))
+    before = base
+    off = abs(predicted - (t_end(answer) - t_end(base)))
     if off > _SUSPICIOUS * abs(predicted) and off > _SAME * t_end(base):
-        before, sure = _solved_again(program, answer)
+        before, sure = _solve_again(program, answer)
         optimal = optimal and sure
         if abs(t_end(before) - t_end(base)) <= _SAME * t_end(base):
             before = base
@@ -228,13 +242,80 @@ def _compared(
     )
 
 
-def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
+def linearised_change(program: Program, x: np.ndarray) -> float | None:
+    """Predict the change of t_E from the answer to a problem with less strict limits.
+
+    Parameters
+    ----------
+    program : Program
+        With the raised limit.
+    x : (v,) ndarray
+        Answer to the problem before.
+
+    Returns
+    -------
+    float or None
+        s; None where the linear program has no answer.
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    from scipy import sparse
+
+    rows, jacobian = rows_and_jacobian(program, x)
+    below = np.isfinite(program.lower)
+    above = np.isfinite(program.upper)
+    slopes = sparse.vstack(
+        [-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]],
+        format="csr",
+    )
+    room = np.concatenate(
+        [(rows - program.lower)[below], (program.upper - rows)[above]]
+    )
+    lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
+    highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
+    kept = room < _NEAR
+    gradient = program.gradient(x)
+    while True:
+        step = _solve_linear_program(
+            gradient,
+            slopes[np.flatnonzero(kept)].toarray(),
+            room[kept],
+            lowest,
+            highest,
+        )
+        if step is None:
+            return None
+        overrun = slopes @ step > room + 1e-9
+        if not (overrun & ~kept).any():
+            return float(gradient @ step)
+        kept |= overrun
+
+
+def _solve_linear_program(
+    gradient: np.ndarray,
+    slopes: np.ndarray,
+    room: np.ndarray,
+    lowest: np.ndarray,
+    highest: np.ndarray,
+) -> np.ndarray | None:
+    """Solve the linear program over some of the rows; None where it has no answer."""
+    from scipy.optimize import linprog
+
+    bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
+    found = linprog(gradient, A_ub=slopes, b_ub=room, bounds=bounds, method="highs")
+    return np.asarray(found.x) if found.success else None
+
+
+def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     """Solve to a tight tolerance from x with one backend after the other; tell whether it is an optimum.
 
     Raises
     ------
     PlanningError
-        No backend found a feasible point, and x is none.
+        No backend found a feasible point, and x is not feasible either.
     """
     answers: list[np.ndarray] = []
     curved = any(limit.where == "whole" for limit in program.limits)
@@ -245,7 +326,7 @@ def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
             continue
         if report.violation > _FEASIBLE:
             continue
-        if _unbalanced(program, report.x) <= _OPTIMAL:
+        if _stationarity(program, report.x) <= 1e-5:
             return report.x, True
         answers.append(report.x)
     if residual(program, x) <= _FEASIBLE:
@@ -258,7 +339,7 @@ def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     return min(answers, key=program.end_time), False
 
 
-def _unbalanced(program: Program, x: np.ndarray) -> float:
+def _stationarity(program: Program, x: np.ndarray) -> float:
     try:
         return multipliers_of(program, x).residual
     except UnreachableError:

@@ -1,17 +1,16 @@
-"""The best value known: the same problem with discontinuous torque allowed, on a fine mesh.
+"""Two comparisons that show what a motion loses: the best value known, and the knots.
 
-Rest means zero velocity only, and the splines have many more intervals than the answer, so that torques may leave
-their static values at once and switch as fast as the mesh allows. Cubic splines are tried on the answer's own mesh and
-then on finer ones, each from the motion before, at last parabolas, whose torques jump at every knot; the fastest motion
-within the limits counts. Redundant joints and branch stay. It is the best value known for them and no proven bound: it
-is another local optimum, on a mesh that is finite still.
+The reference is the same problem with discontinuous torque, on a fine mesh. Rest means
+zero velocity only, so that torques may leave their static values at once. Cubic splines
+are tried on the answer's own mesh and then on finer ones, and finally parabolas, whose
+torques jump at every knot. Each begins at the best motion so far; redundant joints and
+branch stay. The result is a local optimum on a finite mesh, not a proven bound.
 
-What the knots cost: the motion beside the fastest timing of its own joint path.
-
-A spline can only ramp from one limit to another, so that few knot intervals cost time that no limit accounts
-for. The phase plane (`brachis.search.phase_plane`) times the same joint path with torques that may jump; with ever more
-intervals splines come as near to that as one likes. The motion that it finds counts only if it keeps to all limits,
-also to those that it leaves out (friction, power, means).
+The cost of the knots compares the motion with the fastest timing of its own joint path.
+A spline can only ramp from one limit to another, so few knot intervals cost time. The
+phase plane (`brachis.search.phase_plane`) times the same joint path with torques that
+may jump. Its motion counts only if it also keeps the limits that the phase plane leaves
+out (friction, power, means).
 """
 
 from __future__ import annotations
@@ -45,21 +44,13 @@ from brachis.trajectory import Trajectory
 INTERVALS = 100
 """Number of intervals of the fine mesh for one redundant joint, rounded to a multiple of the answer's own."""
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
-_CUBICS, _PARABOLAS = 3, 2
+_PARABOLAS = 2
 _HIGHEST = 2
 """Highest derivative that is bounded where accelerations jump: limits on a higher one are left out."""
-_POINTS = 3
 _BESIDE = 1e-6
 """Parabolas are looked at this much of the whole time before every knot, too: their accelerations jump there."""
-_DENSE = 30
-_FIT_DENSITY = 4
 _AS_GOOD = 1.001
 """A start beyond its limits by less needs no longer time: solvers mend that themselves."""
-_ITERATIONS = 200
-_SECONDS = 2.5
-"""Of one solve."""
-_LEAST_SECONDS = 0.1
-_BACKENDS = 2
 _ROUNDS = 4
 """What still exceeds a limit between collocation points costs some 1e-4 of the time; further solves cost seconds."""
 
@@ -133,23 +124,21 @@ def find_reference(
     with ThreadpoolController().limit(
         limits=1, user_api="blas"
     ):  # as in `plan`: batches are small
-        return _found(refined, tolerance, intervals, time_limit)
+        return _find_faster(refined, tolerance, intervals, time_limit)
 
 
-def _found(
+def _find_faster(
     refined: Refined, tolerance: float, intervals: int, time_limit: float
 ) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
-    (phase,), (motion,) = (
-        refined.program.up_to(_HIGHEST).phases,
-        refined.program.motions(refined.x),
-    )
+    (phase,) = refined.program.up_to(_HIGHEST).phases
+    (motion,) = refined.program.motions(refined.x)
     best: Reference | None = None
     for degree, count in _meshes(phase.intervals, _fine(phase, intervals)):
         if best is not None and time.perf_counter() > began + time_limit:
             break
-        answer = _planned(
+        answer = _plan_on_mesh(
             _on_mesh(phase, degree, count), motion, tolerance, began + time_limit
         )
         violation = np.inf if answer is None else _violation(answer)
@@ -185,38 +174,36 @@ def _fine(phase: Phase, intervals: int) -> int:
 def _meshes(own: int, fine: int) -> tuple[tuple[int, int], ...]:
     """List degrees and numbers of intervals in the order of trying; each begins at the best motion so far."""
     cubics = sorted({own, min(2 * own, fine), fine})
-    return (*((_CUBICS, count) for count in cubics), (_PARABOLAS, fine))
+    return (*((3, count) for count in cubics), (_PARABOLAS, fine))
 
 
 def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
     """Return the phase on a uniform mesh, with rest in velocity alone."""
-    t_norm = np.linspace(0.0, 1.0, _POINTS * intervals + 1)
+    t_norm = np.linspace(0.0, 1.0, 3 * intervals + 1)
     if degree == _PARABOLAS:
         t_norm = np.union1d(t_norm, np.arange(1, intervals) / intervals - _BESIDE)
     grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, t_norm)
     return phase.over(grid, dataclasses.replace(phase.boundary, derivatives=1))
 
 
-def _planned(
+def _plan_on_mesh(
     phase: Phase, motion: Motion, tolerance: float, deadline: float
 ) -> Refined | None:
     """Solve from a motion and refine, with one backend after the other, until one gives a motion within the rows.
 
     It need not be an optimum: any motion within the limits is as good a reference as it is fast.
     """
-    program, t_norm = (
-        Program([phase]),
-        np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots)),
-    )
+    program = Program([phase])
+    t_norm = np.linspace(0.0, 1.0, 4 * len(phase.knots))
     try:
         x = fitted(phase, motion.t_end, t_norm, motion.at(t_norm * motion.t_end)[0])
         if worst_time_scaling_ratio(program, x) > _AS_GOOD:
             x = shortest_time(program, x)
     except UnreachableError:
         return None
-    backends = solver_named("auto")[:_BACKENDS]
+    backends = solver_named("auto")[:2]
     for backend in reversed(backends) if phase.degree == _PARABOLAS else backends:
-        solve = _bounded(backend.solve, deadline)
+        solve = _limit_time(backend.solve, deadline)
         try:
             first = solve(program, x)
         except ImportError:
@@ -237,15 +224,13 @@ def _planned(
     return None
 
 
-def _bounded(backend: Callable[..., SolverReport], deadline: float) -> Solve:
+def _limit_time(backend: Callable[..., SolverReport], deadline: float) -> Solve:
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        seconds = float(
-            np.clip(deadline - time.perf_counter(), _LEAST_SECONDS, _SECONDS)
-        )
+        seconds = float(np.clip(deadline - time.perf_counter(), 0.1, 2.5))
         return backend(
             program,
             x,
-            SolverOptions(max_iterations=_ITERATIONS, time_limit=seconds),
+            SolverOptions(max_iterations=200, time_limit=seconds),
             None,
         )
 
@@ -255,7 +240,7 @@ def _bounded(backend: Callable[..., SolverReport], deadline: float) -> Solve:
 def _violation(answer: Refined) -> float:
     """Largest violation of a limit on a dense grid and on both sides of every knot; infinite where out of reach."""
     ((phase, x),) = answer.program.split(answer.x)
-    grid = np.linspace(0.0, 1.0, _DENSE * phase.intervals + 1)
+    grid = np.linspace(0.0, 1.0, 30 * phase.intervals + 1)
     t_norm = np.unique(
         np.concatenate(
             [grid, phase.breaks, phase.breaks[1:] - 1e-9, phase.breaks[:-1] + 1e-9]
@@ -267,9 +252,8 @@ def _violation(answer: Refined) -> float:
         return np.inf
 
 
-_STATIONS = 1001
-_BISECTIONS = 50
-_WITHIN, _MOST = 0.02, 0.01
+_WITHIN = 0.02
+_MOST = 0.01
 """The motion in the phase plane may exceed limits by more than the first fraction for this fraction of its time: at
 the stations beside rest its derivatives are differences, and rough."""
 _JUMPING = 2
@@ -323,7 +307,7 @@ def knot_cost(
     """
     if any(limit.order > _JUMPING for limit in limits):
         return None
-    s = np.linspace(0.0, 1.0, _STATIONS)
+    s = np.linspace(0.0, 1.0, 1001)
     q = trajectory.position(_times_at(trajectory, s))
     first, last = np.abs(trajectory.path_spline.derivative()([0.0, trajectory.t_end]))
     rate = fastest(limits, s, q, (first, last), s)
@@ -340,11 +324,13 @@ def knot_cost(
 
 def _times_at(trajectory: Trajectory, s: np.ndarray) -> np.ndarray:
     """Find when path coordinates, (S,), are passed, s."""
-    low, high = np.zeros_like(s), np.full_like(s, trajectory.t_end)
-    for _ in range(_BISECTIONS):
+    low = np.zeros_like(s)
+    high = np.full_like(s, trajectory.t_end)
+    for _ in range(50):
         middle = 0.5 * (low + high)
         before = trajectory.path_coordinate(middle) < s
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
+        low = np.where(before, middle, low)
+        high = np.where(before, high, middle)
     return high
 
 

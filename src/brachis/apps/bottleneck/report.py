@@ -1,10 +1,10 @@
-"""The bottleneck report: what every limit costs, which is active when, and how far the motion is from a reference.
+"""The bottleneck report: what limits cost, when they are active, and the reference.
 
-The solved problem that belongs to a saved motion, which has neither collocation points nor multipliers.
-
-Task, URDF, redundant joints and branch, or the chart, knots and control points are saved. The problem is laid down over
-these knots, with the branch margin that the motion keeps, solved from the saved control points and refined as in a
-plan. That takes a few iterations, since the start is an optimum already, and ends at the same one.
+A saved motion has neither collocation points nor multipliers, so its problem is solved
+again. Task, URDF, redundant joints and branch (or the chart), knots and control points
+are saved. The problem is built over these knots, with the branch margin that the motion
+keeps, solved from the saved control points and refined as in a plan. The start is an
+optimum already, so this takes a few iterations and ends at the same one.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def solved_again(trajectory: Trajectory) -> Refined:
     InputError
         The closed form or the branch is not known here; see `brachis.plan`.
     PlanningError
-        The motion is no optimum of its problem: no solver that the task allows came back to it.
+        The motion is not an optimum of its problem: no solver of the task came back to it.
     """
     with ThreadpoolController().limit(
         limits=1, user_api="blas"
@@ -147,7 +147,8 @@ def _answers(
 ) -> Iterator[Refined]:
     """Solve and refine with one backend after the other, until one comes back to the motion."""
     task = trajectory.task
-    deadline, settings = Deadline.after(task.search.time_limit), task.refinement
+    deadline = Deadline.after(task.search.time_limit)
+    settings = task.refinement
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, deadline
     )
@@ -181,7 +182,7 @@ class BottleneckReport:
     t_end : float
         Of the motion, s.
     sensitivities : Sensitivities or None
-        What every limit costs; None of a motion that was not planned, and is no optimum whose multipliers tell.
+        What every limit costs; None for a motion that was not planned.
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
     knots : KnotCost or None
@@ -230,14 +231,12 @@ class BottleneckReport:
         """Return the figures as plain data for JSON."""
         return {
             "t_end_s": self.t_end,
-            "sensitivities": None
-            if self.sensitivities is None
-            else self.sensitivities.to_dict(),
+            "sensitivities": self.sensitivities and self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
-            "knots": None if self.knots is None else self.knots.to_dict(),
-            "check": None if self.check is None else self.check.to_dict(),
-            "reference": None if self.reference is None else self.reference.to_dict(),
+            "knots": self.knots and self.knots.to_dict(),
+            "check": self.check and self.check.to_dict(),
+            "reference": self.reference and self.reference.to_dict(),
         }
 
 
@@ -268,7 +267,7 @@ def report(
     InputError
         The result was made without keeping its solved program, or a trajectory's closed form is not known here.
     PlanningError
-        A trajectory is no optimum of its problem; or, with `check`, no solver could solve the problem again.
+        A trajectory is not an optimum of its problem; or, with `check`, no solver could solve the problem again.
 
     Examples
     --------
@@ -287,7 +286,8 @@ def report(
             raise InputError(problem, where=motion.recovered.source, hint=hint)
         return BottleneckReport(motion.t_end, None, saturations(motion))
     if isinstance(motion, Trajectory):
-        trajectory, refined = motion, solved_again(motion)
+        trajectory = motion
+        refined = solved_again(motion)
     elif motion.attempt.refined is None:
         raise InputError(
             "the result holds no solved problem",
@@ -295,8 +295,10 @@ def report(
             allowed="a result of brachis.plan",
         )
     else:
-        trajectory, refined = motion.trajectory, motion.attempt.refined
-    found, tolerance = sensitivities(refined), trajectory.task.refinement.tolerance
+        trajectory = motion.trajectory
+        refined = motion.attempt.refined
+    found = sensitivities(refined)
+    tolerance = trajectory.task.refinement.tolerance
     limits = [
         limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD
     ]

@@ -1,7 +1,4 @@
-"""Which limit is active when, and for how much of the time, from the trajectory alone.
-
-How near a motion is to its limits over time.
-"""
+"""Ratios of a motion to its limits over time, and when each limit is active."""
 
 from __future__ import annotations
 
@@ -76,10 +73,8 @@ def limit_ratios(
         trajectory.jerk(samples.t),
         samples.s,
     )
-    before, jumps = (
-        _just_before(trajectory),
-        np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:],
-    )
+    before = _just_before(trajectory)
+    jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
     if trajectory.degree <= max(limit.order for limit in limits):
         jumps[:-1] |= np.isin(trajectory.times[1:-1], knots)
     t, *motion = (
@@ -228,7 +223,8 @@ def _stretches(
         ]
     )
     apart = dips < ripple
-    firsts, afters = edges[np.append(True, apart), 0], edges[np.append(apart, True), 1]
+    firsts = edges[np.append(True, apart), 0]
+    afters = edges[np.append(apart, True), 1]
     return [
         (
             _crossing(t, values, first - 1, threshold) if first else float(t[0]),
@@ -244,7 +240,8 @@ def _crossing(
     t: np.ndarray, values: np.ndarray, before: int, threshold: float
 ) -> float:
     """Time between two neighbours at which the line between them meets the threshold, s."""
-    low, high = values[before], values[before + 1]
+    low = values[before]
+    high = values[before + 1]
     return float(
         t[before] + (t[before + 1] - t[before]) * (threshold - low) / (high - low)
     )

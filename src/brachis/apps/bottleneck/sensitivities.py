@@ -5,8 +5,6 @@ of them gives way (`brachis.limits.Bound`): with the multipliers w of these rows
 
     dt_E / d(figure) = -sum w d.
 
-See `multipliers` for w, and for what holds where it is not unique.
-
 Multipliers of a solved program: the solver's where they balance the gradient, otherwise least squares.
 
 At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
@@ -19,15 +17,6 @@ left over, relative to the gradient's, tells how far an answer is from being sta
 If the bounds of the active rows give way at rates d_i >= 0, then dt_E = -sum_i w_i d_i. Where the slopes are linearly
 dependent, many sets of multipliers balance the gradient, and the one that holds for a relaxation is the one that
 promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
-
-The change of t_E for a limit that rises by a finite step, from the problem linearised at its answer.
-
-Multipliers are derivatives: they hold for steps so small that the same rows stay active. The linear program
-
-    minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
-
-with the raised limit lets other rows take over within the step. Its optimum is no lower than what the multipliers
-promise, since they are feasible for its dual; it tells how much of the promise other limits take back.
 """
 
 from __future__ import annotations
@@ -44,12 +33,6 @@ from brachis.optimise.refine import Refined
 
 if TYPE_CHECKING:
     from scipy import sparse
-
-_NEAR = 0.1
-"""Rows farther from their bounds are left out at first; dimensionless."""
-_LARGEST_STEP = 1.0
-"""Of any variable: directions that change nothing to first order are not followed without end."""
-_TOUCHED = 1e-9
 
 
 def rows_and_jacobian(
@@ -71,78 +54,12 @@ def rows_and_jacobian(
     ).tocsr()
 
 
-def linearised_change(program: Program, x: np.ndarray) -> float | None:
-    """Predict the change of t_E from the answer to a problem with less strict limits.
-
-    Parameters
-    ----------
-    program : Program
-        With the raised limit.
-    x : (v,) ndarray
-        Answer to the problem before.
-
-    Returns
-    -------
-    float or None
-        s; None where the linear program has no answer.
-
-    Raises
-    ------
-    UnreachableError
-        A collocation point is out of the branch's reach.
-    """
-    from scipy import sparse
-
-    rows, jacobian = rows_and_jacobian(program, x)
-    below, above = np.isfinite(program.lower), np.isfinite(program.upper)
-    slopes = sparse.vstack(
-        [-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]],
-        format="csr",
-    )
-    room = np.concatenate(
-        [(rows - program.lower)[below], (program.upper - rows)[above]]
-    )
-    lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
-    highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
-    kept, gradient = room < _NEAR, program.gradient(x)
-    while True:
-        step = _solved(
-            gradient,
-            slopes[np.flatnonzero(kept)].toarray(),
-            room[kept],
-            lowest,
-            highest,
-        )
-        if step is None:
-            return None
-        overrun = slopes @ step > room + _TOUCHED
-        if not (overrun & ~kept).any():
-            return float(gradient @ step)
-        kept |= overrun
-
-
-def _solved(
-    gradient: np.ndarray,
-    slopes: np.ndarray,
-    room: np.ndarray,
-    lowest: np.ndarray,
-    highest: np.ndarray,
-) -> np.ndarray | None:
-    """Solve the linear program over some of the rows; None where it has no answer."""
-    from scipy.optimize import linprog
-
-    bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
-    found = linprog(gradient, A_ub=slopes, b_ub=room, bounds=bounds, method="highs")
-    return np.asarray(found.x) if found.success else None
-
-
 ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
 """Distances from a bound within which rows and variables press on it; dimensionless. The least that gives a balance
 counts: solvers differ in how near they come, and a row that is near its bound without being active would count as one
 that takes over within any step."""
 _GOOD = 1e-5
 """The solver's multipliers with a smaller residual are taken as they are."""
-_DEPENDENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -175,10 +92,8 @@ class ActiveSet(Summary):
         values, jacobian = rows_and_jacobian(program, x)
         low = np.flatnonzero(values <= program.lower + near)
         high = np.flatnonzero(values >= program.upper - near)
-        rows, signs = (
-            np.concatenate([low, high]),
-            np.repeat([1.0, -1.0], [len(low), len(high)]),
-        )
+        rows = np.concatenate([low, high])
+        signs = np.repeat([1.0, -1.0], [len(low), len(high)])
         slopes = signs[:, None] * jacobian[rows].toarray()
         pressing = slopes.any(
             axis=1
@@ -192,9 +107,7 @@ class ActiveSet(Summary):
     @property
     def dependent(self) -> bool:
         """True where several sets of multipliers may balance a gradient."""
-        return bool(
-            np.linalg.matrix_rank(self.slopes, tol=_DEPENDENT) < len(self.slopes)
-        )
+        return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < len(self.slopes))
 
     def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
         """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
@@ -346,7 +259,6 @@ def multipliers_of_answer(refined: Refined) -> Multipliers:
 
 STATIONARY = 1e-3
 """With a larger residual the answer is not an optimum, and its multipliers say little."""
-_SMALLEST = 1e-9
 
 
 @dataclass(frozen=True)
@@ -451,7 +363,7 @@ class Sensitivities(Summary):
         return self.residual <= STATIONARY
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
-        """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError where there is none."""
+        """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
         for entry in self.limits:
             if (entry.label.subject, entry.label.kind, entry.bound.end) == (
                 subject,
@@ -500,7 +412,7 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
             rates[rows[:, bound.column]] = bound.per_unit
             if limit.role is not Role.SAFEGUARD:
                 found.append(_sensitivity(limit, bound, rates, multipliers))
-            elif (slope := -multipliers.change(rates)) > _SMALLEST:
+            elif (slope := -multipliers.change(rates)) > 1e-9:
                 boundaries.append(
                     BranchBoundary(
                         limit.labels[bound.column].subject, bound.figure, slope

@@ -18,11 +18,8 @@ from brachis.robot.joints import shown_unit
 _FRACTION = 0.1
 _NOTHING = 1e-5
 """Of t_E; what saves less for `_FRACTION`, and a boundary that costs less, is not worth a line."""
-_TAKEN_BACK = 0.02
 _KNOTS = 0.01
 """Of t_E; what the knots cost is known to 0.2 % or so, and `intervals: auto` leaves 0.1 %."""
-_MOMENT = 5e-4
-"""Smallest share of the time that is worth a line."""
 
 
 def in_words(
@@ -37,21 +34,15 @@ def in_words(
     degrees: bool,
 ) -> list[str]:
     """Say what a report found, a line each; see `BottleneckReport` for its parts."""
-    lines = [
-        *(
-            ["the motion was not planned: what a limit costs is not known"]
-            if sensitivities is None
-            else []
-        ),
-        *(
-            []
-            if sensitivities is None
-            else _costs(sensitivities, t_end, degrees=degrees)
-        ),
-        *([] if knots is None else _knots(knots, t_end)),
-        *([] if check is None else _checked(check)),
-        *active_in_words(saturations),
-    ]
+    if sensitivities is None:
+        lines = ["the motion was not planned: what a limit costs is not known"]
+    else:
+        lines = _costs(sensitivities, t_end, degrees=degrees)
+    if knots is not None:
+        lines += _knots(knots, t_end)
+    if check is not None:
+        lines += _check_lines(check)
+    lines += active_in_words(saturations)
     if reference is not None:
         lines.append(_reference(reference, t_end))
     elif reference_sought:
@@ -81,17 +72,19 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     lines.append(
         f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})"
     )
-    return lines + [
-        _boundary(e)
-        for e in found.boundaries
-        if e.derivative * e.margin > _NOTHING * t_end
+    lines += [
+        _boundary(entry)
+        for entry in found.boundaries
+        if entry.derivative * entry.margin > _NOTHING * t_end
     ]
+    return lines
 
 
 def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
     """Say what more room at one limit saves."""
     saved = -entry.change(_FRACTION)
-    label, end = entry.label, entry.bound.end
+    label = entry.label
+    end = entry.bound.end
     unit, factor = shown_unit(label.unit, degrees=degrees)
     amount = f"{factor * _FRACTION * entry.bound.whole:.3g} {unit}"
     if label.room:
@@ -133,7 +126,7 @@ def _boundary(entry: BranchBoundary) -> str:
     )
 
 
-def _checked(check: SensitivityCheck) -> list[str]:
+def _check_lines(check: SensitivityCheck) -> list[str]:
     """Sentences on the predictions beside solving again."""
     percent = f"{100.0 * check.step:g} %"
     lines = []
@@ -174,7 +167,7 @@ def _checked(check: SensitivityCheck) -> list[str]:
 
 def _taken_back(entry: CheckedSensitivity) -> str:
     """Say how much of a promise other limits take back within the step, where it is worth saying."""
-    if abs(entry.linearised - entry.predicted) <= _TAKEN_BACK * abs(entry.predicted):
+    if abs(entry.linearised - entry.predicted) <= 0.02 * abs(entry.predicted):
         return ""
     return f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
 
@@ -183,7 +176,7 @@ def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
     """Sentences on the limits that are active for some time."""
     lines = []
     for entry in found:
-        if entry.share >= _MOMENT:
+        if entry.share >= 5e-4:
             times = (
                 "once"
                 if len(entry.active) == 1

@@ -8,8 +8,13 @@ True
 """
 
 from brachis.apps.export.animation import export_gif, export_mp4
+from brachis.apps.export.controllers import (
+    TOPIC,
+    export_mcap,
+    export_ros2_yaml,
+    export_urscript,
+)
 from brachis.apps.export.formats import FORMATS, Exporter, Format, format_of, write
-from brachis.apps.export.ros2 import TOPIC, export_mcap, export_ros2_yaml
 from brachis.apps.export.rows import LeftOutWarning
 from brachis.apps.export.tables import (
     SCHEMA_ID,
@@ -18,7 +23,6 @@ from brachis.apps.export.tables import (
     export_parquet,
     samples_schema,
 )
-from brachis.apps.export.urscript import export_urscript
 
 __all__ = [
     "FORMATS",

@@ -1,19 +1,12 @@
-"""Animations: what their periods and parameters must be, and how they are drawn.
-
-Pictures of a moving robot at regular times.
-
-Animated GIF.
-
-MP4, by ffmpeg.
-"""
+"""Animations: a robot that moves over its path, as GIF or, by ffmpeg, as MP4."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,37 +18,35 @@ from brachis.apps.plots.overview import draw_holding
 from brachis.apps.plots.postures import (
     add_posture_axes,
     draw_postures,
-    drawing_plane,
+    plane_of,
     skeleton,
 )
 from brachis.common.files import atomic_write
 from brachis.errors import InputError
-from brachis.robot import task_map_of
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from matplotlib.animation import AbstractMovieWriter
     from matplotlib.figure import Figure
 
-DPI = 100
-_WIDTH, _HEIGHT = 183.0, 88.0
-"""mm."""
-MOST = 5000
-"""Frames."""
+_DPI = 100
+_MAX_FRAMES = 5000
 
 
 def frame_times(trajectory: Trajectory, dt: float) -> np.ndarray:
-    """Return the times of the pictures, (K,), s: multiples of the period, and the end, at which the last one stands."""
+    """Return the times of the pictures, (K,), s: multiples of the period, and the end."""
     times = np.arange(np.ceil(trajectory.t_end / dt * (1.0 - 1e-12)) + 1.0) * dt
     return np.minimum(times, trajectory.t_end)
 
 
 def frames(
     trajectory: Trajectory, times: np.ndarray, slower: float = 1.0
-) -> Iterator[tuple[Figure, np.ndarray]]:
-    """Yield the figure, ever the same one, and its pixels, (height, width, 4) uint8, at every time.
+) -> Iterator[Figure]:
+    """Yield the figure, always the same one, at every time.
 
-    The robot moves over its tool's path and over postures at regular times, with the time written above. Beside it are
-    the limits that hold the motion, torques for example, with a line at the time.
+    The robot moves over its tool's path and over postures at regular times, with the
+    time written above. Next to it are the limits that hold the motion, torques for
+    example, with a line at the time.
 
     Parameters
     ----------
@@ -65,81 +56,87 @@ def frames(
     slower : float, optional
         How many times slower the motion is played, which is written above.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    figure = style.new_figure(_WIDTH, _HEIGHT)
-    figure.set_dpi(DPI)
-    canvas: Any = FigureCanvasAgg(figure)
-    grid, samples = figure.add_gridspec(1, 2), dense_samples(trajectory)
+    width = style.PAGE_WIDTH
+    figure = style.new_figure(width, 88.0)
+    grid = figure.add_gridspec(1, 2)
+    samples = dense_samples(trajectory)
     ax: Any = add_posture_axes(figure, trajectory, grid[0])
     draw_postures(ax, trajectory, samples)
     panels = draw_holding(figure, grid[1], trajectory, samples)
     lines = joint_lines(panels, trajectory)
-    style.legend_below(figure, _WIDTH - 10.0, list(lines.values()), list(lines))
-    task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-    view = list(
-        drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes) or (0, 1, 2)
-    )
+    style.legend_below(figure, width - 10.0, lines)
+    view = list(plane_of(trajectory) or (0, 1, 2))
     bones = skeleton(trajectory.robot, trajectory.position(times)).bones[:, :, view]
-    look = {"color": "black", "animated": True}
     (links,) = ax.plot(
         *bones[0].T,
+        color="black",
         linewidth=3.0,
         solid_capstyle="round",
         zorder=30.0,
         gid="robot",
-        **look,
     )
     (tool,) = ax.plot(
-        *bones[0, -1:].T, "o", markersize=6.0, zorder=31.0, gid="tool", **look
+        *bones[0, -1:].T, "o", color="black", markersize=6.0, zorder=31.0, gid="tool"
     )
     cursors = [
-        panel.axvline(0.0, color=style.GREY, linewidth=1.0, animated=True, gid="now")
+        panel.axvline(0.0, color=style.GREY, linewidth=1.0, gid="now")
         for panel in panels
     ]
     pace = f", {slower:g} times slower" if slower != 1.0 else ""
     title = figure.suptitle(f"t{pace}", fontsize=style.LABEL_SIZE)
-    canvas.draw()
-    figure.set_layout_engine(
-        "none"
-    )  # it would find the same layout for every picture anew
-    title.set_animated(True)
-    canvas.draw()
-    still = canvas.copy_from_bbox(figure.bbox)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the layout is the same for all pictures
     for t, now in zip(times.tolist(), bones, strict=True):
         for artist, points in ((links, now), (tool, now[-1:])):
             artist.set_data(*points.T[:2])
-            if points.shape[1] > 2:
+            if len(view) == 3:
                 artist.set_3d_properties(points[:, 2])
         title.set_text(f"t = {t:.2f} s of {trajectory.t_end:.3f} s{pace}")
-        canvas.restore_region(still)
         for cursor in cursors:
             cursor.set_xdata([t, t])
-        for artist in (title, links, tool, *cursors):
-            figure.draw_artist(artist)
-        yield figure, np.asarray(canvas.buffer_rgba())
+        yield figure
 
 
-def pictures(
+def _write(
+    writer: AbstractMovieWriter,
+    name: str,
+    path: str | os.PathLike[str],
+    all_frames: Iterator[Figure],
+    pause: int = 1,
+) -> None:
+    """Let a writer make a film of figures.
+
+    Parameters
+    ----------
+    writer : AbstractMovieWriter
+    name : str
+        Of a temporary file; its suffix tells the writer the format.
+    path : path
+    all_frames : iterator of Figure
+    pause : int, optional
+        How many times the last figure is written.
+    """
+    figure = next(all_frames)
+    with tempfile.TemporaryDirectory(prefix="brachis-") as folder:
+        film = Path(folder) / name
+        with writer.saving(figure, film, _DPI):
+            writer.grab_frame()
+            for _ in all_frames:
+                writer.grab_frame()
+            for _ in range(pause - 1):
+                writer.grab_frame()
+        with atomic_write(path) as stream:
+            stream.write(film.read_bytes())
+
+
+def _checked_frames(
     trajectory: Trajectory,
     dt: float,
     step: float,
     joints: Sequence[str] | None,
     slower: float,
-) -> Iterator[np.ndarray]:
-    """Yield pictures, (height, width, 3) uint8, of a motion.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    dt : float
-        Period at which pictures are shown, s.
-    step : float
-        Of which the format's periods are multiples, s.
-    joints : sequence of str or None
-        None: an animation shows the whole robot.
-    slower : float
-        How many times slower than in real time the motion goes.
+) -> Iterator[Figure]:
+    """Return `frames` with a period `dt`, s, which has to be a multiple of `step`, s.
 
     Raises
     ------
@@ -147,9 +144,11 @@ def pictures(
         The period or the joints do not fit.
     """
     if joints is not None:
-        problem = "an animation shows the whole robot"
         raise InputError(
-            problem, where="joints", found=", ".join(joints), allowed="all joints"
+            "an animation shows the whole robot",
+            where="joints",
+            found=", ".join(joints),
+            allowed="all joints",
         )
     if not 0.0 < slower < np.inf:
         raise InputError(
@@ -158,21 +157,15 @@ def pictures(
             found=slower,
             allowed="> 0: 10 is ten times slower",
         )
-    usable = np.isfinite(dt) and dt > 0.0 and slower * trajectory.t_end / dt < MOST
+    usable = 0.0 < dt < np.inf and slower * trajectory.t_end / dt < _MAX_FRAMES
     if not usable or abs(dt / step - round(dt / step)) > 1e-6:
-        allowed = f"a multiple of {step:g} s, for at most {MOST} pictures"
         raise InputError(
-            "is no period of an animation", where="dt", found=f"{dt} s", allowed=allowed
+            "cannot be the period of an animation",
+            where="dt",
+            found=f"{dt} s",
+            allowed=f"a multiple of {step:g} s, for up to {_MAX_FRAMES} pictures",
         )
-    for _, pixels in frames(trajectory, frame_times(trajectory, dt / slower), slower):
-        yield pixels[:, :, :3].copy()
-
-
-_STEP = 0.01
-"""s: GIF counts time in hundredths of a second."""
-_COLOURS = 128
-_PAUSE = 1.0
-"""For which the last picture stands, s."""
+    return frames(trajectory, frame_times(trajectory, dt / slower), slower)
 
 
 def export_gif(
@@ -184,39 +177,21 @@ def export_gif(
     joints: Sequence[str] | None = None,
     slower: float = 1.0,
 ) -> None:
-    """Write the motion, again and again; see `brachis.export.write` for the parameters.
+    """Write the motion as GIF, which counts time in hundredths of a second.
+
+    The motion is shown again and again; its end stays for about a second. The
+    parameters are those of `brachis.export.write`.
 
     Raises
     ------
     InputError
-        `dt` is no multiple of 0.01 s, or `joints` are named.
+        `dt` is not a multiple of 0.01 s, or `joints` are named.
     """
-    from PIL import Image
+    from matplotlib.animation import PillowWriter
 
-    images = [
-        Image.fromarray(each)
-        for each in pictures(trajectory, dt, _STEP, joints, slower)
-    ]
-    palette = images[len(images) // 2].quantize(_COLOURS)
-    first, *others = (
-        image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images
-    )
-    period = round(1e3 * dt)
-    durations = [*[period] * len(others), round(1e3 * _PAUSE)]
-    with atomic_write(path) as stream:
-        first.save(
-            stream,
-            format="GIF",
-            save_all=True,
-            append_images=others,
-            duration=durations,
-            loop=0,
-            optimize=True,
-        )
-
-
-_STEP_MP4 = 1e-3
-_PROGRAM = "ffmpeg"
+    all_frames = _checked_frames(trajectory, dt, 0.01, joints, slower)
+    writer = PillowWriter(fps=Fraction(100, round(100 * dt)))  # type: ignore[arg-type]
+    _write(writer, "film.gif", path, all_frames, pause=int(np.ceil(1.0 / dt)))
 
 
 def export_mp4(
@@ -228,58 +203,30 @@ def export_mp4(
     joints: Sequence[str] | None = None,
     slower: float = 1.0,
 ) -> None:
-    """Write the motion; see `brachis.export.write` for the parameters.
+    """Write the motion as MP4, with the parameters of `brachis.export.write`.
 
     Raises
     ------
     InputError
-        There is no ffmpeg, it cannot encode, `dt` is no multiple of 1 ms, or `joints` are named.
+        ffmpeg is missing or cannot encode, `dt` is not a multiple of 1 ms, or `joints`
+        are named.
     """
-    program = shutil.which(_PROGRAM)
-    if program is None:
+    from matplotlib.animation import FFMpegWriter
+
+    if not FFMpegWriter.isAvailable():
         raise InputError(
             "an MP4 file needs ffmpeg, which is not installed",
             hint="Install ffmpeg, or write a GIF",
         )
-    with tempfile.TemporaryDirectory(prefix="brachis-") as folder:
-        film = (
-            Path(folder) / "film.mp4"
-        )  # a file with a name: MP4 is not written from its beginning to its end
-        _encode(program, pictures(trajectory, dt, _STEP_MP4, joints, slower), dt, film)
-        with atomic_write(path) as stream:
-            stream.write(film.read_bytes())
-
-
-def _encode(
-    program: str, all_pictures: Iterator[np.ndarray], dt: float, film: Path
-) -> None:
-    """Let ffmpeg make a film of pictures."""
-    first = next(all_pictures)
-    height, width = (
-        first.shape[0] // 2 * 2,
-        first.shape[1] // 2 * 2,
-    )  # H.264 halves the colours' resolution
-    given = (
-        f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * dt)} -i -"
+    all_frames = _checked_frames(trajectory, dt, 1e-3, joints, slower)
+    rate: Any = Fraction(1000, round(1000 * dt))
+    writer = FFMpegWriter(
+        fps=rate, codec="h264", extra_args=["-movflags", "+faststart"]
     )
-    made = "-an -pix_fmt yuv420p -movflags +faststart"
-    with tempfile.TemporaryFile() as told:
-        with subprocess.Popen(  # noqa: S603  (no shell, and nothing of the user's in the arguments)
-            [program, "-v", "error", "-nostdin", *given.split(), *made.split(), film],
-            stdin=subprocess.PIPE,
-            stdout=told,
-            stderr=told,
-        ) as process:
-            assert process.stdin is not None
-            try:
-                for picture in (first, *all_pictures):
-                    process.stdin.write(picture[:height, :width].tobytes())
-                process.stdin.close()
-            except BrokenPipeError:  # what ffmpeg says tells more
-                pass
-        if process.returncode:
-            told.seek(0)
-            raise InputError(
-                "ffmpeg cannot make the film",
-                found=told.read().decode(errors="replace").strip(),
-            )
+    try:
+        _write(writer, "film.mp4", path, all_frames)
+    except subprocess.CalledProcessError as error:
+        raise InputError(
+            "ffmpeg cannot make the film",
+            found=str(error.stderr).strip(),
+        ) from error

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Protocol
 
 from brachis.apps.export.animation import export_gif, export_mp4
-from brachis.apps.export.ros2 import export_mcap, export_ros2_yaml
+from brachis.apps.export.controllers import (
+    export_mcap,
+    export_ros2_yaml,
+    export_urscript,
+)
 from brachis.apps.export.tables import export_csv, export_json, export_parquet
-from brachis.apps.export.urscript import export_urscript
 from brachis.errors import InputError, UnknownNameError
 from brachis.trajectory import Motion, Trajectory, motion_of
 
@@ -90,9 +93,9 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
     Raises
     ------
     UnknownNameError
-        There is no such format.
+        The format does not exist.
     InputError
-        The suffix is none of a format.
+        The suffix does not belong to a format.
     """
     if name is not None:
         if name not in FORMATS:
@@ -149,7 +152,7 @@ def write(
         The format is unknown or cannot hold the motion, `dt` or `last` cannot be used, a library is missing, or the
         file cannot be written.
     UnknownNameError
-        There is no such format or joint.
+        A format or a joint does not exist.
 
     Examples
     --------

@@ -1,7 +1,4 @@
-"""What a controller is given: the motion of a robot's joints at regular times.
-
-Libraries that only some formats need.
-"""
+"""What a controller is given: the motion of a robot's joints at regular times."""
 
 from __future__ import annotations
 
@@ -85,7 +82,7 @@ def rows_of(
     InputError
         `dt` or `last` cannot be used.
     UnknownNameError
-        There is no such joint.
+        A joint does not exist.
 
     Warns
     -----
@@ -129,7 +126,7 @@ def _list_missing(
             yield f"joint {joint} moves by {travel} and is not in this file"
 
 
-def needed(name: str, what: str) -> ModuleType:
+def require_library(name: str, what: str) -> ModuleType:
     """Import a library of the extra ``export``.
 
     Parameters

@@ -1,8 +1,8 @@
-"""CSV: one row per sample, SI units, the shortest digits that read back exactly.
+"""Tables of samples in SI units: CSV, Parquet and JSON.
 
-Parquet: the columns of the CSV table as doubles, with units and the robot's name as metadata.
-
-JSON that names its schema.
+CSV has one row per sample, with the shortest digits that read back exactly. Parquet has
+the same columns as doubles, with units and the robot's name as metadata. JSON names its
+schema.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from brachis.apps.export.rows import needed, rows_of
+from brachis.apps.export.rows import require_library, rows_of
 from brachis.common.files import atomic_write
 from brachis.trajectory import Trajectory
 from brachis.trajectory.samples import COLUMNS
@@ -39,7 +39,7 @@ def export_csv(
     Examples
     --------
     >>> from brachis import plan
-    >>> from brachis.export import export_csv
+    >>> from brachis.apps.export import export_csv
     >>> trajectory = plan("examples/01_scara_line.yaml").trajectory
     >>> export_csv(trajectory, "motion.csv", dt=0.004)  # doctest: +SKIP
     """
@@ -70,10 +70,8 @@ def export_parquet(
     The file's metadata have a key ``brachis``: joints with their units, the end time in s, and sentences about joints
     that move and are left out.
     """
-    pyarrow, parquet = (
-        needed("pyarrow", "a Parquet file"),
-        needed("pyarrow.parquet", "a Parquet file"),
-    )
+    pyarrow = require_library("pyarrow", "a Parquet file")
+    parquet = require_library("pyarrow.parquet", "a Parquet file")
     rows = rows_of(trajectory, dt, last, joints)
     units = dict(zip(rows.joints, rows.units, strict=True))
     about = {"joints": units, "t_end_s": trajectory.t_end, "left_out": rows.left_out}

@@ -1,9 +1,4 @@
-"""End times of many plans side by side.
-
-The end times of all that a search looked at.
-
-How far the points of a path are from the curve that was fitted to them.
-"""
+"""End times of plans and of candidates side by side, and how well a path fits its points."""
 
 from __future__ import annotations
 
@@ -25,16 +20,9 @@ if TYPE_CHECKING:
 
     from brachis.task import FitReport
 
-_BARS_PER_PANEL = 48
-_GROUP_WIDTH = 0.84
-_HEADROOM = 1.27
-
 
 Case = float | str
 """What is planned: a number that is varied, or a name."""
-
-_ROW = 3
-"""Case, choice, end time."""
 
 
 def plot_comparison(
@@ -62,11 +50,11 @@ def plot_comparison(
     Raises
     ------
     InputError
-        There are no rows, a case is not finite, a time is not positive, or a pair of case and choice comes twice.
+        `rows` is empty, a case is not finite, a time is not positive, or a pair of case and choice comes twice.
 
     Examples
     --------
-    >>> from brachis.plots import plot_comparison
+    >>> from brachis.apps.plots import plot_comparison
     >>> rows = [("seam", "rail", 2.1), ("seam", "joint_1", 2.4), ("hem", "rail", 2.3), ("hem", "joint_1", 2.5)]
     >>> figure = plot_comparison(rows, "path")
     """
@@ -75,12 +63,10 @@ def plot_comparison(
     if not any(isinstance(case, str) for case in cases):
         cases.sort(key=float)
     choices = list(dict.fromkeys(choice for _, choice in cells))
-    panels = math.ceil(len(cases) / max(1, _BARS_PER_PANEL // len(choices)))
+    panels = math.ceil(len(cases) / max(1, 48 // len(choices)))
     per_panel = math.ceil(len(cases) / panels)
     figure = style.new_figure(style.PAGE_WIDTH, 12.0 + 58.0 * panels)
-    height = _HEADROOM * max(
-        (t_end for t_end in cells.values() if t_end > 0.0), default=1.0
-    )
+    height = 1.27 * max((t_end for t_end in cells.values() if t_end > 0.0), default=1.0)
     for panel in range(panels):
         ax = figure.add_subplot(panels, 1, panel + 1)
         _draw(
@@ -113,7 +99,7 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
     cells: dict[tuple[Case, str], float] = {}
     for number, row in enumerate(rows):
         where = f"rows[{number}]"
-        if not isinstance(row, Sequence) or len(row) != _ROW or isinstance(row, str):
+        if not isinstance(row, Sequence) or len(row) != 3 or isinstance(row, str):
             raise InputError(
                 "wrong type",
                 where=where,
@@ -155,8 +141,15 @@ def _draw(
     unit: str,
 ) -> None:
     """Draw one panel of grouped bars with their values; pairs without a row leave a gap."""
-    width = _GROUP_WIDTH / len(choices)
+    width = 0.84 / len(choices)
     found = {pair: t_end for pair, t_end in cells.items() if not math.isnan(t_end)}
+    best = {
+        case: min(
+            (found[case, choice] for choice in choices if (case, choice) in found),
+            default=math.nan,
+        )
+        for case in cases
+    }
     for column, choice in enumerate(choices):
         shift = (column - 0.5 * (len(choices) - 1)) * width
         places = [
@@ -172,16 +165,8 @@ def _draw(
         )
         for place, case in enumerate(cases):
             if (case, choice) in cells:
-                best = min(
-                    (found[case, other] for other in choices if (case, other) in found),
-                    default=math.nan,
-                )
-                _write(
-                    ax,
-                    place + shift,
-                    cells[case, choice],
-                    bold=cells[case, choice] == best,
-                )
+                t_end = cells[case, choice]
+                _write(ax, place + shift, t_end, bold=t_end == best[case])
     style.dress(ax, "", r"$t_\mathrm{E}$ (s)")
     ax.set_xticks(
         range(len(cases)), [style.plain(f"{_name(case)}{unit}") for case in cases]
@@ -204,8 +189,6 @@ def _write(ax: Axes, place: float, value: float, *, bold: bool) -> None:
     )
 
 
-_ROW_MM = 5.0
-_FRAME_MM = 24.0
 _MARKS: dict[str, dict[str, Any]] = {
     "planned": {
         "marker": "o",
@@ -250,7 +233,7 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     Raises
     ------
     InputError
-        There are no candidates, or they are something else.
+        `candidates` is empty, or has other entries than candidates.
     """
     if not isinstance(candidates, Sequence) or not all(
         isinstance(each, Attempt) for each in candidates
@@ -274,19 +257,13 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
         *(each for each in candidates[1:] if each.status != SAME_MOTION),
     ]
     rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
-    refining = (
-        candidates[0].t_end / candidates[0].coarse
-        if math.isfinite(candidates[0].t_end)
-        else 1.0
-    )
-    known = [
-        time
-        for each in candidates
-        for time in [_time(each, refining, math.inf)]
-        if math.isfinite(time)
-    ]
-    edge = 1.05 * max(known, default=1.0)
-    figure = style.new_figure(style.PAGE_WIDTH, _FRAME_MM + _ROW_MM * len(rows))
+    fastest = candidates[0]
+    refining = 1.0
+    if math.isfinite(fastest.t_end):
+        refining = fastest.t_end / fastest.coarse
+    end_times = [_time(candidate, refining, math.inf) for candidate in candidates]
+    edge = 1.05 * max(filter(math.isfinite, end_times), default=1.0)
+    figure = style.new_figure(style.PAGE_WIDTH, 24.0 + 5.0 * len(rows))
     ax = figure.add_subplot()
     drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
     for number, candidate in enumerate(candidates):
@@ -335,7 +312,6 @@ def _kind(candidate: Attempt, *, first: bool) -> str:
     )
 
 
-_HEIGHT = 45.0
 _ROOM = 1.15
 
 
@@ -354,7 +330,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
         that was not fitted gives a figure that says so.
     """
     fits = [fit for fit in trajectory.task.fits if fit.profile]
-    figure = style.new_figure(style.COLUMN_WIDTH, _HEIGHT * max(len(fits), 1))
+    figure = style.new_figure(style.COLUMN_WIDTH, 45.0 * max(len(fits), 1))
     if not fits:
         figure.text(
             0.5,

@@ -1,7 +1,4 @@
-"""How much of every limit is used over time, a panel for each kind.
-
-Which limit is near or active when.
-"""
+"""How much of every limit is used over time: a panel for each kind, or a timeline."""
 
 from __future__ import annotations
 
@@ -19,17 +16,13 @@ from brachis.apps.bottleneck.saturation import (
     saturations_of,
 )
 from brachis.apps.plots import style
-from brachis.apps.plots.motion import knot_times
+from brachis.apps.plots.motion import dress, label_time_once
 from brachis.limits import Label, Limit
 from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_PANEL_MM = 34.0
-_FRAME_MM = 24.0
-_RANGE = 1.15
 
 
 @of_motion
@@ -54,22 +47,15 @@ def plot_limits(
     Examples
     --------
     >>> from brachis import Trajectory
-    >>> from brachis.plots import plot_limits, save_figure
+    >>> from brachis.apps.plots import plot_limits, save_figure
     >>> save_figure(plot_limits(Trajectory.load("out/result.npz")), "limits.pdf")  # doctest: +SKIP
     """
     ratios = limit_ratios(trajectory, limits)
     shown = list(dict.fromkeys(label.axis for label in ratios.labels))
-    figure = style.new_figure(style.COLUMN_WIDTH, _FRAME_MM + _PANEL_MM * len(shown))
-    panels = [figure.add_subplot(len(shown), 1, row + 1) for row in range(len(shown))]
+    figure = style.new_figure(style.COLUMN_WIDTH, 24.0 + 34.0 * len(shown))
+    panels = style.stack_panels(figure, len(shown))
     draw_ratios(panels, trajectory, ratios, shown)
-    handles = {
-        label: line
-        for ax in panels
-        for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
-    style.legend_below(
-        figure, style.COLUMN_WIDTH - 10.0, list(handles.values()), list(handles)
-    )
+    style.legend_below(figure, style.COLUMN_WIDTH - 10.0, style.lines_by_label(panels))
     style.mark_end(panels[-1], trajectory.t_end)
     figure.align_ylabels(panels)
     return figure
@@ -98,28 +84,18 @@ def draw_ratios(
                 ratios.t, ratios.values[:, column], label=style.plain(subject), **look
             )
         values = ratios.values[:, columns]
-        top = _RANGE * max(1.0, float(np.abs(values).max()))
+        top = 1.15 * max(1.0, float(np.abs(values).max()))
         for level in (-1.0, 1.0) if values.min() < 0.0 else (1.0,):
-            ax.axhline(level, color=style.GREY, **style.LIMIT)
-            ax.axhspan(
-                level,
-                np.sign(level) * top,
-                facecolor=style.FORBIDDEN,
-                edgecolor="none",
-                zorder=0.0,
-            )
+            style.draw_limit(ax, level, top)
         ax.set_ylim(-top if values.min() < 0.0 else -0.05 * top, top)
-        style.dress(ax, r"$t$ (s)" if ax is panels[-1] else "", title)
-        style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
-        ax.tick_params(labelbottom=ax is panels[-1])
+        dress(ax, trajectory, title)
+    label_time_once(panels)
 
 
 _SHOWN = 0.5
 """Limits that the motion never comes this near to are left out."""
 _COLOURS = "Blues"
 _ACTIVE = "#D55E00"
-_ROW_MM = 5.0
-_FRAME_MM_TIMELINE = 26.0
 _THICK = 0.84
 
 
@@ -146,7 +122,7 @@ def plot_timeline(
     Examples
     --------
     >>> from brachis import Trajectory
-    >>> from brachis.plots import plot_timeline, save_figure
+    >>> from brachis.apps.plots import plot_timeline, save_figure
     >>> save_figure(plot_timeline(Trajectory.load("out/result.npz")), "timeline.pdf")  # doctest: +SKIP
     """
     ratios = limit_ratios(trajectory, limits)
@@ -156,9 +132,7 @@ def plot_timeline(
         for column, label in enumerate(ratios.labels)
         if found[label].peak > _SHOWN
     ]
-    figure = style.new_figure(
-        style.PAGE_WIDTH, _FRAME_MM_TIMELINE + _ROW_MM * max(len(shown), 1)
-    )
+    figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * max(len(shown), 1))
     ax = figure.add_subplot()
     for row, column in enumerate(shown):
         _draw_row(ax, row, ratios, column, found[ratios.labels[column]])
@@ -202,14 +176,13 @@ def _dress(
     from matplotlib.colors import Normalize
     from matplotlib.patches import Patch
 
-    style.dress(ax, r"$t$ (s)", "")
+    dress(ax, trajectory, "")
     ax.set_ylim(max(len(labels), 1) - 0.5, -0.5)
     ax.set_yticks(
         range(len(labels)),
         [f"{style.plain(label.subject)} {label.kind}" for label in labels],
     )
     ax.tick_params(axis="y", length=0.0)
-    style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
     if not labels:
         text = "no limit is ever used by half"
         ax.text(
@@ -227,7 +200,7 @@ def _dress(
     bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
     bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)
     words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond, with ripple down to {100.0 * RIPPLE:g} %"
-    style.legend_above(ax, style.PAGE_WIDTH - 20.0, [Patch(facecolor=_ACTIVE)], [words])
+    style.legend_above(ax, style.PAGE_WIDTH - 20.0, {words: Patch(facecolor=_ACTIVE)})
     ax.text(
         1.0,
         1.02,

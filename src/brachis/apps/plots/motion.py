@@ -1,9 +1,4 @@
-"""Joint positions, joint velocities, progress along the path and the tool's speed over time.
-
-Joint torques and forces over time, as fractions of their limits.
-
-Samples that are dense enough for a smooth line and miss no corner.
-"""
+"""Joint quantities, torques, path coordinate and tool speed over time."""
 
 from __future__ import annotations
 
@@ -13,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.apps.plots import style
-from brachis.apps.plots.quantities import Quantity, allowed_tool_speeds, quantities
+from brachis.apps.plots.quantities import REACH, Quantity, near_tool_speeds, quantities
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -39,11 +34,7 @@ def dense_samples(trajectory: Trajectory) -> Samples:
     )
 
 
-_REACH = 0.3  # of the range of all data
-_LEAST_RANGE = 1e-9
-_JOINT_MM, _PROGRESS_MM, _FRAME_MM = 38.0, 26.0, 17.0
-_FEW_JOINTS = 2
-_LOW = 0.6
+_PROGRESS_MM = 26.0
 
 
 @of_motion
@@ -61,17 +52,13 @@ def plot_motion(trajectory: Trajectory) -> Figure:
         them; the faint ticks are the knots of the splines.
     """
     samples = dense_samples(trajectory)
-    found = [
-        part
-        for kind in ("position", "velocity")
-        for part in quantities(trajectory, samples, kind)
-    ]
+    found = quantities(trajectory, samples, "position", "velocity")
     heights = [
-        *(_JOINT_MM * height_of(part) for part in found),
+        *(38.0 * height_of(part) for part in found),
         _PROGRESS_MM,
         _PROGRESS_MM,
     ]
-    figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + _FRAME_MM)
+    figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + 17.0)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     panels = [figure.add_subplot(grid[row]) for row in range(len(heights))]
     for ax, part in zip(panels, found, strict=False):
@@ -89,14 +76,14 @@ def plot_motion(trajectory: Trajectory) -> Figure:
 
 def height_of(part: Quantity) -> float:
     """Height of a panel, relative to one with many joints."""
-    return 1.0 if len(part.joints) > _FEW_JOINTS else _LOW
+    return 1.0 if len(part.joints) > 2 else 0.6
 
 
 def draw_quantity(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
     """Draw one quantity of its joints, with their limits."""
-    draw_joints(ax, trajectory, part, part.values)
+    draw_joints(ax, trajectory, part)
     _draw_limits(ax, part)
-    _dress(ax, trajectory, f"${part.symbol}$ ({part.unit})")
+    dress(ax, trajectory, f"${part.symbol}$ ({part.unit})")
 
 
 def label_time_once(panels: Sequence[Axes]) -> None:
@@ -106,11 +93,9 @@ def label_time_once(panels: Sequence[Axes]) -> None:
         ax.set_xlabel("")
 
 
-def draw_joints(
-    ax: Axes, trajectory: Trajectory, part: Quantity, values: np.ndarray
-) -> None:
-    """Draw values, (K, j), of a quantity's joints: one labelled line for each."""
-    for joint, column in zip(part.joints.tolist(), values.T, strict=True):
+def draw_joints(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
+    """Draw one labelled line for each joint of a quantity."""
+    for joint, column in zip(part.joints.tolist(), part.values.T, strict=True):
         ax.plot(
             part.t,
             column,
@@ -121,25 +106,20 @@ def draw_joints(
 
 def joint_lines(panels: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
     """Collect one line of every joint that the panels show, in chain order, by its label."""
-    found = {
-        label: line
-        for ax in panels
-        for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
+    found = style.lines_by_label(panels)
     names = map(style.plain, trajectory.joint_names)
     return {name: found[name] for name in names if name in found}
 
 
 def legend_joints(panels: Sequence[Axes], trajectory: Trajectory, width: float) -> None:
     """Put a legend of all joints above the first panel; `width` is its room, mm."""
-    lines = joint_lines(panels, trajectory)
-    style.legend_above(panels[0], width, list(lines.values()), list(lines))
+    style.legend_above(panels[0], width, joint_lines(panels, trajectory))
 
 
 def draw_progress(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw the path coordinate."""
     ax.plot(samples.t, samples.s, color="black", linewidth=style.LINE_WIDTH)
-    _dress(ax, trajectory, "$s$")
+    dress(ax, trajectory, "$s$")
     ax.set_ylim(-0.04, 1.04)
 
 
@@ -152,23 +132,21 @@ def draw_tool_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
         color="black",
         linewidth=style.LINE_WIDTH,
     )
-    reach = (1.0 + _REACH) * max(float(samples.tool_speed.max()), _LEAST_RANGE)
-    for allowed in allowed_tool_speeds(trajectory, samples):
-        near = np.where(allowed < reach, allowed, np.nan)
-        if np.isfinite(near).any():
-            ax.plot(samples.t, near, color=style.GREY, **style.LIMIT)
-    _dress(ax, trajectory, "tool speed (m/s)")
+    for allowed in near_tool_speeds(trajectory, samples):
+        ax.plot(samples.t, allowed, color=style.GREY, **style.LIMIT)
+    dress(ax, trajectory, "tool speed (m/s)")
     ax.set_ylim(bottom=0.0)
 
 
-def _dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
+def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
+    """Set the labels, with time to the right and the knots of the splines as faint ticks."""
     style.dress(ax, r"$t$ (s)", ylabel)
     style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
 
 
 def _draw_limits(ax: Axes, part: Quantity) -> None:
     """Draw every joint's own limits where it comes near them; joints that share a level share its dashes."""
-    reach = _REACH * max(float(np.ptp(part.values)), _LEAST_RANGE)
+    reach = REACH * max(float(np.ptp(part.values)), 1e-9)
     levels = np.array([part.lower, part.upper])
     near = (levels >= part.values.min(axis=0) - reach) & (
         levels <= part.values.max(axis=0) + reach
@@ -182,10 +160,6 @@ def _draw_limits(ax: Axes, part: Quantity) -> None:
                 color=style.joint_style(joint)["color"],
                 **{**style.LIMIT, "linestyle": dashes},
             )
-
-
-_RANGE = 1.15
-_WHAT = "torque"
 
 
 @of_motion
@@ -205,12 +179,12 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     Examples
     --------
     >>> from brachis import plan
-    >>> from brachis.plots import plot_torques, save_figure
+    >>> from brachis.apps.plots import plot_torques, save_figure
     >>> save_figure(plot_torques(plan("examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
     """
     found = shown_torques(trajectory, dense_samples(trajectory))
     figure = style.new_figure(style.COLUMN_WIDTH, 22.0 + 36.0 * len(found))
-    panels = [figure.add_subplot(len(found), 1, row + 1) for row in range(len(found))]
+    panels = style.stack_panels(figure, len(found))
     draw_torques(panels, trajectory, found)
     legend_joints(panels, trajectory, style.COLUMN_WIDTH - 15.0)
     return figure
@@ -218,13 +192,9 @@ def plot_torques(trajectory: Trajectory) -> Figure:
 
 def shown_torques(trajectory: Trajectory, samples: Samples) -> list[list[Quantity]]:
     """Torques and forces by panels: those with limits in one, all of them apart by unit where no joint has a limit."""
-    found = [part.limited() for part in quantities(trajectory, samples, _WHAT)]
-    limited = [part for part in found if part is not None]
-    return (
-        [limited]
-        if limited
-        else [[part] for part in quantities(trajectory, samples, _WHAT)]
-    )
+    parts = quantities(trajectory, samples, "torque")
+    limited = [ratios for part in parts if (ratios := part.over_limits()) is not None]
+    return [limited] if limited else [[part] for part in parts]
 
 
 def draw_torques(
@@ -232,7 +202,7 @@ def draw_torques(
 ) -> None:
     """Draw what `shown_torques` found into as many axes; one labelled line per joint."""
     for ax, parts in zip(panels, found, strict=True):
-        if parts[0].limited() is None:
+        if not parts[0].is_limited.all():
             draw_quantity(ax, trajectory, parts[0])
         else:
             _draw_ratios(ax, trajectory, parts)
@@ -243,20 +213,12 @@ def draw_torques(
 def _draw_ratios(ax: Axes, trajectory: Trajectory, parts: Sequence[Quantity]) -> None:
     """Draw torques and forces over their limits, which may differ in both directions."""
     for part in parts:
-        draw_joints(ax, trajectory, part, part.ratios)
-    _draw_band(ax, max(float(np.abs(part.ratios).max()) for part in parts))
-    labels = (rf"${part.symbol} / {part.symbol}_\mathrm{{max}}$" for part in parts)
-    style.dress(ax, r"$t$ (s)", ", ".join(labels))
-    style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
-
-
-def _draw_band(ax: Axes, largest: float) -> None:
-    """Shade what is forbidden, so that the band stands out and the lines do not."""
-    top = _RANGE * max(1.0, largest)
-    for sign in (-1.0, 1.0):
-        ax.axhline(sign, **style.LIMIT, color=style.GREY)
-        ax.axhspan(
-            sign, sign * top, facecolor=style.FORBIDDEN, edgecolor="none", zorder=0.0
-        )
+        draw_joints(ax, trajectory, part)
+    largest = max(float(np.abs(part.values).max()) for part in parts)
+    top = 1.15 * max(1.0, largest)
+    for level in (-1.0, 1.0):
+        style.draw_limit(ax, level, top)
     ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(-top, top)
+    labels = (rf"${part.symbol} / {part.symbol}_\mathrm{{max}}$" for part in parts)
+    dress(ax, trajectory, ", ".join(labels))

@@ -28,11 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
-_MOST, _TALL = 3, 2
-"""Kinds of limits; and how many panels are high enough for their titles on one line."""
-_POSTURES, _JOINTS, _PROGRESS, _FRAME = 74.0, 46.0, 34.0, 11.0
-"""Heights of the rows, and of what is around them, mm."""
-
 
 @of_motion
 def plot_overview(trajectory: Trajectory) -> Figure:
@@ -55,11 +50,11 @@ def plot_overview(trajectory: Trajectory) -> Figure:
         for kind, draw in (("position", draw_progress), ("velocity", draw_tool_speed))
     }
     heights = [
-        _POSTURES,
-        *(_JOINTS * height_of(part) for part in rows[draw_progress]),
-        _PROGRESS,
+        74.0,
+        *(46.0 * height_of(part) for part in rows[draw_progress]),
+        34.0,
     ]
-    figure = style.new_figure(style.PAGE_WIDTH, sum(heights) + _FRAME)
+    figure = style.new_figure(style.PAGE_WIDTH, sum(heights) + 11.0)
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     postures = add_posture_axes(figure, trajectory, grid[0, 0])
     draw_postures(postures, trajectory, samples)
@@ -77,9 +72,7 @@ def plot_overview(trajectory: Trajectory) -> Figure:
         figure.align_ylabels(panels)
         joints += panels[:-1]
     lines = joint_lines(joints, trajectory)
-    style.legend_below(
-        figure, style.PAGE_WIDTH - 10.0, list(lines.values()), list(lines)
-    )
+    style.legend_below(figure, style.PAGE_WIDTH - 10.0, lines)
     return figure
 
 
@@ -97,7 +90,7 @@ def draw_holding(
         title
         for title in sorted(shares, key=shares.__getitem__, reverse=True)
         if shares[title] > 0.0
-    ][:_MOST]
+    ][:3]
     held = [title for title in longest if title not in of_torques]
     if longest and held == longest:
         torques = []
@@ -108,7 +101,7 @@ def draw_holding(
     draw_ratios(panels[len(torques) :], trajectory, ratios, held)
     if not torques:
         style.mark_end(panels[0], trajectory.t_end)
-    for ax in panels if len(panels) > _TALL else ():
+    for ax in panels if len(panels) > 2 else ():
         ax.set_ylabel(ax.get_ylabel().replace(" / ", " /\n"), fontsize=style.LABEL_SIZE)
     label_time_once(panels)
     figure.align_ylabels(panels)

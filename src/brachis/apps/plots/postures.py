@@ -1,7 +1,4 @@
-"""Postures of the robot along the path.
-
-A robot as a stick figure: positions of its joints by forward kinematics.
-"""
+"""Postures of the robot along the path, as stick figures by forward kinematics."""
 
 from __future__ import annotations
 
@@ -48,8 +45,10 @@ class Skeleton:
 
 def skeleton(robot: Robot, q: np.ndarray) -> Skeleton:
     """Stick figures of the postures `q`, (K, n)."""
-    model, data = robot.model, robot.model.createData()
-    base, n = int(model.getFrameId(robot.base_frame)), robot.n
+    model = robot.model
+    data = robot.model.createData()
+    base = int(model.getFrameId(robot.base_frame))
+    n = robot.n
     bones = np.empty((len(q), 2 * n + 2, 3))
     for points, posture in zip(bones, q, strict=True):
         pin.framesForwardKinematics(model, data, posture)
@@ -81,7 +80,8 @@ def drawing_plane(
         6, robot.n
     )  # (6,) for one joint
     revolute = robot.revolute
-    turning, sliding = columns[3:, revolute], columns[:3, ~revolute]
+    turning = columns[3:, revolute]
+    sliding = columns[:3, ~revolute]
     for normal in (2, 1, 0):
         in_plane = [axis for axis in range(3) if axis != normal]
         turns_about = np.abs(turning[in_plane]).max(initial=0.0) < _AXIS_TOLERANCE
@@ -92,7 +92,8 @@ def drawing_plane(
 
 
 _POSTURES = 7
-_FIRST, _LAST = np.array([0.72, 0.83, 0.91]), np.array([0.03, 0.23, 0.39])
+_FIRST = np.array([0.72, 0.83, 0.91])
+_LAST = np.array([0.03, 0.23, 0.39])
 _PATH_COLOUR = "#D55E00"
 _REDUNDANT_COLOUR = "#E69F00"
 _SHADOW_COLOUR = "#C8C8C8"
@@ -100,7 +101,6 @@ _GROUND = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
 _WORLD = "xyz"
 _ROOM = 0.78
 """Part of the frame that the box of axes in space takes; their labels take the rest."""
-_LEAST_SPAN = 1e-3
 _VIEWS = tuple(
     itertools.product(
         (15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)
@@ -175,14 +175,13 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
     from matplotlib.lines import Line2D
 
     first, *_, last = _shades()
-    handles: list[Artist] = [
-        Line2D([], [], color=tuple(first), linewidth=2.2),
-        Line2D([], [], color=tuple(last), linewidth=2.2),
-        Line2D([], [], color=_PATH_COLOUR, linewidth=1.4),
-    ]
-    labels = ["start", "end", "tool path"]
+    lines: dict[str, Artist] = {
+        "start": Line2D([], [], color=tuple(first), linewidth=2.2),
+        "end": Line2D([], [], color=tuple(last), linewidth=2.2),
+        "tool path": Line2D([], [], color=_PATH_COLOUR, linewidth=1.4),
+    }
     if trajectory.redundant_joints:
-        circle = Line2D(
+        lines["redundant"] = Line2D(
             [],
             [],
             linestyle="",
@@ -191,9 +190,7 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
             markerfacecolor=_REDUNDANT_COLOUR,
             markeredgecolor=tuple(last),
         )
-        handles.append(circle)
-        labels.append("redundant")
-    style.legend_above(ax, width, handles, labels)
+    style.legend_above(ax, width, lines)
 
 
 def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
@@ -262,11 +259,11 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     ax.tick_params(pad=-2.0)
     ax.set_proj_type("ortho")
     spans = [
-        max(np.ptp(limits), _LEAST_SPAN)
+        max(np.ptp(limits), 1e-3)
         for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())
     ]
     ax.set_box_aspect(spans)
-    elevation, azimuth = max(_VIEWS, key=lambda view: _filled(ax, points, *view))
+    elevation, azimuth = max(_VIEWS, key=lambda view: _fill_factor(ax, points, *view))
     ax.view_init(elevation, azimuth)
     ax.set_box_aspect(spans, zoom=_ROOM / _extent(ax))
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
@@ -278,7 +275,8 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
 
 def _draw_floor(ax: Any, z: float) -> None:
     """Draw a grid of the ticks on the floor, up to the edges of the axes."""
-    x, y = ax.get_xlim(), ax.get_ylim()
+    x = ax.get_xlim()
+    y = ax.get_ylim()
     inner = [
         [tick for tick in ticks if low < tick < high]
         for ticks, (low, high) in ((ax.get_xticks(), x), (ax.get_yticks(), y))
@@ -291,7 +289,9 @@ def _draw_floor(ax: Any, z: float) -> None:
     ax.set(xlim=x, ylim=y)
 
 
-def _filled(ax: Any, points: np.ndarray, elevation: float, azimuth: float) -> float:
+def _fill_factor(
+    ax: Any, points: np.ndarray, elevation: float, azimuth: float
+) -> float:
     """Tell how much of the frame points take when the axes' box just fits into it; dimensionless."""
     ax.view_init(elevation, azimuth)
     return float(np.prod(_spans(ax, points)) / _extent(ax) ** 2)

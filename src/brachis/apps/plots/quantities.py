@@ -1,4 +1,7 @@
-"""Joint quantities over time with their limits: what plots, report and viewer show, joints in rad and in m apart."""
+"""Joint quantities over time with their limits, for plots, report and viewer.
+
+Joints in rad and joints in m are separate.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ class Quantity:
         In chain order; at least one.
     values : (K, j) ndarray
     lower, upper : (j,) ndarray
-        Limits; infinite where there is none.
+        Limits; infinite if a joint has no limit.
     centre : (j,) ndarray
         Value that uses nothing of the limits: zero, or the middle of a range of positions.
     share : str
@@ -54,7 +57,7 @@ class Quantity:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Values over the limits of their directions, both from the centre, (K, j); NaN where there is no limit."""
+        """Values over the limits of their directions, both from the centre, (K, j); NaN without a limit."""
         away = self.values - self.centre
         room = np.where(away > 0.0, self.upper - self.centre, self.centre - self.lower)
         return np.where(self.is_limited, away / room, np.nan)
@@ -65,118 +68,167 @@ class Quantity:
         return np.isfinite(self.lower) & np.isfinite(self.upper)
 
     def of_joints(self, kept: np.ndarray) -> Quantity | None:
-        """Return the same of some of its joints, (j,) bool; None where there is none."""
-        parts = {
-            name: getattr(self, name)[kept]
-            for name in ("joints", "lower", "upper", "centre")
-        }
-        return (
-            replace(self, values=self.values[:, kept], **parts) if kept.any() else None
+        """Select joints, (j,) bool; None if no joint is left."""
+        if not kept.any():
+            return None
+        return replace(
+            self,
+            joints=self.joints[kept],
+            values=self.values[:, kept],
+            lower=self.lower[kept],
+            upper=self.upper[kept],
+            centre=self.centre[kept],
         )
 
-    def limited(self) -> Quantity | None:
-        """Return the same of the joints with limits in both directions; None where there is no such joint."""
-        return self.of_joints(self.is_limited)
+    def over_limits(self) -> Quantity | None:
+        """Return the ratios of the joints with limits in both directions.
+
+        Their limits are -1 and 1. None if no joint has limits in both directions.
+        """
+        part = self.of_joints(self.is_limited)
+        if part is None:
+            return None
+        ones = np.ones(len(part.joints))
+        return replace(
+            part,
+            unit="of the limit",
+            values=part.ratios,
+            lower=-ones,
+            upper=ones,
+            centre=np.zeros(len(ones)),
+        )
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """A kind of quantity: how it is called where joints turn and where they slide, and what its ratios are."""
+    """A kind of quantity.
 
-    symbols: tuple[str, str]
+    Symbols and names are those of revolute and of prismatic joints. With `in_range` the
+    limits are a range, and ratios count from its middle. A kind with `if_limited` is
+    shown only if the robot limits it.
+    """
+
     values: Callable[[Trajectory, Samples], np.ndarray]
-    names: tuple[str, str] | None = None
+    symbols: tuple[str, str]
+    names: tuple[str, str]
     share: str = ""
     of: str = "its limit"
     in_range: bool = False
-    """Whether the limits are a range, from whose middle ratios count."""
     if_limited: bool = False
-    """Whether it is of interest only where there is a limit."""
 
 
 KINDS = {
     "position": _Kind(
-        ("q", "q"),
         lambda _, samples: samples.q,
+        ("q", "q"),
+        ("position", "position"),
         share="position in its range",
         of="the way from the middle of its range to an end",
         in_range=True,
     ),
-    "velocity": _Kind((r"\dot{q}", r"\dot{q}"), lambda _, samples: samples.qdot),
-    "acceleration": _Kind((r"\ddot{q}", r"\ddot{q}"), lambda _, samples: samples.qddot),
+    "velocity": _Kind(
+        lambda _, samples: samples.qdot,
+        (r"\dot{q}", r"\dot{q}"),
+        ("velocity", "velocity"),
+    ),
+    "acceleration": _Kind(
+        lambda _, samples: samples.qddot,
+        (r"\ddot{q}", r"\ddot{q}"),
+        ("acceleration", "acceleration"),
+    ),
     "jerk": _Kind(
-        (r"\dddot{q}", r"\dddot{q}"),
         lambda trajectory, samples: trajectory.jerk(samples.t),
+        (r"\dddot{q}", r"\dddot{q}"),
+        ("jerk", "jerk"),
         if_limited=True,
     ),
     "torque": _Kind(
-        (r"\tau", "F"), lambda _, samples: samples.tau, names=("torque", "force")
+        lambda _, samples: samples.tau, (r"\tau", "F"), ("torque", "force")
     ),
 }
-"""Kinds of joint quantities by the name that their limits have."""
+"""The table of what plots, report and viewer show of joints.
+
+The keys are the names of the limits.
+"""
 
 
 def kinds_of(trajectory: Trajectory) -> tuple[str, ...]:
     """Return the kinds that are of interest for a motion."""
     limits = trajectory.robot.limits
     return tuple(
-        kind
-        for kind, own in KINDS.items()
-        if not own.if_limited or np.isfinite(limits_of(limits, kind)).any()
+        name
+        for name, kind in KINDS.items()
+        if not kind.if_limited or np.isfinite(limits_of(limits, name)).any()
     )
 
 
 def quantities(
-    trajectory: Trajectory, samples: Samples, kind: str, *, degrees: bool = False
-) -> tuple[Quantity, ...]:
-    """Split one kind of quantity by unit: that of revolute joints first, then that of prismatic ones.
+    trajectory: Trajectory, samples: Samples, *kinds: str, degrees: bool = False
+) -> list[Quantity]:
+    """Split quantities by unit: revolute joints first, then prismatic ones.
 
     Parameters
     ----------
     trajectory : Trajectory
     samples : Samples
         Of the trajectory.
-    kind : str
-        One of `KINDS`.
+    *kinds : str
+        Some of `KINDS`.
     degrees : bool, optional
         Whether angles are in degrees.
 
     Returns
     -------
-    tuple of Quantity
-        One or two.
+    list of Quantity
+        One or two of each kind.
     """
-    robot, own = trajectory.robot, KINDS[kind]
-    lower, upper = limits_of(robot.limits, kind)
-    values = own.values(trajectory, samples)
+    robot = trajectory.robot
+    joints_by_unit = {
+        "rad": np.flatnonzero(robot.revolute),
+        "m": np.flatnonzero(~robot.revolute),
+    }
     found = []
-    for place, (base, of_kind) in enumerate(
-        (("rad", robot.revolute), ("m", ~robot.revolute))
-    ):
-        joints = np.flatnonzero(of_kind)
-        if not len(joints):
-            continue
-        unit, factor = shown_unit(UNITS[kind][base], degrees=degrees)
-        low, high = factor * lower[joints], factor * upper[joints]
-        ended = np.isfinite(low) & np.isfinite(high) & own.in_range
-        centre = 0.5 * np.where(ended, low, 0.0) + 0.5 * np.where(ended, high, 0.0)
-        name = own.names[place] if own.names else kind
-        found.append(
-            Quantity(
-                name=name,
-                symbol=own.symbols[place],
-                unit=unit.replace("^2", "²").replace("^3", "³"),
-                t=samples.t,
-                joints=joints,
-                values=factor * values[:, joints],
-                lower=low,
-                upper=high,
-                centre=centre,
-                share=own.share or f"{name} / limit",
-                of=own.of,
+    for name in kinds:
+        kind = KINDS[name]
+        lower, upper = limits_of(robot.limits, name)
+        values = kind.values(trajectory, samples)
+        for place, (base, joints) in enumerate(joints_by_unit.items()):
+            if not len(joints):
+                continue
+            unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
+            low = factor * lower[joints]
+            high = factor * upper[joints]
+            centre = np.zeros(len(joints))
+            if kind.in_range:
+                is_range = np.isfinite(low) & np.isfinite(high)
+                centre[is_range] = 0.5 * low[is_range] + 0.5 * high[is_range]
+            found.append(
+                Quantity(
+                    name=kind.names[place],
+                    symbol=kind.symbols[place],
+                    unit=unit.replace("^2", "²").replace("^3", "³"),
+                    t=samples.t,
+                    joints=joints,
+                    values=factor * values[:, joints],
+                    lower=low,
+                    upper=high,
+                    centre=centre,
+                    share=kind.share or f"{kind.names[place]} / limit",
+                    of=kind.of,
+                )
             )
-        )
-    return tuple(found)
+    return found
+
+
+def joint_quantities(
+    trajectory: Trajectory, samples: Samples, *kinds: str, degrees: bool = False
+) -> list[list[Quantity]]:
+    """As `quantities`, but a list for each joint; every entry has this joint alone."""
+    parts = quantities(trajectory, samples, *kinds, degrees=degrees)
+    return [
+        [one for part in parts if (one := part.of_joints(part.joints == joint))]
+        for joint in range(trajectory.robot.n)
+    ]
 
 
 def limits_of(limits: Limits, kind: str) -> np.ndarray:
@@ -185,11 +237,23 @@ def limits_of(limits: Limits, kind: str) -> np.ndarray:
     return ranges[kind] if kind in ranges else limits.both_ways(kind)
 
 
+REACH = 0.3
+"""Limits are shown if the motion comes as near to them as this part of its range."""
+
+
+def near_tool_speeds(trajectory: Trajectory, samples: Samples) -> list[np.ndarray]:
+    """Select the `allowed_tool_speeds`, (K,), that the motion comes near; NaN elsewhere."""
+    reach = (1.0 + REACH) * max(float(samples.tool_speed.max()), 1e-9)
+    found = [
+        np.where(allowed < reach, allowed, np.nan)
+        for allowed in allowed_tool_speeds(trajectory, samples)
+    ]
+    return [near for near in found if np.isfinite(near).any()]
+
+
 def allowed_tool_speeds(trajectory: Trajectory, samples: Samples) -> np.ndarray:
-    """Largest speeds of the tool that the task allows, (c, K), m/s; infinite where there is no limit."""
+    """Largest speeds of the tool that the task allows, (c, K), m/s; infinite without a limit."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
-    return (
-        np.empty((0, len(samples.t)))
-        if limit is None
-        else limit.largest_at(samples.s)[0].T
-    )
+    if limit is None:
+        return np.empty((0, len(samples.t)))
+    return limit.largest_at(samples.s)[0].T

@@ -1,10 +1,6 @@
-"""What all figures share: sizes, fonts, colours, axes and legends.
+"""What all figures share: sizes, fonts, colours, axes, legends, files, notebooks.
 
 Everything is set on the figure at hand; Matplotlib's own settings are left alone.
-
-Figures to files.
-
-Figures in notebooks, which know those of pyplot alone.
 """
 
 from __future__ import annotations
@@ -13,7 +9,7 @@ import base64
 import io
 import itertools
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,9 +88,6 @@ def check_suffix(path: str | os.PathLike[str]) -> str:
     return suffix
 
 
-_DPI_NOTEBOOK = 110
-
-
 @cache
 def figure_class() -> type[Figure]:
     """Return a class of Matplotlib's figures that notebooks show without further ado."""
@@ -117,7 +110,7 @@ def as_html(figure: Figure) -> str:
 
 def _png(figure: Figure) -> bytes:
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=_DPI_NOTEBOOK)
+    figure.savefig(stream, format="png", dpi=110)
     return stream.getvalue()
 
 
@@ -169,6 +162,11 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def stack_panels(figure: Figure, count: int) -> list[Axes]:
+    """Add panels of the same height, one below the other."""
+    return [figure.add_subplot(count, 1, row + 1) for row in range(count)]
+
+
 def joint_style(joint: int) -> dict[str, Any]:
     """Line properties of the joint with this index: a colour and, for print in greys, a line style."""
     return {
@@ -190,7 +188,8 @@ def bar_style(column: int) -> dict[str, Any]:
 
 def limit_dashes(place: int, sharing: int) -> tuple[float, tuple[float, float]]:
     """Line style of a limit that some joints share: the dashes of each lie in the gaps of the others."""
-    dash, gap = 4.0, 2.0
+    dash = 4.0
+    gap = 2.0
     period = (dash + gap) * sharing
     return (period - place * (dash + gap)) % period, (dash, period - dash)
 
@@ -215,7 +214,7 @@ def dress_time(ax: Axes, t_end: float, knots: np.ndarray) -> None:
 
 
 def mark_end(ax: Axes, t_end: float) -> None:
-    """Write the end time beside the right edge, where no data are."""
+    """Write the end time outside the right edge."""
     ax.text(
         1.02,
         0.5,
@@ -228,10 +227,7 @@ def mark_end(ax: Axes, t_end: float) -> None:
 
 
 def legend_above(
-    ax: Axes,
-    width: float,
-    handles: Sequence[Artist] | None = None,
-    labels: Sequence[str] | None = None,
+    ax: Axes, width: float, lines: Mapping[str, Artist] | None = None
 ) -> None:
     """Put a legend above the axes, in as many columns as fit.
 
@@ -240,42 +236,60 @@ def legend_above(
     ax : Axes
     width : float
         Room, mm.
-    handles, labels : sequences, optional
-        What the legend shows; the labelled artists of the axes if left out.
+    lines : mapping of str to Artist, optional
+        What the legend shows; by default the labelled artists of the axes.
     """
-    if handles is None or labels is None:
-        handles, labels = ax.get_legend_handles_labels()
-    if not labels:
-        return
-    ax.legend(
-        handles,
-        labels,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=_columns_that_fit(labels, width),
-        fontsize=TICK_SIZE,
-        frameon=False,
-        handlelength=2.3,
-        columnspacing=1.2,
-        borderaxespad=0.2,
-        borderpad=0.2,
-    )
+    lines = lines_by_label([ax]) if lines is None else lines
+    if lines:
+        ax.legend(
+            list(lines.values()),
+            list(lines),
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            borderaxespad=0.2,
+            borderpad=0.2,
+            **_legend_look(lines, width),
+        )
 
 
-def legend_below(
-    figure: Figure, width: float, handles: Sequence[Artist], labels: Sequence[str]
-) -> None:
-    """Put one legend for all axes at the foot of the figure, in as many columns as fit `width`, mm."""
+def legend_below(figure: Figure, width: float, lines: Mapping[str, Artist]) -> None:
+    """Put one legend for all axes at the foot of the figure; `width` in mm."""
     figure.legend(
-        handles,
-        labels,
+        list(lines.values()),
+        list(lines),
         loc="outside lower center",
-        ncols=_columns_that_fit(labels, width),
-        fontsize=TICK_SIZE,
-        frameon=False,
-        handlelength=2.3,
-        columnspacing=1.2,
+        **_legend_look(lines, width),
     )
+
+
+def lines_by_label(panels: Sequence[Axes]) -> dict[str, Artist]:
+    """Artists of some axes by their labels."""
+    return {
+        label: line
+        for ax in panels
+        for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+
+
+def _legend_look(lines: Mapping[str, Artist], width: float) -> dict[str, Any]:
+    return {
+        "ncols": _columns_that_fit(list(lines), width),
+        "fontsize": TICK_SIZE,
+        "frameon": False,
+        "handlelength": 2.3,
+        "columnspacing": 1.2,
+    }
+
+
+def draw_limit(ax: Axes, level: float, top: float) -> None:
+    """Draw a limit, and shade what is beyond it, up to `top`."""
+    ax.axhline(level, color=GREY, **LIMIT)
+    beyond: dict[str, Any] = {
+        "facecolor": FORBIDDEN,
+        "edgecolor": "none",
+        "zorder": 0.0,
+    }
+    ax.axhspan(level, np.sign(level) * top, **beyond)
 
 
 def _columns_that_fit(labels: Sequence[str], width: float) -> int:

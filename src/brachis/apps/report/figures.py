@@ -1,7 +1,4 @@
-"""The interactive figures of a report, as data and layout of Plotly.
-
-The motion as an animation: stick figures, the tool's trace and the figures of every joint at some times.
-"""
+"""The interactive figures of a report for Plotly, and its animation of stick figures."""
 
 from __future__ import annotations
 
@@ -17,9 +14,11 @@ from brachis.apps.plots import style
 from brachis.apps.plots.motion import knot_times
 from brachis.apps.plots.postures import plane_of, skeleton
 from brachis.apps.plots.quantities import (
+    REACH,
     Quantity,
-    allowed_tool_speeds,
+    joint_quantities,
     kinds_of,
+    near_tool_speeds,
     quantities,
 )
 from brachis.apps.report.motion import ReportedMotion
@@ -28,17 +27,15 @@ from brachis.apps.report.tables import NEAR
 Figure = dict[str, Any]
 """``data`` and ``layout`` of Plotly."""
 
-_REACH = 0.3
-"""Limits are in view where the motion comes as near to them as this part of its range."""
-_PANEL_PX, _SMALL_PX, _ROW_PX, _FRAME_PX = 210, 130, 26, 110
-_FEW_JOINTS = 2
+_SMALL_PX = 130
+_FRAME_PX = 110
 _SHOWN = 0.5
 """Limits that the motion never comes this near to have no row."""
 _MOST = 1.1
 """Ratio at the upper end of the colours."""
 
 
-def encoded(values: np.ndarray) -> dict[str, Any]:
+def encode(values: np.ndarray) -> dict[str, Any]:
     """Write an array as Plotly reads it: single precision, base64."""
     data = np.ascontiguousarray(values, dtype="<f4")
     shape = {"shape": ",".join(map(str, data.shape))} if data.ndim > 1 else {}
@@ -50,23 +47,21 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 
     Joints in rad and joints in m have panels of their own; a joint is hidden in all panels at once.
     """
-    trajectory, samples = motion.trajectory, motion.samples
-    kinds = kinds_of(trajectory)
-    panels = [
-        [part]
-        for kind in kinds
-        for part in quantities(trajectory, samples, kind, degrees=motion.degrees)
-    ]
-    panels += (
-        [parts]
-        if (parts := _over_their_limits(quantities(trajectory, samples, "torque")))
-        else []
+    trajectory = motion.trajectory
+    samples = motion.samples
+    parts = quantities(
+        trajectory, samples, *kinds_of(trajectory), degrees=motion.degrees
     )
-    heights = [
-        _PANEL_PX if len(parts[0].joints) > _FEW_JOINTS else _SMALL_PX
-        for parts in panels
-    ] + [_SMALL_PX]
-    data, named, last = [], set(), len(heights)
+    panels = [[part] for part in parts]
+    shares = _over_their_limits(quantities(trajectory, samples, "torque"))
+    if shares:
+        panels.append(shares)
+    heights = [210 if len(parts[0].joints) > 2 else _SMALL_PX for parts in panels] + [
+        _SMALL_PX
+    ]
+    data = []
+    named = set()
+    last = len(heights)
     layout = _layout(trajectory.t_end, sum(heights) + _FRAME_PX)
     for row, (parts, domain) in enumerate(
         zip(panels, _domains(heights), strict=False), start=1
@@ -81,29 +76,19 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     layout[_axis("yaxis", last)] = _value_axis(
         "tool speed (m/s)", _domains(heights)[-1], None
     )
-    look = {
-        "line": {"color": style.COLOURS[-1], "width": 1.6},
-        "name": "tool",
-        "showlegend": False,
-    }
-    hover = {"hovertemplate": "%{y:.4g} m/s<extra>tool</extra>"}
-    data.append({**_curve(samples.t, samples.tool_speed, last), **look, **hover})
-    for allowed in allowed_tool_speeds(trajectory, samples):
-        near = np.where(
-            allowed < (1.0 + _REACH) * samples.tool_speed.max(), allowed, np.nan
-        )
-        thin = {"color": style.GREY, "width": 1, "dash": "4px,4px"}
-        limit = {
-            **_curve(samples.t, near, last),
-            "line": thin,
-            "name": "limit of the tool speed",
-            "showlegend": False,
-        }
-        data += (
-            [{**limit, "hoverinfo": "skip", "meta": "limit"}]
-            if np.isfinite(near).any()
-            else []
-        )
+    speed = _curve(
+        samples.t,
+        samples.tool_speed,
+        last,
+        line={"color": style.COLOURS[-1], "width": 1.6},
+        name="tool",
+        showlegend=False,
+        hovertemplate="%{y:.4g} m/s<extra>tool</extra>",
+    )
+    data.append(speed)
+    for allowed in near_tool_speeds(trajectory, samples):
+        name = "limit of the tool speed"
+        data.append(_limit_line(samples.t, allowed, last, style.GREY, name=name))
     layout["xaxis"] |= {"anchor": f"y{last}", "title": {"text": "t (s)"}}
     layout["xaxis"]["minor"] = {
         "tickvals": knot_times(trajectory).tolist(),
@@ -114,21 +99,10 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 
 
 def _over_their_limits(parts: Sequence[Quantity]) -> list[Quantity]:
-    """Give torques and forces as parts of their limits: those of a wrist are small beside those of a shoulder."""
-    found = [part.limited() for part in parts]
-    names = ", ".join(part.name for part in found if part is not None)
-    ones = ((part, np.ones(len(part.joints))) for part in found if part is not None)
-    return [
-        replace(
-            part,
-            name=names,
-            unit="of the limit",
-            values=part.ratios,
-            lower=-one,
-            upper=one,
-        )
-        for part, one in ones
-    ]
+    """Divide torques and forces by their limits: a wrist's are smaller than a shoulder's."""
+    found = [ratios for part in parts if (ratios := part.over_limits()) is not None]
+    names = ", ".join(part.name for part in found)
+    return [replace(part, name=names) for part in found]
 
 
 def _joint_traces(
@@ -136,47 +110,38 @@ def _joint_traces(
 ) -> list[dict[str, Any]]:
     """Draw one joint's curve, and its limits as thin straight lines."""
     joint = style.joint_style(int(part.joints[column]))
-    values, levels = part.values[:, column], (part.lower[column], part.upper[column])
-    line = {
+    values = part.values[:, column]
+    levels = (part.lower[column], part.upper[column])
+    group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
+    hover = f"%{{y:.4g}} {part.unit}"
+    look: dict[str, Any] = {**group, "showlegend": shown}
+    if np.isfinite(levels).all():
+        look["customdata"] = encode(100.0 * np.abs(part.ratios[:, column]))
+        hover += f", %{{customdata:.1f}} % of {part.of}"
+    look["hovertemplate"] = f"{hover}<extra>{_escape(name)}</extra>"
+    look["line"] = {
         "color": joint["color"],
         "width": 1.8,
         "dash": _dash(joint["linestyle"]),
         "simplify": False,
     }
-    group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
-    hover, share = f"%{{y:.4g}} {part.unit}", {}
-    if np.isfinite(levels).all():
-        share = {"customdata": encoded(100.0 * np.abs(part.ratios[:, column]))}
-        hover += f", %{{customdata:.1f}} % of {part.of}"
-    curve = {
-        **_curve(part.t, values, row),
-        **group,
-        **share,
-        "line": line,
-        "showlegend": shown,
-    }
-    traces = [{**curve, "hovertemplate": f"{hover}<extra>{_escaped(name)}</extra>"}]
-    ends = part.t[[0, -1]]
-    for level in levels:
-        if np.isfinite(level):
-            thin = {"color": joint["color"], "width": 1, "dash": "4px,4px"}
-            limit = {
-                **_curve(ends, np.full(2, level), row),
-                **group,
-                "line": thin,
-                "showlegend": False,
-            }
-            traces.append({**limit, "hoverinfo": "skip", "meta": "limit"})
-    return traces
+    limits = [
+        _limit_line(part.t[[0, -1]], np.full(2, level), row, joint["color"], **group)
+        for level in levels
+        if np.isfinite(level)
+    ]
+    return [_curve(part.t, values, row, **look), *limits]
 
 
 def timeline_figure(motion: ReportedMotion) -> Figure:
     """Draw how near the motion is to every limit over time, a row each: blue, orange where active, red beyond it."""
-    ratios, tolerance = motion.ratios, motion.trajectory.task.refinement.tolerance
+    ratios = motion.ratios
+    tolerance = motion.trajectory.task.refinement.tolerance
     columns = {label: column for column, label in enumerate(ratios.labels)}
     entries = [entry for entry in motion.saturations if entry.peak > _SHOWN][::-1]
     once = np.append(np.diff(ratios.t) > 0.0, True)
-    t, values = ratios.t[once], np.abs(ratios.values[once])
+    t = ratios.t[once]
+    values = np.abs(ratios.values[once])
     part = np.array([values[:, columns[entry.label]] for entry in entries]).reshape(
         len(entries), len(t)
     )
@@ -185,19 +150,18 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
         for stretch in entry.active:  # ripple included
             inside = (t >= stretch.begin) & (t <= stretch.end)
             colours[row, inside] = np.maximum(colours[row, inside], THRESHOLD)
-    active, beyond = THRESHOLD / _MOST, (1.0 + tolerance) / _MOST
-    layout = _layout(
-        motion.trajectory.t_end, _ROW_PX * max(len(entries), 1) + _FRAME_PX
-    )
+    active = THRESHOLD / _MOST
+    beyond = (1.0 + tolerance) / _MOST
+    layout = _layout(motion.trajectory.t_end, 26 * max(len(entries), 1) + _FRAME_PX)
     layout["xaxis"] |= {"title": {"text": "t (s)"}}
     layout["yaxis"] = {"automargin": True, "fixedrange": True, "ticks": ""}
     layout["hovermode"] = "closest"
     heat = {
         "type": "heatmap",
-        "x": encoded(t),
+        "x": encode(t),
         "y": [f"{entry.label}" for entry in entries],
-        "z": encoded(np.minimum(colours, _MOST)),
-        "customdata": encoded(100.0 * part),
+        "z": encode(np.minimum(colours, _MOST)),
+        "customdata": encode(100.0 * part),
         "zmin": 0.0,
         "zmax": _MOST,
         "ygap": 3,
@@ -220,14 +184,25 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     return {"data": [heat] if entries else [], "layout": layout}
 
 
-def _curve(t: np.ndarray, values: np.ndarray, row: int) -> dict[str, Any]:
+def _curve(t: np.ndarray, values: np.ndarray, row: int, **look: Any) -> dict[str, Any]:
+    """Return a curve of the panel with this number."""
     return {
         "type": "scatter",
         "mode": "lines",
-        "x": encoded(t),
-        "y": encoded(values),
+        "x": encode(t),
+        "y": encode(values),
         "yaxis": f"y{row}",
+        **look,
     }
+
+
+def _limit_line(
+    t: np.ndarray, values: np.ndarray, row: int, colour: str, **look: Any
+) -> dict[str, Any]:
+    """Return a thin dashed line, without an entry in the legend."""
+    line = {"color": colour, "width": 1, "dash": "4px,4px"}
+    look |= {"line": line, "showlegend": False, "hoverinfo": "skip", "meta": "limit"}
+    return _curve(t, values, row, **look)
 
 
 def _layout(t_end: float, height: float) -> dict[str, Any]:
@@ -250,28 +225,30 @@ def _value_axis(
         "anchor": "x",
         "zeroline": True,
     }
-    return axis if view is None else {**axis, "range": view}
+    if view is not None:
+        axis["range"] = view
+    return axis
 
 
 def _view(parts: Sequence[Quantity]) -> tuple[float, float]:
     """Range of values in view: the motion, and the limits that it comes near."""
-    low, high = (
-        min(float(part.values.min()) for part in parts),
-        max(float(part.values.max()) for part in parts),
-    )
-    reach = _REACH * max(high - low, 1e-9)
+    low = min(float(part.values.min()) for part in parts)
+    high = max(float(part.values.max()) for part in parts)
+    reach = REACH * max(high - low, 1e-9)
     levels = np.concatenate(
         [level for part in parts for level in (part.lower, part.upper)]
     )
     near = levels[(levels > low - reach) & (levels < high + reach)]
-    low, high = min([low, *near.tolist()]), max([high, *near.tolist()])
+    low = min([low, *near.tolist()])
+    high = max([high, *near.tolist()])
     room = 0.06 * max(high - low, 1e-9)
     return low - room, high + room
 
 
 def _domains(heights: list[int]) -> list[tuple[float, float]]:
     """Parts of the figure's height for panels, from the top down."""
-    whole, gap = float(sum(heights)), 0.012
+    whole = float(sum(heights))
+    gap = 0.012
     ends = 1.0 - np.cumsum([0.0, *heights]) / whole
     return [
         (float(low) + gap, float(high) - gap)
@@ -290,12 +267,9 @@ def _dash(linestyle: object) -> str:
     return ",".join(f"{1.8 * length:.1f}px" for length in linestyle[1])
 
 
-def _escaped(name: str) -> str:
+def _escape(name: str) -> str:
     """Keep Plotly from reading names as markup."""
     return name.replace("&", "&amp;").replace("<", "&lt;").replace("%{", "% {")
-
-
-_FRAMES = 240
 
 
 def scene(motion: ReportedMotion) -> dict[str, Any]:
@@ -309,30 +283,34 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         with their unit and parts of their limits; ``levels``, the parts of a limit from which on values are marked.
     """
     trajectory = motion.trajectory
-    samples = trajectory.at(np.linspace(0.0, trajectory.t_end, _FRAMES))
+    samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 240))
     robot = trajectory.robot
-    joints: list[dict[str, Any]] = [
-        {
+    kinds = kinds_of(trajectory)
+    joints: list[dict[str, Any]] = []
+    for name, unit, parts in zip(
+        robot.joint_names,
+        robot.position_units,
+        joint_quantities(trajectory, samples, *kinds, degrees=motion.degrees),
+        strict=True,
+    ):
+        entries = []
+        for part in parts:
+            entry = {"unit": part.unit, "values": encode(part.values[:, 0])}
+            if part.is_limited[0]:
+                entry["ratios"] = encode(np.abs(part.ratios[:, 0]))
+            entries.append(entry)
+        joint = {
             "name": name,
             "redundant": name in trajectory.redundant_joints,
             "prismatic": unit == "m",
-            "quantities": [],
+            "quantities": entries,
         }
-        for name, unit in zip(robot.joint_names, robot.position_units, strict=True)
-    ]
-    kinds = kinds_of(trajectory)
-    for kind in kinds:
-        for part in quantities(trajectory, samples, kind, degrees=motion.degrees):
-            for column, joint in enumerate(part.joints.tolist()):
-                entry = {"unit": part.unit, "values": encoded(part.values[:, column])}
-                if part.is_limited[column]:
-                    entry["ratios"] = encoded(np.abs(part.ratios[:, column]))
-                joints[joint]["quantities"].append(entry)
+        joints.append(joint)
     return {
-        "t": encoded(samples.t),
-        "s": encoded(samples.s),
-        "speed": encoded(samples.tool_speed),
-        "bones": encoded(skeleton(robot, samples.q).bones),
+        "t": encode(samples.t),
+        "s": encode(samples.s),
+        "speed": encode(samples.tool_speed),
+        "bones": encode(skeleton(robot, samples.q).bones),
         "plane": plane_of(trajectory),
         "joints": joints,
         "kinds": kinds,

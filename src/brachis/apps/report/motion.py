@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -39,9 +38,9 @@ class ReportedMotion:
     held_back : tuple of str
         What holds the motion back, a sentence each.
     remarks : tuple of Remark
-        What of robot and task is hardly meant.
+        What is implausible in robot and task.
     left_undone : tuple of str
-        What the search left undone.
+        What the search did not complete.
     candidates : tuple of Attempt
         What the search looked at; none for a saved motion.
     planned : dict of str to str
@@ -66,67 +65,45 @@ class ReportedMotion:
 def reported_motion(
     motion: PlannedMotion | Trajectory, *, degrees: bool = False
 ) -> ReportedMotion:
-    """Gather what there is to say of a planned or a saved motion; a saved one is verified again."""
+    """Gather what there is to say of a motion; a saved one is verified again."""
+    limits: list[Limit] | None = None
+    not_completed: list[str] = []
     if isinstance(motion, Trajectory):
-        return _gathered(
-            motion,
-            motion,
-            verify_trajectory(motion),
-            limits=None,
-            remarks=of_robot(motion.robot) + of_task(motion.task),
-            degrees=degrees,
-        )
-    refined = motion.attempt.refined
-    limits = (
-        None
-        if refined is None
-        else [
-            each for each in refined.program.limits if each.role is not Role.SAFEGUARD
-        ]
-    )
-    early = (
-        ("the search was ended early: a faster motion may have been missed",)
-        if motion.interrupted
-        else ()
-    )
-    return _gathered(
-        motion,
-        motion.trajectory,
-        motion.verification,
-        limits=limits,
-        remarks=motion.warnings,
-        left_undone=(*early, *motion.undone),
-        candidates=motion.candidates,
-        planned=_planned(motion),
-        degrees=degrees,
-    )
-
-
-def _gathered(
-    source: PlannedMotion | Trajectory,
-    trajectory: Trajectory,
-    verification: Verification,
-    *,
-    limits: Sequence[Limit] | None,
-    remarks: tuple[Remark, ...],
-    degrees: bool,
-    left_undone: tuple[str, ...] = (),
-    candidates: tuple[Attempt, ...] = (),
-    planned: dict[str, str] | None = None,
-) -> ReportedMotion:
+        trajectory = motion
+        verification = verify_trajectory(motion)
+        remarks = of_robot(motion.robot) + of_task(motion.task)
+        candidates: tuple[Attempt, ...] = ()
+        planned = {}
+    else:
+        trajectory = motion.trajectory
+        verification = motion.verification
+        remarks = motion.warnings
+        candidates = motion.candidates
+        planned = _describe_plan(motion)
+        if motion.attempt.refined is not None:
+            limits = [
+                limit
+                for limit in motion.attempt.refined.program.limits
+                if limit.role is not Role.SAFEGUARD
+            ]
+        if motion.interrupted:
+            not_completed.append(
+                "the search was ended early: a faster motion may have been missed"
+            )
+        not_completed += motion.undone
     ratios = limit_ratios(trajectory, limits)
-    found = saturations_of(ratios)
+    saturations = saturations_of(ratios)
     return ReportedMotion(
         trajectory=trajectory,
         samples=dense_samples(trajectory),
         verification=verification,
         ratios=ratios,
-        saturations=found,
-        held_back=_held_back(source, found, degrees=degrees),
+        saturations=saturations,
+        held_back=_held_back(motion, saturations, degrees=degrees),
         remarks=remarks,
-        left_undone=left_undone,
+        left_undone=tuple(not_completed),
         candidates=candidates,
-        planned=planned or {},
+        planned=planned,
         degrees=degrees,
     )
 
@@ -141,9 +118,10 @@ def _held_back(
         return (*active_in_words(found), f"What the limits cost is not known: {error}")
 
 
-def _planned(result: PlannedMotion) -> dict[str, str]:
+def _describe_plan(result: PlannedMotion) -> dict[str, str]:
     """Say how a motion was planned."""
-    report, least = result.solver_report, result.least_motion
+    report = result.solver_report
+    least = result.least_motion
     return {
         "solver": f"{report.solver}, {report.status.value}",
         "collocation points": str(result.attempt.collocation_points),

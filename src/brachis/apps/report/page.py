@@ -104,11 +104,12 @@ def make_report(
     Examples
     --------
     >>> import brachis
-    >>> from brachis.report import make_report
+    >>> from brachis.apps.report import make_report
     >>> page = make_report(brachis.Trajectory.load("out/result.npz"))  # doctest: +SKIP
     >>> page.save("out/report.html")  # doctest: +SKIP
     """
-    template, program = _template(), _plotly()
+    template = _template()
+    program = _plotly()
     reported = reported_motion(motion, degrees=degrees)
     checks = tables.check_rows(reported)
     page = template.render(

@@ -15,7 +15,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD
-from brachis.apps.plots.quantities import Quantity, kinds_of, quantities
+from brachis.apps.plots.quantities import Quantity, joint_quantities, kinds_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.optimise.candidate import coordinates
 from brachis.robot.from_task import in_use
@@ -25,7 +25,6 @@ from brachis.verify import Check
 _LIBRARIES = ("pin", "numpy", "scipy", "plotly")
 NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
-_SMALL, _LARGE = 1e-9, 1e4
 _LISTED = 6
 """Segments of a path, and numbers of one, that are named."""
 
@@ -37,9 +36,9 @@ class Row:
     Attributes
     ----------
     value, limit : str
-        With units; the limit is empty where there is none.
+        With units; the limit is empty for a joint without one.
     share : str
-        Of the limit, per cent; empty where there is none.
+        Percentage of the limit; empty without a limit.
     level : str
         ``beyond``, ``at``, ``near`` or empty: how near to the limit.
     """
@@ -76,11 +75,9 @@ class JointRow:
 
 def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     """Say what a person asks first."""
-    trajectory, samples, verification = (
-        motion.trajectory,
-        motion.samples,
-        motion.verification,
-    )
+    trajectory = motion.trajectory
+    samples = motion.samples
+    verification = motion.verification
     boundary = trajectory.task.boundary
     named = trajectory.branch not in {
         "",
@@ -106,7 +103,8 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
 def identity(motion: ReportedMotion) -> dict[str, str]:
     """Say what the motion is of: robot, path, payload and where the robot stands; and when the page was made."""
     trajectory = motion.trajectory
-    urdf, recovered = trajectory.task.robot.urdf, trajectory.recovered
+    urdf = trajectory.task.robot.urdf
+    recovered = trajectory.recovered
     file = "" if urdf is None else f" ({_file_name(urdf)})"
     way = float(
         np.linalg.norm(np.diff(motion.samples.tool_position, axis=0), axis=1).sum()
@@ -198,59 +196,59 @@ def what_limits(motion: ReportedMotion) -> str:
 
 def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     """List what every joint does, in chain order."""
-    trajectory, tolerance = (
-        motion.trajectory,
-        motion.trajectory.task.refinement.tolerance,
+    trajectory = motion.trajectory
+    tolerance = trajectory.task.refinement.tolerance
+    parts_by_joint = joint_quantities(
+        trajectory, motion.samples, *kinds_of(trajectory), degrees=motion.degrees
     )
-    peaks: dict[int, list[Row]] = {joint: [] for joint in range(trajectory.robot.n)}
-    positions: dict[int, tuple[np.ndarray, str]] = {}
-    for kind in kinds_of(trajectory):
-        for part in quantities(
-            trajectory, motion.samples, kind, degrees=motion.degrees
-        ):
-            for column, joint in enumerate(part.joints.tolist()):
-                positions.setdefault(joint, (part.values[:, column], part.unit))
-                peaks[joint].append(_peak(part, column, tolerance))
     rows = []
-    for joint, name in enumerate(trajectory.joint_names):
-        q, unit = positions[joint]
-        rows.append(
-            JointRow(
-                name=name,
-                redundant=name in trajectory.redundant_joints,
-                start=f"{q[0]:.4f} {unit}",
-                end=f"{q[-1]:.4f} {unit}",
-                travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
-                peaks=tuple(peaks[joint]),
-            )
+    for name, parts in zip(trajectory.joint_names, parts_by_joint, strict=True):
+        position = parts[0]
+        q = position.values[:, 0]
+        unit = position.unit
+        row = JointRow(
+            name=name,
+            redundant=name in trajectory.redundant_joints,
+            start=f"{q[0]:.4f} {unit}",
+            end=f"{q[-1]:.4f} {unit}",
+            travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
+            peaks=tuple(_peak(part, tolerance) for part in parts),
         )
+        rows.append(row)
     return rows
 
 
-def _peak(part: Quantity, column: int, tolerance: float) -> Row:
-    """Find the value of a joint that is nearest to its limit, or the largest one where there is no limit."""
-    values, lower, upper = (
-        part.values[:, column],
-        part.lower[column],
-        part.upper[column],
-    )
-    limited = bool(part.is_limited[column])
-    ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
-    at = int(np.argmax(ratios if limited else np.abs(values)))
-    value = values[at] if abs(values[at]) > _SMALL else 0.0
-    low, high = _write_number(lower), _write_number(upper)
-    limit = f"{high} {part.unit}" if upper == -lower else f"{low} to {high} {part.unit}"
+def _peak(part: Quantity, tolerance: float) -> Row:
+    """Find the value of a joint that is nearest to its limit.
+
+    Without a limit it is the largest one.
+    """
+    values = part.values[:, 0]
+    upper = part.upper[0]
+    lower = part.lower[0]
+    if not part.is_limited[0]:
+        largest = values[np.argmax(np.abs(values))]
+        return Row(_write_value(largest, part.unit), "", "", "")
+    ratios = np.abs(part.ratios[:, 0])
+    limit = f"{_write_number(upper)} {part.unit}"
+    if upper != -lower:
+        limit = f"{_write_number(lower)} to {limit}"
     return Row(
-        value=f"{_write_number(value)} {part.unit}",
-        limit=limit if limited else "",
-        share=f"{100.0 * ratios.max():.1f} %" if limited else "",
+        value=_write_value(values[np.argmax(ratios)], part.unit),
+        limit=limit,
+        share=f"{100.0 * ratios.max():.1f} %",
         level=_level(float(ratios.max()), tolerance),
     )
 
 
+def _write_value(value: float, unit: str) -> str:
+    """Write a value with its unit, rounding noise as zero."""
+    return f"{_write_number(value if abs(value) > 1e-9 else 0.0)} {unit}"
+
+
 def _write_number(value: float) -> str:
     """Write a number with four significant figures, large ones without an exponent."""
-    return f"{value:.0f}" if _LARGE <= abs(value) < np.inf else f"{value:.4g}"
+    return f"{value:.0f}" if 1e4 <= abs(value) < np.inf else f"{value:.4g}"
 
 
 def _level(share: float, tolerance: float) -> str:

@@ -1,8 +1,6 @@
-"""What is drawn of a robot: for every joint what moves with it, and for joint 0, the world, what stands still.
+"""What is drawn of a robot: the shapes of its URDF or a skeleton, and where they are.
 
-What a URDF says its links look like: primitives and meshes, with their colours.
-
-Where links and tool are.
+Shapes belong to the joint that moves them; joint 0 is the world, which stands still.
 """
 
 from __future__ import annotations
@@ -60,7 +58,9 @@ def link_shapes(
     unread : list of str
         Of the shapes that cannot be shown, the link and the reason; of missing files one line.
     """
-    tree, shapes, unread = read_tree(urdf, "URDF"), {}, []
+    tree = read_tree(urdf, "URDF")
+    shapes = {}
+    unread = []
     absent: list[str] = []
     room = _LARGEST
     materials = [each for each in tree.robot if each.tag == "material"]
@@ -125,10 +125,8 @@ def _check_size(visual: Element, room: int) -> int:
             )
         size += _size(path)
         if size > room:
-            found, allowed = (
-                f"{size / 1e6:.0f} MB",
-                f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot",
-            )
+            found = f"{size / 1e6:.0f} MB"
+            allowed = f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
             raise InputError(
                 "the mesh is too large to be shown",
                 where=path.name,
@@ -160,8 +158,8 @@ def _meshes(
     import yourdfpy
 
     robot = etree.Element("robot", name="robot")
-    robot.extend([_copied(each) for each in materials])
-    etree.SubElement(robot, "link", name=name).append(_copied(visual))
+    robot.extend([_copy(each) for each in materials])
+    etree.SubElement(robot, "link", name=name).append(_copy(visual))
     read = yourdfpy.URDF.load(
         io.BytesIO(etree.tostring(robot)),
         load_meshes=True,
@@ -174,7 +172,7 @@ def _meshes(
         mesh = read.scene.geometry[geometry]
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
             found.append(
-                _placed(
+                _place(
                     trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual),
                     placement,
                 )
@@ -187,11 +185,11 @@ def _meshes(
     return found
 
 
-def _copied(element: Element) -> Element:
+def _copy(element: Element) -> Element:
     return etree.fromstring(etree.tostring(element))
 
 
-def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
+def _place(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
     """Place a mesh, and see to its colour where it has no picture on it."""
     look = getattr(
         mesh.visual, "material", mesh.visual
@@ -200,15 +198,15 @@ def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
         getattr(look, "baseColorTexture", None) is None
         and getattr(look, "image", None) is None
     ):
-        mesh = coloured(
+        mesh = with_colour(
             mesh, tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL
         )
     mesh.apply_transform(placement)
     return mesh
 
 
-def coloured(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
-    """Give a mesh one material that is no metal, RGBA from 0 to 255, and sharp edges unless it has too many faces."""
+def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
+    """Give a mesh a matt material, RGBA from 0 to 255, and sharp edges if it has few faces."""
     import trimesh
 
     if len(mesh.faces) <= _PRIMITIVE:
@@ -243,7 +241,9 @@ class Placements:
 
 def placements(robot: Robot, q: np.ndarray) -> Placements:
     """Forward kinematics of postures `q`, (K, n)."""
-    model, data, frame = robot.model, robot.model.createData(), robot.frame_id
+    model = robot.model
+    data = robot.model.createData()
+    frame = robot.frame_id
     found = Placements(
         np.empty((len(q), robot.n + 2, 3)), np.empty((len(q), robot.n + 2, 4))
     )
@@ -261,10 +261,6 @@ def placements(robot: Robot, q: np.ndarray) -> Placements:
 _BONE = (72, 101, 129, 255)
 _JOINT = (230, 159, 0, 255)
 _AXIS = (120, 130, 140, 255)
-_THICKNESS = 0.012
-"""Radius of a skeleton's links as a part of the robot's size."""
-_POSTURES = 33
-"""At which a motion is looked at to find its extent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,10 +305,10 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         for mesh in meshes:
             mesh.apply_transform(frame.placement.homogeneous)
         links.setdefault(int(frame.parentJoint), []).extend(meshes)
-    q = trajectory.position(np.linspace(0.0, trajectory.t_end, _POSTURES))
+    q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     found = placements(robot, q)
     size = float(np.ptp(found.positions.reshape(-1, 3), axis=0).max())
-    skeleton = _skeleton(trajectory, max(size, 1e-3) * _THICKNESS)
+    skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
     drawn = links or skeleton
     moving = {joint: meshes for joint, meshes in drawn.items() if joint}
     return Bodies(
@@ -353,7 +349,8 @@ def _skeleton(
 ) -> dict[int, list[trimesh.Trimesh]]:
     """Draw every joint, and the link from it to the next one; along the axis of a prismatic joint where it slides."""
     robot = trajectory.robot
-    model, tool = robot.model, robot.model.frames[robot.frame_id]
+    model = robot.model
+    tool = robot.model.frames[robot.frame_id]
     base = model.frames[
         model.getFrameId(robot.base_frame, pin.FrameType.BODY)
     ].placement.translation
@@ -362,10 +359,8 @@ def _skeleton(
         joint: [] for joint in range(robot.n + 1)
     }
     for joint in range(robot.n):
-        placement, axis = (
-            model.jointPlacements[joint + 1],
-            _axis(model.joints[joint + 1]),
-        )
+        placement = model.jointPlacements[joint + 1]
+        axis = _axis(model.joints[joint + 1])
         drawn[joint] += _rod(begins[joint], placement.translation, radius, _BONE)
         if robot.position_units[joint] == "m":
             low, high = (
@@ -390,8 +385,10 @@ def _axis(joint: Any) -> np.ndarray:
 
 def _range(trajectory: Trajectory, joint: int) -> tuple[float, float]:
     """Positions between which a prismatic joint can move, m; where it has no ends, those of the motion."""
-    limits, q = trajectory.robot.limits, trajectory.q[:, joint]
-    low, high = float(limits.position_lower[joint]), float(limits.position_upper[joint])
+    limits = trajectory.robot.limits
+    q = trajectory.q[:, joint]
+    low = float(limits.position_lower[joint])
+    high = float(limits.position_upper[joint])
     return (
         low if np.isfinite(low) else float(q.min()),
         high if np.isfinite(high) else float(q.max()),
@@ -407,7 +404,7 @@ def _rod(
     if np.linalg.norm(end - begin) < 1e-9:
         return []
     return [
-        coloured(
+        with_colour(
             trimesh.creation.cylinder(radius, segment=[begin, end], sections=24), colour
         )
     ]
@@ -416,4 +413,4 @@ def _rod(
 def _block(size: float, colour: tuple[int, ...]) -> list[trimesh.Trimesh]:
     import trimesh
 
-    return [coloured(trimesh.creation.box((size, size, size)), colour)]
+    return [with_colour(trimesh.creation.box((size, size, size)), colour)]

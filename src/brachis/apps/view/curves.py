@@ -1,7 +1,4 @@
-"""The curves of the viewer's plots: joint quantities over their limits, the tool's speed, the use of all limits.
-
-What the viewer draws of a motion, evaluated once.
-"""
+"""What the viewer shows of a motion, evaluated once: frames, path, curves of the plots."""
 
 from __future__ import annotations
 
@@ -25,7 +22,6 @@ from brachis.trajectory import Samples, Trajectory
 _TOP = 1.15
 _NEAR = 1.3
 """Of the axis: limits of the tool's speed that are farther away are not shown."""
-_BINS = 400
 _SHOWN_FREE = ("position", "velocity", "torque")
 """Kinds of quantities that are shown of joints without limits, too."""
 
@@ -68,33 +64,26 @@ def all_curves(
     plots = []
     for kind in reversed(kinds_of(trajectory)):
         parts = quantities(trajectory, samples, kind, degrees=degrees)
-        limited = [part for each in parts if (part := each.limited()) is not None]
-        free = [
-            part
-            for each in parts
-            if (part := each.of_joints(~each.is_limited)) is not None
+        limited = [
+            ratios for part in parts if (ratios := part.over_limits()) is not None
         ]
         if limited:
-            values = np.hstack([part.ratios for part in limited])
-            top = _TOP * max(1.0, float(np.abs(values).max()))
+            largest = max(float(np.abs(part.values).max()) for part in limited)
+            top = _TOP * max(1.0, largest)
             title = ", ".join(dict.fromkeys(part.share for part in limited))
-            plots.append(
-                _of(trajectory, title, limited, values, (-1.0, 1.0), -top, top)
-            )
-        for part in free if kind in _SHOWN_FREE else ():
-            low, high = float(part.values.min()), float(part.values.max())
+            plots.append(_of(trajectory, title, limited, (-1.0, 1.0), -top, top))
+        if kind not in _SHOWN_FREE:
+            continue
+        for each in parts:
+            part = each.of_joints(~each.is_limited)
+            if part is None:
+                continue
+            low = float(part.values.min())
+            high = float(part.values.max())
             margin = 0.1 * (high - low) or 1.0
             title = f"{part.name} ({part.unit}), no limit"
             plots.append(
-                _of(
-                    trajectory,
-                    title,
-                    [part],
-                    part.values,
-                    (),
-                    low - margin,
-                    high + margin,
-                )
+                _of(trajectory, title, [part], (), low - margin, high + margin)
             )
     return [*plots, _tool_speed(trajectory, samples), _largest_ratios(trajectory)]
 
@@ -103,12 +92,12 @@ def _of(
     trajectory: Trajectory,
     title: str,
     parts: Sequence[Quantity],
-    values: np.ndarray,
     bounds: tuple[float, ...],
     low: float,
     high: float,
 ) -> Curves:
-    """Plot values, (K, c), of the joints of some quantities, in chain order."""
+    """Plot some quantities of the joints, in chain order."""
+    values = np.hstack([part.values for part in parts])
     joints = np.concatenate([part.joints for part in parts])
     order = np.argsort(joints)
     names = tuple(trajectory.joint_names[joint] for joint in joints[order])
@@ -154,9 +143,7 @@ def _largest_ratios(trajectory: Trajectory) -> Curves:
     kinds = tuple(dict.fromkeys(label.kind for label in ratios.labels))
     parts = np.abs(ratios.values)
     edges = np.unique(
-        np.searchsorted(
-            ratios.t, np.linspace(0.0, trajectory.t_end, _BINS), side="left"
-        )
+        np.searchsorted(ratios.t, np.linspace(0.0, trajectory.t_end, 400), side="left")
     )
     edges = edges[ratios.t[edges] < trajectory.t_end]
     values = np.empty((len(edges), len(kinds)))
@@ -164,10 +151,8 @@ def _largest_ratios(trajectory: Trajectory) -> Curves:
         largest = parts[:, [label.kind == kind for label in ratios.labels]].max(axis=1)
         values[:, column] = np.maximum.reduceat(largest, edges)
     top = _TOP * max(1.0, float(values.max(initial=0.0)))
-    t, values = (
-        np.append(ratios.t[edges], trajectory.t_end),
-        np.vstack([values, values[-1:]]),
-    )
+    t = np.append(ratios.t[edges], trajectory.t_end)
+    values = np.vstack([values, values[-1:]])
     return Curves(
         "largest of every kind / limit",
         kinds,
@@ -178,10 +163,6 @@ def _largest_ratios(trajectory: Trajectory) -> Curves:
         0.0,
         top,
     )
-
-
-_INSTANTS = 401
-_GHOSTS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,11 +191,11 @@ class Motion:
     @classmethod
     def of(cls, trajectory: Trajectory) -> Motion:
         """Evaluate a trajectory."""
-        samples = trajectory.at(np.linspace(0.0, trajectory.t_end, _INSTANTS))
+        samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
         frames = placements(trajectory.robot, samples.q)
         ghosts = placements(
             trajectory.robot,
-            trajectory.position(np.linspace(0.0, trajectory.t_end, _GHOSTS)),
+            trajectory.position(np.linspace(0.0, trajectory.t_end, 6)),
         )
         return cls(
             trajectory,

@@ -1,9 +1,4 @@
-"""The viewer's controls, tables and plots.
-
-Plots beside the scene, with a line at the instant that is shown.
-
-The clock of the viewer: which instant of the motion is shown.
-"""
+"""The viewer's controls, tables, clock, and plots with a line at the instant shown."""
 
 from __future__ import annotations
 
@@ -25,11 +20,16 @@ if TYPE_CHECKING:
     from viser import uplot
 
 _HEIGHT = 165
-_LEFT, _RIGHT, _ABOVE, _BELOW = 40, 12, 6, 44
+_LEFT = 40
+_RIGHT = 12
+_ABOVE = 6
+_BELOW = 44
 """Of a plot, and what is around its curves; pixels."""
 _LABEL = 16
 """Of the height below, for the label."""
-_EDGE, _EDGES, _GAP = 9.5, 18.5, 12
+_EDGE = 9.5
+_EDGES = 18.5
+_GAP = 12
 """What viser leaves to the left of a plot (less half the line), on both sides and below, pixels; a test measures it."""
 _FONT = "11px sans-serif"
 _NOW = "#D00000"
@@ -103,7 +103,8 @@ class Chart:
 
     def _data(self) -> tuple[np.ndarray, ...]:
         """Columns of the plot."""
-        t, values = self._curves.t, self._curves.values
+        t = self._curves.t
+        values = self._curves.values
         return (
             t,
             *(np.full_like(t, bound) for bound in self._curves.bounds),
@@ -195,10 +196,8 @@ class Playback:
         if not self.playing:
             return self.time
         if self.time < self.t_end:
-            self.time, self._waited = (
-                min(self.time + elapsed * self.rate, self.t_end),
-                0.0,
-            )
+            self.time = min(self.time + elapsed * self.rate, self.t_end)
+            self._waited = 0.0
             return self.time
         if not self.repeats:
             self.playing = False
@@ -218,12 +217,6 @@ class Playback:
         self.playing = not self.playing
         if self.playing and self.time >= self.t_end:
             self.time = 0.0
-
-
-_STOPS = 9
-_SLIDER_STEPS = 200
-_CONTROLS_WIDTH, _PLOTS_WIDTH = 400, 350
-"""Pixels."""
 
 
 class Panel:
@@ -262,18 +255,16 @@ class Panel:
         degrees: bool,
     ) -> None:
         self._degrees = degrees
-        self._gui, self._motion, self._playback, self._show = (
-            server.gui,
-            motion,
-            playback,
-            show,
-        )
+        self._gui = server.gui
+        self._motion = motion
+        self._playback = playback
+        self._show = show
         self._gui.configure_theme(show_logo=False, show_share_button=False)
         self._gui.add_html(tables.summary(motion.trajectory, notes, verified=verified))
         self._add_controls()
         stops = [
             f"rgb({red},{green},{blue})"
-            for red, green, blue in speed_colours(np.linspace(0.0, 1.0, _STOPS))
+            for red, green, blue in speed_colours(np.linspace(0.0, 1.0, 9))
         ]
         self._gui.add_html(
             tables.speed_legend(stops, float(motion.samples.tool_speed.max()))
@@ -302,7 +293,7 @@ class Panel:
     def _add_controls(self) -> None:
         """Add slider, button and speed."""
         t_end = self._playback.t_end
-        step = float(10.0 ** np.floor(np.log10(t_end / _SLIDER_STEPS)))
+        step = float(10.0 ** np.floor(np.log10(t_end / 200)))
         self._digits = max(0, round(-np.log10(step)))
         ends = ((0.0, "0"), (t_end, f"{t_end:.4g}"))
         self._slider = self._gui.add_slider(
@@ -368,7 +359,8 @@ class Panel:
 
     def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> list[Chart]:
         """Add a panel with the plots and the list of candidates."""
-        motion, panel = self._motion, self._gui.add_panel()
+        motion = self._motion
+        panel = self._gui.add_panel()
         with panel.add_tab("limits"):
             charts = [
                 Chart(self._gui, curves)
@@ -381,9 +373,9 @@ class Panel:
         ):
             self._gui.add_html(tables.candidates_table(candidates))
         panel.dock_left()
-        panel.set_width(_PLOTS_WIDTH)
+        panel.set_width(350)
         self._gui.main_panel.dock_right()
-        self._gui.main_panel.set_width(_CONTROLS_WIDTH)
+        self._gui.main_panel.set_width(400)
         return charts
 
 

@@ -27,17 +27,15 @@ LAYERS = (
     "ground",
 )
 """What can be shown and hidden."""
-_GHOST_FIRST, _GHOST_LAST = (
-    np.array([190.0, 214.0, 235.0]),
-    np.array([25.0, 75.0, 125.0]),
-)
-_GHOST_OPACITY = 0.13
+_GHOST_FIRST = np.array([190.0, 214.0, 235.0])
+_GHOST_LAST = np.array([25.0, 75.0, 125.0])
 _SHADES = 32
 """Colours of the trace."""
 _FINE = 2000
 """Faces of a mesh that is drawn as its convex hull where it is a ghost."""
 _PATH = (30, 30, 30)
-_START, _END = (0, 158, 115), (213, 94, 0)
+_START = (0, 158, 115)
+_END = (213, 94, 0)
 _FIELD_OF_VIEW = 0.75
 """rad."""
 _ROOM = 1.35
@@ -59,7 +57,9 @@ class Scene:
     def __init__(
         self, server: viser.ViserServer, motion: Motion, bodies: Bodies
     ) -> None:
-        self._api, self._motion, self._bodies = server.scene, motion, bodies
+        self._api = server.scene
+        self._motion = motion
+        self._bodies = bodies
         self._api.configure_environment_map(
             None
         )  # a plain light shows pale robots on the white page better
@@ -102,7 +102,8 @@ class Scene:
             found.quaternions[0],
             strict=True,
         ):
-            handle.position, handle.wxyz = position, quaternion
+            handle.position = position
+            handle.wxyz = quaternion
 
     def _frame(self, name: str, part: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""
@@ -155,7 +156,7 @@ class Scene:
                 batched_wxyzs=ghosts.quaternions[:, joint],
                 batched_positions=ghosts.positions[:, joint],
                 batched_colors=shades,
-                opacity=_GHOST_OPACITY,
+                opacity=0.13,
                 cast_shadow=False,
                 receive_shadow=False,
             )
@@ -163,7 +164,8 @@ class Scene:
 
     def _draw_path(self) -> None:
         """Draw the prescribed path with its ends."""
-        points, layer = self._motion.path, self.layers["path"]
+        points = self._motion.path
+        layer = self.layers["path"]
         layer.append(
             self._api.add_line_segments(
                 "/path",
@@ -184,10 +186,8 @@ class Scene:
 
     def _draw_trace(self) -> None:
         """Draw the way of the tool, coloured by its speed."""
-        speed, segments = (
-            self._motion.samples.tool_speed,
-            _segments(self._motion.frames.tool),
-        )
+        speed = self._motion.samples.tool_speed
+        segments = _segments(self._motion.frames.tool)
         parts = 0.5 * (speed[:-1] + speed[1:]) / max(float(speed.max()), 1e-9)
         shades = np.round(parts * (_SHADES - 1)).astype(int)
         colours = speed_colours(np.linspace(0.0, 1.0, _SHADES))
@@ -205,7 +205,8 @@ class Scene:
 
     def _draw_ground(self) -> float:
         """Draw a grid below everything; returns the size of its cells, m."""
-        low, high = self._bodies.lower, self._bodies.upper
+        low = self._bodies.lower
+        high = self._bodies.upper
         cell = float(10.0 ** np.round(np.log10(0.06 * self._size)))
         width, height = 10.0 * cell * np.ceil((high - low)[:2] / (10.0 * cell) + 1.0)
         centre = 10.0 * cell * np.round(0.5 * (low + high)[:2] / (10.0 * cell))
@@ -228,12 +229,11 @@ class Scene:
         centre = 0.5 * (self._bodies.moving_lower + self._bodies.moving_upper)
         distance = _ROOM * 0.5 * self._size / np.sin(0.5 * _FIELD_OF_VIEW)
         camera = server.initial_camera
-        camera.fov, camera.near, camera.far = (
-            _FIELD_OF_VIEW,
-            0.005 * distance,
-            100.0 * distance,
-        )
-        camera.look_at, camera.position = centre, centre + distance * self._direction()
+        camera.fov = _FIELD_OF_VIEW
+        camera.near = 0.005 * distance
+        camera.far = 100.0 * distance
+        camera.look_at = centre
+        camera.position = centre + distance * self._direction()
 
     def _direction(self) -> np.ndarray:
         """Return the unit vector from the scene to the camera, (3,)."""
@@ -241,10 +241,8 @@ class Scene:
         axes = task_map_of(self._robot, trajectory.task.task_space).axes
         plane = drawing_plane(self._robot, trajectory.q[0], axes)
         if plane is None:
-            base, tool = (
-                self._motion.frames.positions[:, 1].mean(axis=0),
-                self._motion.frames.tool.mean(axis=0),
-            )
+            base = self._motion.frames.positions[:, 1].mean(axis=0)
+            tool = self._motion.frames.tool.mean(axis=0)
             azimuth = np.arctan2(*(tool - base)[1::-1]) - _SIDE
             direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.55])
         else:

@@ -36,7 +36,7 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
     Raises
     ------
     InputError
-        There is no such host on this machine, or no such port, or it is in use.
+        The host is not on this machine, or the port does not exist or is in use.
     NotInstalledError
         viser is not installed.
     """

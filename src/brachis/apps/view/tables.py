@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from brachis.apps.plots.quantities import quantities
+from brachis.apps.plots.quantities import joint_quantities
 from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import Samples, Trajectory
 
@@ -34,18 +34,21 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
         f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
         f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
     )
-    cells: dict[int, list[str]] = {
-        joint: [name] for joint, name in enumerate(trajectory.joint_names)
-    }
-    for kind, digits in _STATE.items():
-        for part in quantities(trajectory, now, kind, degrees=degrees):
-            for joint, value in zip(
-                part.joints.tolist(), part.values[0].tolist(), strict=True
-            ):
-                cells[joint].append(f"{_write_number(value, digits)} {part.unit}")
-    return head + _table(
-        ("joint", "position", "velocity", "torque, force"), list(cells.values())
-    )
+    rows = [
+        [
+            name,
+            *(
+                f"{_write_number(part.values[0, 0], digits)} {part.unit}"
+                for part, digits in zip(parts, _STATE.values(), strict=True)
+            ),
+        ]
+        for name, parts in zip(
+            trajectory.joint_names,
+            joint_quantities(trajectory, now, *_STATE, degrees=degrees),
+            strict=True,
+        )
+    ]
+    return head + _table(("joint", "position", "velocity", "torque, force"), rows)
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:

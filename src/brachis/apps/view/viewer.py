@@ -94,12 +94,14 @@ class Viewer:
         verified: bool | None,
         degrees: bool,
     ) -> None:
-        motion, bodies = Motion.of(trajectory), bodies_of(trajectory)
+        motion = Motion.of(trajectory)
+        bodies = bodies_of(trajectory)
         boundary = trajectory.task.boundary
         self.playback = Playback(
             trajectory.t_end, first_rate(trajectory.t_end), loops=boundary.periodic
         )
-        self._trajectory, self._lock = trajectory, threading.RLock()
+        self._trajectory = trajectory
+        self._lock = threading.RLock()
         self._scene = Scene(self._server, motion, bodies)
         notes = [f"not shown: {reason}" for reason in bodies.unread]
         self._panel = Panel(
@@ -158,10 +160,12 @@ class Viewer:
 
     def _run(self) -> None:
         """Play the motion as long as somebody looks."""
-        before, picture = time.monotonic(), 0
+        before = time.monotonic()
+        picture = 0
         while not self._stopped.wait(_FRAME):
             now = time.monotonic()
-            elapsed, before = now - before, now
+            elapsed = now - before
+            before = now
             if not self.playback.playing or not self._server.get_clients():
                 continue
             with self._lock, self._server.atomic():
