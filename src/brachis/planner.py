@@ -248,10 +248,8 @@ def _plan(
     began, loaded = times
     remarks = of_robot(robot) + of_task(task)
     remarks = tell(remarks, strict=task.strict, stacklevel=4)
-    joints, segments = (
-        write_count(robot.n, "joint"),
-        write_count(len(task.path), "segment"),
-    )
+    joints = write_count(robot.n, "joint")
+    segments = write_count(len(task.path), "segment")
     listener(
         f"planning for {joints} along a path of {segments}, task space {_space(task)}"
     )
@@ -388,7 +386,8 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
             program, reports = continued(program, x, solve, MARGINS)
     except ImportError as error:
         return Attempt.of(start, f"{start.solver}: not installed ({error})")
-    reports, last = (*before, *reports), reports[-1]
+    last = reports[-1]
+    reports = (*before, *reports)
     coarse = last.objective if last.status.usable else np.inf
     return Attempt.of(
         start,
@@ -414,15 +413,18 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     -------
     Attempt
     """
-    start, program = attempt.start, attempt.program
+    start = attempt.start
+    program = attempt.program
     assert start is not None and program is not None
     task = start.problem.task
-    settings, soon = task.refinement, deadline.part(_KNOT_TIME)
+    settings = task.refinement
+    soon = deadline.part(_KNOT_TIME)
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
     solve = _solver(start, soon, listener)
-    reports, target = attempt.reports, attempt.target
+    reports = attempt.reports
+    target = attempt.target
     if (
         attempt.keeps_knots
         and start.in_chart
@@ -430,13 +432,12 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
         and not deadline.passed
     ):
         program, further = best_of_joints(start.problem, program, reports[-1], solve)
-        reports, target = (*reports[:-1], *further), program
+        reports = (*reports[:-1], *further)
+        target = program
     adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)
     attempt = dataclasses.replace(attempt, undone=adapted.undone)
-    options, solve = (
-        dataclasses.replace(options, deadline=deadline),
-        _solver(start, deadline, listener),
-    )
+    options = dataclasses.replace(options, deadline=deadline)
+    solve = _solver(start, deadline, listener)
     return completed(attempt, adapted.program, adapted.reports, solve, options)
 
 
@@ -564,11 +565,13 @@ def plan_many(
             "wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks"
         )
     check_keywords(keywords, "plan_many", ("jobs", "progress"))
-    given, jobs = list(tasks), processes(count(jobs, "jobs"))
+    given = list(tasks)
+    jobs = processes(count(jobs, "jobs"))
     outcomes: list[Outcome] = []
     work = _outcome, given, keywords
     if callable(progress):
-        heard, progress = progress, False
+        heard = progress
+        progress = False
     else:
         heard = None
     with (

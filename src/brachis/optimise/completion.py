@@ -39,8 +39,10 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
-    joint_map, task = phase.joint_map, start.problem.task
+    (phase,) = refined.program.phases
+    (motion,) = refined.program.motions(refined.x)
+    joint_map = phase.joint_map
+    task = start.problem.task
     assert joint_map.path is not None
     joins = motion.times_of(joint_map.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
@@ -75,7 +77,8 @@ def extract(start: Start, refined: Refined) -> Trajectory:
 
 def where_it_failed(attempt: Attempt) -> Program | None:
     """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
-    trajectory, refined = attempt.trajectory, attempt.refined
+    trajectory = attempt.trajectory
+    refined = attempt.refined
     if trajectory is None or refined is None or attempt.verification is None:
         return None
     failed = [check for check in attempt.verification.checks if not check.passed]
@@ -137,7 +140,9 @@ def _verified(
     """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
     start = attempt.start
     assert start is not None
-    problem, trajectory, verification = start.problem, None, None
+    problem = start.problem
+    trajectory = None
+    verification = None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
             trajectory = extract(start, refined)

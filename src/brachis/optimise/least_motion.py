@@ -43,7 +43,8 @@ _KEPT_BACK = 0.1e-4
 """Part of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
 """A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
-_TOLERANCE, _ITERATIONS = 1e-6, 60
+_TOLERANCE = 1e-6
+_ITERATIONS = 60
 _MANY_VARIABLES, _FOR_MANY, _FEW_ITERATIONS = 150, "ipopt", 20
 """With more variables than these active sets take seconds an iteration; so few of an interior-point solver will do."""
 _PROGRESS, _PATIENCE, _ROUND = 1e-2, 5, 2
@@ -117,7 +118,8 @@ def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMo
 
 def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
     """Solve, and complete what came of it if it is worth it."""
-    start, before = fastest.start, fastest.refined
+    start = fastest.start
+    before = fastest.refined
     assert start is not None and before is not None
     task = start.problem.task
     slower = max(task.search.slower, AS_FAST)
@@ -126,7 +128,8 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
     if deadline.passed:
         return _kept(fastest, "no time was left")
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
-    program, soon = before.program.minimising(objective), deadline.part(_TIME)
+    program = before.program.minimising(objective)
+    soon = deadline.part(_TIME)
     name = _FOR_MANY if program.variables > _MANY_VARIABLES else start.solver
     solve = _solver(name, soon, listener, _PATIENCE)
     first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
@@ -199,14 +202,13 @@ def least_acceleration(
     Every joint's acceleration counts in proportion to its largest velocity: that of its limit; without one the largest
     that any such joint of its unit has at x. Joints that nothing limits, the virtual roll of a tool, do not count.
     """
-    robot, states = program.phases[0].joint_map.robot, program.states(x)
+    robot = program.phases[0].joint_map.robot
+    states = program.states(x)
     by_acceleration, weights = reciprocals_near(
         robot, program.limits, states[0].q[len(states[0].q) // 2]
     )
-    speeds, units = (
-        np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0),
-        np.array(robot.position_units),
-    )
+    speeds = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0)
+    units = np.array(robot.position_units)
     for unit in set(robot.position_units):
         own = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
         if speeds[own].any():

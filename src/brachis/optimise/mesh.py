@@ -130,7 +130,8 @@ def solve_nested(
     Answer
         Over the target's knots; over those of the last level that was solved, where one could not be.
     """
-    reports, solved = [report], report
+    reports = [report]
+    solved = report
     for level in _levels(target):
         if level.intervals <= coarse.intervals:
             continue
@@ -147,8 +148,10 @@ def solve_nested(
         reports.append(report)
         if not report.status.usable:
             break
-        coarse, solved = finer, report
-    reached, asked = coarse.intervals, target.intervals
+        coarse = finer
+        solved = report
+    reached = coarse.intervals
+    asked = target.intervals
     undone = (
         f"the motion has {reached} of {asked} intervals, of which more were not solved"
         if reached < asked
@@ -250,7 +253,9 @@ def refine_mesh(
     Answer
         Over all knots.
     """
-    reports, last, gains = [first], first, [1.0]
+    reports = [first]
+    last = first
+    gains = [1.0]
     is_settled = False
     for _ in range(_MOST_ROUNDS):
         if _GROWTH * last.wall_time > deadline.left:
@@ -270,7 +275,8 @@ def refine_mesh(
         if not report.status.usable:
             break
         gains.append(1.0 - report.objective / last.objective)
-        program, last = finer, report
+        program = finer
+        last = report
         is_settled = sum(gains[-2:]) < _ENOUGH * options.tolerance
         if is_settled and 2 * program.variables > _FEW_VARIABLES:
             break
@@ -378,7 +384,9 @@ def optimise_knots(
         With knots fixed where they are best; the given program if moving them led to no motion within the limits.
     """
     given = program
-    reports, best, x = [first], None, first.x
+    reports = [first]
+    best = None
+    x = first.x
     shortest = max(
         shortest, SHORTEST * max(phase.intervals for phase in program.phases)
     )
@@ -400,7 +408,8 @@ def optimise_knots(
             best = refined
         if not gained > _WORTH_IT:
             break
-        program, x = refined.program, refined.x
+        program = refined.program
+        x = refined.x
     undone = (
         "the knots were not moved as far as that pays"
         if refinement.deadline.passed

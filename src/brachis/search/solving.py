@@ -226,7 +226,8 @@ def solved_in_chart(
     reports : tuple of SolverReport
         Of all solves; the last one belongs to `program`.
     """
-    first, further = MARGINS[:1], MARGINS[1:]
+    first = MARGINS[:1]
+    further = MARGINS[1:]
     program, reports = continued(program, x, solve, first)
     if not reports[-1].status.usable and reports[-1].status not in _OUT_OF_TIME:
         program, more = continued(program, x, solve, further)
@@ -242,7 +243,8 @@ def solved_in_chart(
             reports = (*more, *reports)
             break
         gained = more[-1].objective < (1.0 - WORTH_IT) * reports[-1].objective
-        program, reports = other, reports + more
+        program = other
+        reports = reports + more
         if not gained:
             break
     if (
@@ -276,7 +278,8 @@ def best_of_joints(
     reports : tuple of SolverReport
         Of the further solves, then `report` if it belongs to `program`, else the one that does.
     """
-    best, last = program, report
+    best = program
+    last = report
     others: list[SolverReport] = []
     for rows in _selections(program, report.x):
         moved = moved_to(problem, program, report.x, rows)
@@ -285,7 +288,8 @@ def best_of_joints(
         other, reports = continued(*moved, solve, MARGINS)
         others += reports
         if reports[-1].status.usable and reports[-1].objective < last.objective:
-            best, last = other, reports[-1]
+            best = other
+            last = reports[-1]
     return best, (*(each for each in others if each is not last), last)
 
 
@@ -309,7 +313,8 @@ def moved_to(
     x : (v,) ndarray
         The same motion but for what splines of the new coordinates cannot say.
     """
-    (phase,), (motion,) = program.phases, program.motions(x)
+    (phase,) = program.phases
+    (motion,) = program.motions(x)
     t_norm = np.linspace(0.0, 1.0, _DENSE * len(phase.t_norm) + 1)
     try:
         state = phase.joint_map.state(
@@ -326,7 +331,8 @@ def moved_to(
 
 def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
     """Bases of the null spaces of the task Jacobian, (K, n, r), along a motion."""
-    (state,), (phase,) = program.states(x), program.phases
+    (state,) = program.states(x)
+    (phase,) = program.phases
     chart = phase.joint_map
     assert isinstance(chart, ChartMap)
     return null_spaces(Newton(chart.task_map).placed(state.q)[1])
@@ -335,8 +341,10 @@ def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
 def _follows(program: Program, x: np.ndarray) -> bool:
     """Tell whether the chart still does for the motion."""
     try:
-        (phase,), null = program.phases, _self_motion(program, x)
-        chart, s = phase.joint_map, program.states(x)[0].y[:, 0]
+        (phase,) = program.phases
+        null = _self_motion(program, x)
+        chart = phase.joint_map
+        s = program.states(x)[0].y[:, 0]
         assert isinstance(chart, ChartMap)
         own = transversality(chart.rows.at(s)[0], null).min()
         return program.safeguard_slack(x) > HELD_BACK and bool(own >= _TRANSVERSAL)
