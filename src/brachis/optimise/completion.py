@@ -75,7 +75,7 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     )
 
 
-def where_it_failed(attempt: Attempt) -> Program | None:
+def with_points_at_violations(attempt: Attempt) -> Program | None:
     """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
     trajectory = attempt.trajectory
     refined = attempt.refined
@@ -96,7 +96,7 @@ _SECOND_LOOKS = 4
 """Times that a motion which the verification refuses is refined again where it failed."""
 
 
-def completed(
+def refine_and_verify(
     attempt: Attempt,
     program: Program,
     reports: tuple[SolverReport, ...],
@@ -123,7 +123,7 @@ def completed(
     refined = refine(program, reports[-1], solve, options)
     done = _verified(attempt, reports[:-1], refined)
     for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
-        finer = None if options.deadline.passed else where_it_failed(done)
+        finer = None if options.deadline.passed else with_points_at_violations(done)
         if finer is None:
             break
         report = solve(finer, refined.x)

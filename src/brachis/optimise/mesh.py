@@ -63,7 +63,7 @@ _EARLY = (
 """How a solve ends that is not done; a solver that breaks down at last may have come far."""
 
 
-def accepted(report: SolverReport, before: SolverReport) -> SolverReport:
+def accept_early_end(report: SolverReport, before: SolverReport) -> SolverReport:
     """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
     better = report.feasible and report.objective < before.objective
     early = report.status in _EARLY
@@ -87,7 +87,7 @@ def gain(before: Refined, after: Refined, refinement: RefinementOptions) -> floa
     return 1.0 - end_time(after, refinement) / end_time(before, refinement)
 
 
-def ending_with(
+def with_last(
     last: SolverReport, reports: list[SolverReport]
 ) -> tuple[SolverReport, ...]:
     """Move one of the reports to the end."""
@@ -144,7 +144,7 @@ def solve_nested(
         start = finer.variables_from(
             [own.motion(part).over(fine.knots) for (own, part), fine in pairs]
         )
-        report = accepted(solve(finer, start), solved)
+        report = accept_early_end(solve(finer, start), solved)
         reports.append(report)
         if not report.status.usable:
             break
@@ -157,7 +157,7 @@ def solve_nested(
         if reached < asked
         else ""
     )
-    return Answer(coarse, ending_with(solved, reports), undone)
+    return Answer(coarse, with_last(solved, reports), undone)
 
 
 def _levels(program: Program) -> Iterator[Program]:
@@ -259,7 +259,7 @@ def refine_mesh(
     is_settled = False
     for _ in range(_MOST_ROUNDS):
         if _GROWTH * last.wall_time > deadline.left:
-            return Answer(program, ending_with(last, reports), _UNDONE)
+            return Answer(program, with_last(last, reports), _UNDONE)
         intervals = (
             _every_h_refinement(program)
             if is_settled
@@ -267,10 +267,10 @@ def refine_mesh(
         )
         finer, x = _halved(program, last.x, intervals, options)
         if finer.variables > _MOST_VARIABLES:
-            return Answer(program, ending_with(last, reports), _UNDONE)
+            return Answer(program, with_last(last, reports), _UNDONE)
         if finer.variables == program.variables:
             break
-        report = accepted(solve(finer, x), last)
+        report = accept_early_end(solve(finer, x), last)
         reports.append(report)
         if not report.status.usable:
             break
@@ -280,7 +280,7 @@ def refine_mesh(
         is_settled = sum(gains[-2:]) < _ENOUGH * options.tolerance
         if is_settled and 2 * program.variables > _FEW_VARIABLES:
             break
-    return Answer(program, ending_with(last, reports))
+    return Answer(program, with_last(last, reports))
 
 
 def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.ndarray]:
@@ -397,7 +397,7 @@ def optimise_knots(
         moved = solve(free, free.variables_from(program.motions(x)))
         fixed, start = free.frozen(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
-        report = accepted(solve(fixed, start), reports[-1])
+        report = accept_early_end(solve(fixed, start), reports[-1])
         reports += [moved, report]
         if not report.status.usable:
             break
@@ -416,8 +416,8 @@ def optimise_knots(
         else ""
     )
     if best is None or not np.isfinite(end_time(best, refinement)):
-        return Answer(given, ending_with(first, reports), undone)
-    return Answer(best.program, ending_with(best.reports[-1], reports), undone)
+        return Answer(given, with_last(first, reports), undone)
+    return Answer(best.program, with_last(best.reports[-1], reports), undone)
 
 
 def adapt_mesh(
