@@ -1,7 +1,4 @@
-"""From a solved program to a verified motion: refinement, trajectory, verification.
-
-From an answer of the optimiser to a trajectory.
-"""
+"""From a solved program to a verified motion: refinement, trajectory, verification."""
 
 from __future__ import annotations
 

@@ -1,19 +1,13 @@
-"""The knots that a task asks for.
+"""The knots of a solved program: more of them, better ones, or free ones.
 
-What the rounds of mesh refinement and of knot optimisation are judged by.
-
-Many given intervals, reached from few: coarse problems over some of the knots, then all of them.
-
-A cold solve with hundreds of variables takes seconds; from a coarse motion, inserted exactly, it takes a few
-iterations on every level.
-
-A mesh refined from coarse to fine by exact knot insertion, so that every solve starts from the motion before it.
-
-A time-optimal motion has 1 + r limits active at almost every instant, and jumps from one set of them to another. A
-spline can only ramp: where it does, time is lost, about the ramp's length times its height. The intervals that lose
-most are halved.
-
-Free knots: interval lengths as variables of the optimisation, from the answer for given ones.
+- `solve_nested` reaches many given intervals from few. A cold solve with hundreds of
+  variables takes seconds; from a coarse motion, inserted exactly, it takes a few
+  iterations on every level.
+- `refine_mesh` halves the intervals that lose most. A time-optimal motion has 1 + r
+  limits active at almost every instant, and jumps from one set of them to another. A
+  spline can only ramp, and loses about the ramp's length times its height.
+- `optimise_knots` makes the interval lengths variables of the optimisation.
+- `adapt_mesh` chooses among them as the task asks.
 """
 
 from __future__ import annotations

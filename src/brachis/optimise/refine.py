@@ -1,16 +1,15 @@
-"""Refinement to truth: from limits at collocation points to limits everywhere.
+"""Refinement: from limits at collocation points to limits everywhere.
 
-After a solve the limits are evaluated on a grid many times denser. Where one is violated between collocation points,
-points are added around the worst place of each stretch and the problem is solved again from where it stands, until the
-worst ratio is within the tolerance. A last violation of the tolerance's own size is met by lengthening t_E by as
-little, and by up to one per cent once the rounds, or the time, are used up.
+After a solve the limits are evaluated on a much denser grid. Where one is violated
+between collocation points, points are added around the worst place of each interval,
+and the problem is solved again from where it stands, until the worst ratio is within
+the tolerance. A last violation of the tolerance's own size is removed by a slightly
+longer t_E, up to one per cent longer once the rounds, or the time, are used up.
 
-Where limits are violated between collocation points.
-
-Where joints with Coulomb friction reverse: their torque rises by twice the friction within its own width.
-
-A width of 1e-5 rad/s is passed in microseconds, which no grid resolves. Between grid points the velocity of a joint is
-taken for the cubic that its velocities and accelerations there define.
+The torque of a joint with Coulomb friction rises by twice the friction where the joint
+reverses, within the friction's own width. A width of 1e-5 rad/s is passed in
+microseconds, which no grid resolves. Between grid points the velocity of a joint is
+therefore taken for the cubic that its velocities and accelerations define.
 """
 
 from __future__ import annotations

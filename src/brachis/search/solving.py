@@ -1,12 +1,12 @@
-"""Solving one NLP from one starting point, with ever smaller branch margins.
+"""Solve one NLP from one starting point, with ever smaller branch margins.
 
-Solving in a chart that follows the motion, and in other coordinates than the chart's.
-
-A chart holds around its joint path. Where the motion that a solve ends at goes so far from it that the rows are no
-longer transversal there, or that the least singular value holds the motion back, a new chart is laid around that
-motion, and the solve goes on in it. At the optimum any rows that are transversal along the motion describe the same
-motions, but splines of them are not the same curves: over the same knots one measure of self-motion may be a few parts
-in a thousand faster than another. So the best of some of them, those of single joints, is taken.
+A chart holds around its joint path. Where a solve ends far from that path, the chart's
+rows may no longer be transversal, or the least singular value may hold the motion back.
+Then a new chart is laid around the motion, and the solve goes on in it. At the optimum
+any rows that are transversal along the motion describe the same motions, but splines of
+their coordinates are not the same curves: over the same knots one measure of
+self-motion may be a few parts in a thousand faster than another. So several choices of
+single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ def solved_in_chart(
 def best_of_joints(
     problem: Problem, program: Program, report: SolverReport, solve: Solve
 ) -> Solved:
-    """Solve again with joints in place of the chart's rows, and keep the fastest; see the module.
+    """Solve again with joints in place of the chart's rows, and keep the fastest.
 
     Parameters
     ----------
