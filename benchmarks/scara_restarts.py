@@ -16,7 +16,7 @@ from brachis.optimise.backends import SolverOptions, solver_named
 from brachis.optimise.guess import starting_point
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search.solving import MARGINS, continued
+from brachis.search.solving import MARGINS, solve_by_margin_continuation
 
 ROOT = Path(__file__).parents[1]
 spec = importlib.util.spec_from_file_location(
@@ -49,7 +49,7 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
             )
             if x is None:
                 continue
-            _, reports = continued(program, x, solve, MARGINS)
+            _, reports = solve_by_margin_continuation(program, x, solve, MARGINS)
             found.append(reports[-1].objective if reports[-1].status.usable else np.inf)
             if len(found) == count:
                 break

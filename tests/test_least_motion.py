@@ -151,21 +151,21 @@ def test_without_time_or_a_verified_motion_the_fastest_stays():
         kept.append(attempt)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("brachis.planner.calmest", keep)
+        patch.setattr("brachis.planner.find_least_motion", keep)
         brachis.plan(
             task.model_copy(
                 update={"search": task.search.model_copy(update={"least_motion": True})}
             )
         )
     (fastest,) = kept
-    over = least_motion.calmest(fastest, Deadline(0.0), lambda _text: None)
+    over = least_motion.find_least_motion(fastest, Deadline(0.0), lambda _text: None)
     assert over.trajectory is fastest.trajectory
     assert over.status == "no time was left"
 
     def interrupt(_text):
         raise KeyboardInterrupt
 
-    interrupted = least_motion.calmest(fastest, NEVER, interrupt)
+    interrupted = least_motion.find_least_motion(fastest, NEVER, interrupt)
     assert interrupted.trajectory is fastest.trajectory
     assert interrupted.status == "interrupted"
 

@@ -14,7 +14,7 @@ import brachis
 from brachis.errors import StartError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.search.solving import MARGINS, continued
+from brachis.search.solving import MARGINS, solve_by_margin_continuation
 from support.effort import QUICK
 from support.starts import starting_points
 
@@ -103,7 +103,7 @@ def test_margins_that_change_nothing_are_not_solved_again():
             tried, x, SolverOptions(max_iterations=1), None
         )
 
-    continued(program, next(starting_points(program)), fail, MARGINS)
+    solve_by_margin_continuation(program, next(starting_points(program)), fail, MARGINS)
     assert len(solves) == 1
 
 

@@ -1,11 +1,13 @@
-"""The whole pipeline on one page.
+"""Plan a motion: the whole pipeline, step by step in the order in which it runs.
 
-task -> robot -> path, limits -> decompositions -> joint paths (search) -> `solved` at the first collocation points
--> `finished`: mesh, refinement, trajectory, verification -> the calmest motion that is as fast -> result.
+1. `plan` reads the task and the robot.
+2. `_plan` builds the problem: path, limits, decompositions into redundant joints.
+3. The search finds joint paths. It says which are solved and finished, and in which order.
+4. `solve_candidate` solves from a joint path at the first collocation points.
+5. `finish_candidate` adapts the mesh, refines and verifies.
+6. `find_least_motion` looks for the calmest motion that is as fast.
 
-The search decides what is solved and finished, and in which order; the two functions say how.
-
-Many plans at a time.
+`transcribe` stops before the solve; `plan_many` plans many tasks in several processes.
 """
 
 from __future__ import annotations
@@ -29,12 +31,13 @@ from brachis.common.progress import Listener, report_progress
 from brachis.errors import BrachisError, InputError, write_count
 from brachis.optimise.backends import SolveStatus, solver_named
 from brachis.optimise.candidate import Attempt, Start
-from brachis.optimise.completion import completed
+from brachis.optimise.completion import refine_and_verify
 from brachis.optimise.layout import SHORTEST_TIME
-from brachis.optimise.least_motion import calmest
+from brachis.optimise.least_motion import find_least_motion
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
-from brachis.optimise.refine import RefinementOptions, Solve
+from brachis.optimise.refine import RefinementOptions
+from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import breaks_of, phase_in, program_of
 from brachis.problem.plausibility import (
     check_within_reach,
@@ -56,15 +59,14 @@ from brachis.search import (
     MARGINS,
     Stages,
     best_of_joints,
-    continued,
-    eased,
     find_fastest,
     first_breaks,
     first_map,
     first_point,
     given_start,
     is_planned,
-    solve_with,
+    solve_by_margin_continuation,
+    solve_without_third_order_limits,
     solved_in_chart,
     try_remedies,
 )
@@ -248,10 +250,8 @@ def _plan(
     began, loaded = times
     remarks = of_robot(robot) + of_task(task)
     remarks = tell(remarks, strict=task.strict, stacklevel=4)
-    joints, segments = (
-        write_count(robot.n, "joint"),
-        write_count(len(task.path), "segment"),
-    )
+    joints = write_count(robot.n, "joint")
+    segments = write_count(len(task.path), "segment")
     listener(
         f"planning for {joints} along a path of {segments}, task space {_space(task)}"
     )
@@ -265,7 +265,12 @@ def _plan(
     first = None if known is None else _first(problem, decompositions, known)
     warm = first if isinstance(first, Start) else None
     found = find_fastest(
-        problem, decompositions, Stages(solved, finished), deadline, listener, warm
+        problem,
+        decompositions,
+        Stages(solve_candidate, finish_candidate),
+        deadline,
+        listener,
+        warm,
     )
     best = found.best
     assert best is not None and best.start is not None
@@ -274,7 +279,9 @@ def _plan(
     over = Deadline(0.0) if found.interrupted else deadline
     if task.search.least_motion:
         listener("looking for the calmest motion that is as fast")
-    least = calmest(best, over, listener) if task.search.least_motion else None
+    least = (
+        find_least_motion(best, over, listener) if task.search.least_motion else None
+    )
     calmed = time.perf_counter()
     end_time = of_end_time(best.t_end, SHORTEST_TIME)
     remarks += tell(end_time, strict=task.strict, stacklevel=4)
@@ -300,32 +307,6 @@ def _plan(
     )
 
 
-def _is_planned(
-    robot: Robot,
-    task: Task,
-    changed: Task,
-    families: Sequence[ik.Family],
-    own_limits: Sequence[LimitModel],
-    deadline: Deadline,
-    most: int | None,
-) -> bool | None:
-    """Tell whether a plan of a task that was changed is verified; see `brachis.search.is_planned`."""
-    changed = task_with(changed, effort="single") if most else changed
-    same = changed.robot == task.robot
-    problem = Problem.of(
-        robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf),
-        changed,
-        own_limits,
-    )
-    return is_planned(
-        problem,
-        decompositions_of(problem, families),
-        Stages(solved, finished),
-        deadline,
-        most,
-    )
-
-
 def _space(task: Task) -> str:
     return (
         task.task_space
@@ -344,17 +325,7 @@ def _first(
     return start if isinstance(start, str) else start.with_solver(solver.name)
 
 
-def _not_used(first: Start | str | None, best: Attempt) -> tuple[str, ...]:
-    """Say where the plan was to start from a known motion and does not."""
-    if first is None or best.origin == GIVEN:
-        return ()
-    reason = first if isinstance(first, str) else "it led to no verified plan"
-    return (
-        f"the plan does not start from the given motion: {reason}; it was searched for as usual",
-    )
-
-
-def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
+def solve_candidate(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     """Solve from a start, at the first collocation points.
 
     Parameters
@@ -375,20 +346,23 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
         return Attempt.of(
             start, "the splines through the joint path leave the branch, or the chart"
         )
-    solve = _solver(start, deadline, listener)
+    session = _session(start, deadline, listener)
     try:
-        x, before = eased(program, x, solve, MARGINS[0])
+        x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
         if start.in_chart and not start.timed:
-            program, reports = solved_in_chart(problem, program, x, solve)
+            program, reports = solved_in_chart(problem, program, x, session)
             joint_map = program.phases[0].joint_map
             target = target.with_phases(
                 phase_in(problem, joint_map, phase.grid) for phase in target.phases
             )
         else:
-            program, reports = continued(program, x, solve, MARGINS)
+            program, reports = solve_by_margin_continuation(
+                program, x, session, MARGINS
+            )
     except ImportError as error:
         return Attempt.of(start, f"{start.solver}: not installed ({error})")
-    reports, last = (*before, *reports), reports[-1]
+    last = reports[-1]
+    reports = (*before, *reports)
     coarse = last.objective if last.status.usable else np.inf
     return Attempt.of(
         start,
@@ -400,7 +374,9 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     )
 
 
-def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attempt:
+def finish_candidate(
+    attempt: Attempt, deadline: Deadline, listener: Listener
+) -> Attempt:
     """Adapt the mesh, refine and verify; only verify where the time is up.
 
     Parameters
@@ -414,30 +390,43 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     -------
     Attempt
     """
-    start, program = attempt.start, attempt.program
+    start = attempt.start
+    program = attempt.program
     assert start is not None and program is not None
     task = start.problem.task
-    settings, soon = task.refinement, deadline.part(_KNOT_TIME)
+    settings = task.refinement
+    soon = deadline.part(_KNOT_TIME)
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
-    solve = _solver(start, soon, listener)
-    reports, target = attempt.reports, attempt.target
+    session = _session(start, soon, listener)
+    reports = attempt.reports
+    target = attempt.target
     if (
         attempt.keeps_knots
         and start.in_chart
         and not start.timed
         and not deadline.passed
     ):
-        program, further = best_of_joints(start.problem, program, reports[-1], solve)
-        reports, target = (*reports[:-1], *further), program
-    adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)
+        program, further = best_of_joints(start.problem, program, reports[-1], session)
+        reports = (*reports[:-1], *further)
+        target = program
+    adapted = adapt_mesh(program, reports, session, task.spline, options, target=target)
     attempt = dataclasses.replace(attempt, undone=adapted.undone)
-    options, solve = (
-        dataclasses.replace(options, deadline=deadline),
-        _solver(start, deadline, listener),
+    options = dataclasses.replace(options, deadline=deadline)
+    session = dataclasses.replace(session, deadline=deadline)
+    return refine_and_verify(
+        attempt, adapted.program, adapted.reports, session, options
     )
-    return completed(attempt, adapted.program, adapted.reports, solve, options)
+
+
+def _session(start: Start, deadline: Deadline, listener: Listener) -> SolverSession:
+    """Open a session of the start's solver under the task's bounds."""
+    (backend,) = solver_named(start.solver)
+    settings = start.problem.task.solver
+    return SolverSession.for_task(
+        backend, settings, start.joint_map, deadline, listener
+    )
 
 
 def _in_words(status: SolveStatus) -> str:
@@ -447,11 +436,39 @@ def _in_words(status: SolveStatus) -> str:
     return "planned" if status is SolveStatus.OPTIMAL else f"planned, {name}"
 
 
-def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
-    """Make a function that solves with the start's solver."""
-    (solver,) = solver_named(start.solver)
-    return solve_with(
-        solver, start.problem.task.solver, start.joint_map, deadline, listener
+def _not_used(first: Start | str | None, best: Attempt) -> tuple[str, ...]:
+    """Say where the plan was to start from a known motion and does not."""
+    if first is None or best.origin == GIVEN:
+        return ()
+    reason = first if isinstance(first, str) else "it led to no verified plan"
+    return (
+        f"the plan does not start from the given motion: {reason}; it was searched for as usual",
+    )
+
+
+def _is_planned(
+    robot: Robot,
+    task: Task,
+    changed: Task,
+    families: Sequence[ik.Family],
+    own_limits: Sequence[LimitModel],
+    deadline: Deadline,
+    most: int | None,
+) -> bool | None:
+    """Tell whether a plan of a task that was changed is verified; see `brachis.search.is_planned`."""
+    changed = task_with(changed, effort="single") if most else changed
+    same = changed.robot == task.robot
+    problem = Problem.of(
+        robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf),
+        changed,
+        own_limits,
+    )
+    return is_planned(
+        problem,
+        decompositions_of(problem, families),
+        Stages(solve_candidate, finish_candidate),
+        deadline,
+        most,
     )
 
 
@@ -564,11 +581,13 @@ def plan_many(
             "wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks"
         )
     check_keywords(keywords, "plan_many", ("jobs", "progress"))
-    given, jobs = list(tasks), processes(count(jobs, "jobs"))
+    given = list(tasks)
+    jobs = processes(count(jobs, "jobs"))
     outcomes: list[Outcome] = []
     work = _outcome, given, keywords
     if callable(progress):
-        heard, progress = progress, False
+        heard = progress
+        progress = False
     else:
         heard = None
     with (

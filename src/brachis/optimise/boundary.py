@@ -75,7 +75,8 @@ class BoundarySpline:
         abscissae = greville(knots, degree)
         count = len(abscissae)
         group = np.arange(count)
-        fixed, rate = np.zeros(count), np.zeros(count)
+        fixed = np.zeros(count)
+        rate = np.zeros(count)
         first, last = (
             1 if np.isnan(each.rate) else 1 + each.derivatives for each in (start, end)
         )
@@ -88,7 +89,8 @@ class BoundarySpline:
             fixed[own] = np.nan_to_num(condition.value)
             away = abscissae - abscissae[anchor]
             fading = away * (1.0 - np.abs(away)) ** 2
-            fading[own], fading[other] = away[own], 0.0
+            fading[own] = away[own]
+            fading[other] = 0.0
             rate += np.nan_to_num(condition.rate) * fading
         variable = np.full(count, -1)
         _, variable[group >= 0] = np.unique(group[group >= 0], return_inverse=True)
@@ -157,18 +159,16 @@ def periodic(
     """
     orders = min(degree, ORDERS)
     _, derivatives = local_basis(knots, degree, np.array([0.0, 1.0]))
-    first, last = derivatives[:orders, 0, :orders], derivatives[:orders, 1, -orders:]
+    first = derivatives[:orders, 0, :orders]
+    last = derivatives[:orders, 1, -orders:]
     count = len(knots) - degree - 1
-    variable, weight = np.full((count, orders), -1), np.zeros((count, orders))
+    variable = np.full((count, orders), -1)
+    weight = np.zeros((count, orders))
     fixed = np.zeros(count)
-    variable[: count - orders, 0], weight[: count - orders, 0] = (
-        np.arange(count - orders),
-        1.0,
-    )
-    variable[count - orders :], weight[count - orders :] = (
-        np.arange(orders),
-        np.linalg.solve(last, first),
-    )
+    variable[: count - orders, 0] = np.arange(count - orders)
+    weight[: count - orders, 0] = 1.0
+    variable[count - orders :] = np.arange(orders)
+    weight[count - orders :] = np.linalg.solve(last, first)
     fixed[count - orders :] = jump
     weight[-1], variable[-1, 1:] = (
         np.eye(orders)[0],

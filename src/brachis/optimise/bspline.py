@@ -125,7 +125,8 @@ def _raised(
     value: np.ndarray, left: np.ndarray, right: np.ndarray, p: int
 ) -> np.ndarray:
     """Basis functions of degree p from those of degree p - 1."""
-    before, behind = left[..., :p][..., ::-1], right[..., :p]
+    before = left[..., :p][..., ::-1]
+    behind = right[..., :p]
     share = value / (before + behind)
     return _shifted(before * share) + _padded(behind * share)
 

@@ -135,7 +135,8 @@ class Attempt(Summary):
     def of(cls, start: Start, status: str, **more: Any) -> Attempt:
         """Begin an attempt."""
         joint_map = start.joint_map
-        names, branch = joint_map.redundant_joints, joint_map.branch_label
+        names = joint_map.redundant_joints
+        branch = joint_map.branch_label
         return cls(
             names,
             branch,

@@ -1,7 +1,4 @@
-"""From a solved program to a verified motion: refinement, trajectory, verification.
-
-From an answer of the optimiser to a trajectory.
-"""
+"""From a solved program to a verified motion: refinement, trajectory, verification."""
 
 from __future__ import annotations
 
@@ -39,8 +36,10 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
-    joint_map, task = phase.joint_map, start.problem.task
+    (phase,) = refined.program.phases
+    (motion,) = refined.program.motions(refined.x)
+    joint_map = phase.joint_map
+    task = start.problem.task
     assert joint_map.path is not None
     joins = motion.times_of(joint_map.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
@@ -73,9 +72,10 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     )
 
 
-def where_it_failed(attempt: Attempt) -> Program | None:
+def with_points_at_violations(attempt: Attempt) -> Program | None:
     """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
-    trajectory, refined = attempt.trajectory, attempt.refined
+    trajectory = attempt.trajectory
+    refined = attempt.refined
     if trajectory is None or refined is None or attempt.verification is None:
         return None
     failed = [check for check in attempt.verification.checks if not check.passed]
@@ -93,7 +93,7 @@ _SECOND_LOOKS = 4
 """Times that a motion which the verification refuses is refined again where it failed."""
 
 
-def completed(
+def refine_and_verify(
     attempt: Attempt,
     program: Program,
     reports: tuple[SolverReport, ...],
@@ -120,7 +120,7 @@ def completed(
     refined = refine(program, reports[-1], solve, options)
     done = _verified(attempt, reports[:-1], refined)
     for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
-        finer = None if options.deadline.passed else where_it_failed(done)
+        finer = None if options.deadline.passed else with_points_at_violations(done)
         if finer is None:
             break
         report = solve(finer, refined.x)
@@ -137,7 +137,9 @@ def _verified(
     """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
     start = attempt.start
     assert start is not None
-    problem, trajectory, verification = start.problem, None, None
+    problem = start.problem
+    trajectory = None
+    verification = None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
             trajectory = extract(start, refined)

@@ -78,10 +78,12 @@ def _weights(u: np.ndarray) -> np.ndarray:
     """Weights, (P,), of the integral over [0, 1] of the cubics through values at places u, (P,)."""
     count = min(_STENCIL, len(u))
     ends = np.concatenate([[0.0], u[1:-1], [1.0]])[: max(len(u), 2)]
-    weights, powers = np.zeros(len(u)), np.arange(count)
+    weights = np.zeros(len(u))
+    powers = np.arange(count)
     for step in range(len(ends) - 1):
         first = int(np.clip(step - 1, 0, len(u) - count))
-        stencil, middle = slice(first, first + count), ends[step]
+        stencil = slice(first, first + count)
+        middle = ends[step]
         moments = np.diff(
             [
                 (end - middle) ** (powers + 1) / (powers + 1)
@@ -163,7 +165,9 @@ class FixedGrid:
     point = variable = np.empty(0, dtype=int)
 
     def __init__(self, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> None:
-        self.knots, self.degree, self.t_norm = knots, degree, t_norm
+        self.knots = knots
+        self.degree = degree
+        self.t_norm = t_norm
         self._basis = LocalBasis.of(knots, degree, t_norm)
 
     def knots_at(self, _h: np.ndarray) -> np.ndarray:
@@ -223,10 +227,13 @@ class FreeGrid:
     def __init__(
         self, knots: np.ndarray, degree: int, t_norm: np.ndarray, shortest: float
     ) -> None:
-        self.knots, self.degree, self.t_norm = knots, degree, t_norm
+        self.knots = knots
+        self.degree = degree
+        self.t_norm = t_norm
         breaks = knots[degree : len(knots) - degree]
         count = len(breaks) - 1
-        self.lower, self.upper = np.full(count, shortest), np.ones(count)
+        self.lower = np.full(count, shortest)
+        self.upper = np.ones(count)
         self._interval = np.clip(
             np.searchsorted(breaks, t_norm, side="right") - 1, 0, count - 1
         )

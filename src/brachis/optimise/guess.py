@@ -18,7 +18,8 @@ from brachis.optimise.program import Program
 
 _STRETCH = 1.1
 _SHRINKAGE = 0.8
-_SHORTEST_TIME, _LONGEST_TIME = 0.01, 200.0
+_SHORTEST_TIME = 0.01
+_LONGEST_TIME = 200.0
 _FIT_DENSITY = 4
 _MISSED = 0.1
 """Part of a least speed that a fit may miss."""
@@ -190,14 +191,16 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    best, least = x, np.inf
+    best = x
+    least = np.inf
     while program.end_time(x) < _LONGEST_TIME:
         worst = worst_time_scaling_ratio(program, x)
         if worst <= 1.0:
             break
         if worst >= least:
             return best
-        best, least = x, worst
+        best = x
+        least = worst
         # Without gravity and friction, torque falls with the square of the time.
         x = program.time_scaled(x, _STRETCH * min(np.sqrt(worst), 8.0))
     else:

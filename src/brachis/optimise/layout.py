@@ -82,15 +82,11 @@ class Progress:
     def of(cls, spline: BoundarySpline, first: int) -> Progress:
         """Take the differences of a spline whose free variables begin at `first`; the duration is variable 0."""
         point, entry = np.nonzero(spline.variable >= 0)
-        variable, weight = (
-            first + spline.variable[point, entry],
-            spline.weight[point, entry],
-        )
+        variable = first + spline.variable[point, entry]
+        weight = spline.weight[point, entry]
         every = np.arange(len(spline.rate))
-        point, variable = (
-            np.append(point, every),
-            np.append(variable, np.zeros_like(every)),
-        )
+        point = np.append(point, every)
+        variable = np.append(variable, np.zeros_like(every))
         weight = np.append(weight, spline.rate)
         # Control point i is in difference i - 1, and with the other sign in difference i.
         number = np.concatenate([point - 1, point])
@@ -102,7 +98,8 @@ class Progress:
             (number >= 0) & (number < len(every) - 1)
         ]
         total = np.bincount(place, weights=signed)
-        unique, total = unique[total != 0.0], total[total != 0.0]
+        unique = unique[total != 0.0]
+        total = total[total != 0.0]
         number, variable = np.divmod(unique, first + spline.free)
         several = np.bincount(number, minlength=len(every) - 1) > 1
         kept = several[number]
@@ -180,7 +177,8 @@ class Layout:
         x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
         x_lower[0] = SHORTEST_TIME
         if path and not splines[0].rate.any():
-            x_lower[slices[0]], x_upper[slices[0]] = 0.0, 1.0
+            x_lower[slices[0]] = 0.0
+            x_upper[slices[0]] = 1.0
         progress = Progress.of(splines[0], slices[0].start) if path else Progress.none()
         lengths = slice(int(ends[-1]), len(x_lower))
         basis = grid.basis(grid.lengths_of(grid.knots))
@@ -253,7 +251,8 @@ def _pattern(
             limits, counts, itertools.pairwise(ends), strict=True
         )
     }
-    rows, columns = [], []
+    rows = []
+    columns = []
     for batch in batches(limits):
         together = np.concatenate([numbers[id(limit)] for limit in batch], axis=1)
         if batch[0].where == "whole":

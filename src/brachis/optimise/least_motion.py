@@ -12,7 +12,6 @@ stays. The multipliers that bottlenecks are found by are those of the fastest on
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,15 +24,16 @@ from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
 from brachis.limits.joint import reciprocals_near
 from brachis.optimise.backends import (
+    FEASIBLE,
     SolverOptions,
     SolverReport,
-    SolveStatus,
     solver_named,
 )
 from brachis.optimise.candidate import Attempt
-from brachis.optimise.completion import completed
+from brachis.optimise.completion import refine_and_verify
 from brachis.optimise.program import LeastAcceleration, Program
-from brachis.optimise.refine import RefinementOptions, Solve
+from brachis.optimise.refine import RefinementOptions
+from brachis.optimise.session import SolverSession
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
@@ -43,16 +43,10 @@ _KEPT_BACK = 0.1e-4
 """Part of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
 """A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
-_TOLERANCE, _ITERATIONS = 1e-6, 60
-_MANY_VARIABLES, _FOR_MANY, _FEW_ITERATIONS = 150, "ipopt", 20
-"""With more variables than these active sets take seconds an iteration; so few of an interior-point solver will do."""
-_PROGRESS, _PATIENCE, _ROUND = 1e-2, 5, 2
-"""A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do.
-
-Rounds of refinement begin near enough, and end sooner.
-"""
-_TIME = 0.5
-"""Part of the remaining time that may be used."""
+_FOR_MANY = "ipopt"
+"""With more than 150 variables active sets take seconds an iteration; a few iterations of an interior point do."""
+_PROGRESS = 1e-2
+"""A solve ends where several iterations lower the mean square by less than this fraction: near enough will do."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,7 +86,9 @@ class LeastMotion(Summary):
         }
 
 
-def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
+def find_least_motion(
+    fastest: Attempt, deadline: Deadline, listener: Listener
+) -> LeastMotion:
     """Find the calmest motion that is as fast as a finished attempt, or as little slower as the task allows.
 
     Parameters
@@ -107,7 +103,7 @@ def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMo
     LeastMotion
     """
     try:
-        return _calmest(fastest, deadline, listener)
+        return _solve(fastest, deadline, listener)
     except UnreachableError as error:
         return _kept(fastest, f"the fastest motion stays: {error}")
     except KeyboardInterrupt:
@@ -115,9 +111,10 @@ def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMo
         return _kept(fastest, "interrupted")
 
 
-def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
+def _solve(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
     """Solve, and complete what came of it if it is worth it."""
-    start, before = fastest.start, fastest.refined
+    start = fastest.start
+    before = fastest.refined
     assert start is not None and before is not None
     task = start.problem.task
     slower = max(task.search.slower, AS_FAST)
@@ -126,9 +123,10 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
     if deadline.passed:
         return _kept(fastest, "no time was left")
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
-    program, soon = before.program.minimising(objective), deadline.part(_TIME)
-    name = _FOR_MANY if program.variables > _MANY_VARIABLES else start.solver
-    solve = _solver(name, soon, listener, _PATIENCE)
+    program = before.program.minimising(objective)
+    soon = deadline.part(0.5)
+    name = _FOR_MANY if program.variables > 150 else start.solver
+    solve = _session(name, soon, listener, patience=5)
     first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
     if not first.status.usable:
         return _kept(
@@ -146,8 +144,9 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
         soon,
         before.t_end * (1.0 + slower),
     )
-    solve = _solver(name, soon, listener, _ROUND)
-    found = completed(fastest, program, (first,), solve, options)
+    # Rounds of refinement begin near enough, and end sooner.
+    solve = _session(name, soon, listener, patience=2)
+    found = refine_and_verify(fastest, program, (first,), solve, options)
     return _better(
         fastest,
         found,
@@ -199,14 +198,13 @@ def least_acceleration(
     Every joint's acceleration counts in proportion to its largest velocity: that of its limit; without one the largest
     that any such joint of its unit has at x. Joints that nothing limits, the virtual roll of a tool, do not count.
     """
-    robot, states = program.phases[0].joint_map.robot, program.states(x)
+    robot = program.phases[0].joint_map.robot
+    states = program.states(x)
     by_acceleration, weights = reciprocals_near(
         robot, program.limits, states[0].q[len(states[0].q) // 2]
     )
-    speeds, units = (
-        np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0),
-        np.array(robot.position_units),
-    )
+    speeds = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0)
+    units = np.array(robot.position_units)
     for unit in set(robot.position_units):
         own = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
         if speeds[own].any():
@@ -218,28 +216,23 @@ def least_acceleration(
     )
 
 
-def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) -> Solve:
-    """Make a function that solves with a backend; any feasible motion will do, however the solve ended."""
+def _session(
+    name: str, deadline: Deadline, listener: Listener, patience: int
+) -> SolverSession:
+    """Make a session of a backend; any feasible motion will do, however the solve ended."""
     (backend,) = solver_named(name)
+    options = SolverOptions(
+        tolerance=1e-6,
+        max_iterations=20 if name == _FOR_MANY else 60,
+        time_limit=np.inf,
+        progress=_PROGRESS,
+        patience=patience,
+        anywhere=True,
+    )
 
     def progress(iteration: int, objective: float) -> None:
         rms = 100.0 * objective**0.5
-        listener(
-            Iteration(
-                f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
-            )
-        )
+        text = f"iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
+        listener(Iteration(f"least motion: {text}"))
 
-    def solve(program: Program, x: np.ndarray) -> SolverReport:
-        most = _FEW_ITERATIONS if name == _FOR_MANY else _ITERATIONS
-        options = SolverOptions(
-            _TOLERANCE, most, deadline.left, _PROGRESS, patience, anywhere=True
-        )
-        report = backend.solve(program, x, options, progress)
-        return (
-            dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)
-            if report.feasible
-            else report
-        )
-
-    return solve
+    return SolverSession(backend, options, deadline, progress, acceptable=FEASIBLE)

@@ -1,19 +1,13 @@
-"""The knots that a task asks for.
+"""The knots of a solved program: more of them, better ones, or free ones.
 
-What the rounds of mesh refinement and of knot optimisation are judged by.
-
-Many given intervals, reached from few: coarse problems over some of the knots, then all of them.
-
-A cold solve with hundreds of variables takes seconds; from a coarse motion, inserted exactly, it takes a few
-iterations on every level.
-
-A mesh refined from coarse to fine by exact knot insertion, so that every solve starts from the motion before it.
-
-A time-optimal motion has 1 + r limits active at almost every instant, and jumps from one set of them to another. A
-spline can only ramp: where it does, time is lost, about the ramp's length times its height. The intervals that lose
-most are halved.
-
-Free knots: interval lengths as variables of the optimisation, from the answer for given ones.
+- `solve_nested` reaches many given intervals from few. A cold solve with hundreds of
+  variables takes seconds; from a coarse motion, inserted exactly, it takes a few
+  iterations on every level.
+- `refine_mesh` halves the intervals that lose most. A time-optimal motion has 1 + r
+  limits active at almost every instant, and jumps from one set of them to another. A
+  spline can only ramp, and loses about the ramp's length times its height.
+- `optimise_knots` makes the interval lengths variables of the optimisation.
+- `adapt_mesh` chooses among them as the task asks.
 """
 
 from __future__ import annotations
@@ -63,7 +57,7 @@ _EARLY = (
 """How a solve ends that is not done; a solver that breaks down at last may have come far."""
 
 
-def accepted(report: SolverReport, before: SolverReport) -> SolverReport:
+def accept_early_end(report: SolverReport, before: SolverReport) -> SolverReport:
     """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
     better = report.feasible and report.objective < before.objective
     early = report.status in _EARLY
@@ -87,7 +81,7 @@ def gain(before: Refined, after: Refined, refinement: RefinementOptions) -> floa
     return 1.0 - end_time(after, refinement) / end_time(before, refinement)
 
 
-def ending_with(
+def with_last(
     last: SolverReport, reports: list[SolverReport]
 ) -> tuple[SolverReport, ...]:
     """Move one of the reports to the end."""
@@ -130,7 +124,8 @@ def solve_nested(
     Answer
         Over the target's knots; over those of the last level that was solved, where one could not be.
     """
-    reports, solved = [report], report
+    reports = [report]
+    solved = report
     for level in _levels(target):
         if level.intervals <= coarse.intervals:
             continue
@@ -143,18 +138,20 @@ def solve_nested(
         start = finer.variables_from(
             [own.motion(part).over(fine.knots) for (own, part), fine in pairs]
         )
-        report = accepted(solve(finer, start), solved)
+        report = accept_early_end(solve(finer, start), solved)
         reports.append(report)
         if not report.status.usable:
             break
-        coarse, solved = finer, report
-    reached, asked = coarse.intervals, target.intervals
+        coarse = finer
+        solved = report
+    reached = coarse.intervals
+    asked = target.intervals
     undone = (
         f"the motion has {reached} of {asked} intervals, of which more were not solved"
         if reached < asked
         else ""
     )
-    return Answer(coarse, ending_with(solved, reports), undone)
+    return Answer(coarse, with_last(solved, reports), undone)
 
 
 def _levels(program: Program) -> Iterator[Program]:
@@ -250,11 +247,13 @@ def refine_mesh(
     Answer
         Over all knots.
     """
-    reports, last, gains = [first], first, [1.0]
+    reports = [first]
+    last = first
+    gains = [1.0]
     is_settled = False
     for _ in range(_MOST_ROUNDS):
         if _GROWTH * last.wall_time > deadline.left:
-            return Answer(program, ending_with(last, reports), _UNDONE)
+            return Answer(program, with_last(last, reports), _UNDONE)
         intervals = (
             _every_h_refinement(program)
             if is_settled
@@ -262,19 +261,20 @@ def refine_mesh(
         )
         finer, x = _halved(program, last.x, intervals, options)
         if finer.variables > _MOST_VARIABLES:
-            return Answer(program, ending_with(last, reports), _UNDONE)
+            return Answer(program, with_last(last, reports), _UNDONE)
         if finer.variables == program.variables:
             break
-        report = accepted(solve(finer, x), last)
+        report = accept_early_end(solve(finer, x), last)
         reports.append(report)
         if not report.status.usable:
             break
         gains.append(1.0 - report.objective / last.objective)
-        program, last = finer, report
+        program = finer
+        last = report
         is_settled = sum(gains[-2:]) < _ENOUGH * options.tolerance
         if is_settled and 2 * program.variables > _FEW_VARIABLES:
             break
-    return Answer(program, ending_with(last, reports))
+    return Answer(program, with_last(last, reports))
 
 
 def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.ndarray]:
@@ -378,7 +378,9 @@ def optimise_knots(
         With knots fixed where they are best; the given program if moving them led to no motion within the limits.
     """
     given = program
-    reports, best, x = [first], None, first.x
+    reports = [first]
+    best = None
+    x = first.x
     shortest = max(
         shortest, SHORTEST * max(phase.intervals for phase in program.phases)
     )
@@ -389,7 +391,7 @@ def optimise_knots(
         moved = solve(free, free.variables_from(program.motions(x)))
         fixed, start = free.frozen(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
-        report = accepted(solve(fixed, start), reports[-1])
+        report = accept_early_end(solve(fixed, start), reports[-1])
         reports += [moved, report]
         if not report.status.usable:
             break
@@ -400,15 +402,16 @@ def optimise_knots(
             best = refined
         if not gained > _WORTH_IT:
             break
-        program, x = refined.program, refined.x
+        program = refined.program
+        x = refined.x
     undone = (
         "the knots were not moved as far as that pays"
         if refinement.deadline.passed
         else ""
     )
     if best is None or not np.isfinite(end_time(best, refinement)):
-        return Answer(given, ending_with(first, reports), undone)
-    return Answer(best.program, ending_with(best.reports[-1], reports), undone)
+        return Answer(given, with_last(first, reports), undone)
+    return Answer(best.program, with_last(best.reports[-1], reports), undone)
 
 
 def adapt_mesh(

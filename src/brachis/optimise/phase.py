@@ -78,13 +78,15 @@ class Motion(Summary):
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-        low, high = np.zeros(len(s)), np.full(len(s), self.t_end)
+        low = np.zeros(len(s))
+        high = np.full(len(s), self.t_end)
         for _ in range(_BISECTIONS if len(s) else 0):
             middle = 0.5 * (low + high)
             order = np.argsort(middle, kind="stable")
             before = np.empty(len(s), dtype=bool)
             before[order] = self.at(middle[order])[0][:, 0] < s[order]
-            low, high = np.where(before, middle, low), np.where(before, high, middle)
+            low = np.where(before, middle, low)
+            high = np.where(before, high, middle)
         return 0.5 * (low + high)
 
 
@@ -132,23 +134,22 @@ class Phase:
 
     def _lay_out(self, grid: Grid, boundary: Boundary) -> None:
         """Set grid and boundary conditions, and all that depends on them."""
-        self.grid, self.boundary = grid, boundary
+        self.grid = grid
+        self.boundary = boundary
         self.splines = boundary.splines(grid.knots, grid.degree)
         layout = Layout.of(
             grid, self.splines, self.limits, path=self.joint_map.path is not None
         )
-        self.slices, self._lengths, self._places = (
-            layout.slices,
-            layout.lengths,
-            layout.places,
-        )
+        self.slices = layout.slices
+        self._lengths = layout.lengths
+        self._places = layout.places
         self._progress = layout.progress
-        self.x_lower, self.x_upper = layout.x_lower, layout.x_upper
-        self.lower, self.upper = layout.lower, layout.upper
-        self.jacobian_rows, self.jacobian_columns = (
-            layout.jacobian_rows,
-            layout.jacobian_columns,
-        )
+        self.x_lower = layout.x_lower
+        self.x_upper = layout.x_upper
+        self.lower = layout.lower
+        self.upper = layout.upper
+        self.jacobian_rows = layout.jacobian_rows
+        self.jacobian_columns = layout.jacobian_columns
         self._entries: tuple[LocalBasis, list[np.ndarray]] | None = None
         self._last: tuple[bytes, JointState] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
@@ -331,11 +332,9 @@ class Phase:
 
     def violation_at(self, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
         """As `violation`, at other normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
-        motion, known, at = (
-            self.motion(x),
-            self.state(x),
-            self.grid.t_norm_at(x[self._lengths]),
-        )
+        motion = self.motion(x)
+        known = self.state(x)
+        at = self.grid.t_norm_at(x[self._lengths])
         place = np.clip(np.searchsorted(at, t_norm), 0, len(at) - 1)
         near = (
             known.q[place]
@@ -463,7 +462,8 @@ class Phase:
 
     def _drifts(self, x: np.ndarray) -> list[np.ndarray]:
         """Differentiate the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
-        state, rates = self.state(x), np.array([spline.rate for spline in self.splines])
+        state = self.state(x)
+        rates = np.array([spline.rate for spline in self.splines])
         moving = per_second(self.grid.basis(x[self._lengths]).curves(rates), x[0])
         orders = enumerate(
             zip(moving, (state.y, state.ydot, state.yddot, state.ydddot), strict=True)

@@ -213,11 +213,9 @@ class Program(Summary):
         links: Sequence[Link] = (),
         objective: Objective | None = None,
     ) -> None:
-        self.phases, self.links, self.minimised = (
-            tuple(phases),
-            tuple(links),
-            objective or EndTime(),
-        )
+        self.phases = tuple(phases)
+        self.links = tuple(links)
+        self.minimised = objective or EndTime()
         first = np.cumsum([0, *(phase.variables for phase in self.phases)]).tolist()
         self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
         self._durations = first[:-1]

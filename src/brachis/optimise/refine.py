@@ -1,16 +1,15 @@
-"""Refinement to truth: from limits at collocation points to limits everywhere.
+"""Refinement: from limits at collocation points to limits everywhere.
 
-After a solve the limits are evaluated on a grid many times denser. Where one is violated between collocation points,
-points are added around the worst place of each stretch and the problem is solved again from where it stands, until the
-worst ratio is within the tolerance. A last violation of the tolerance's own size is met by lengthening t_E by as
-little, and by up to one per cent once the rounds, or the time, are used up.
+After a solve the limits are evaluated on a much denser grid. Where one is violated
+between collocation points, points are added around the worst place of each interval,
+and the problem is solved again from where it stands, until the worst ratio is within
+the tolerance. A last violation of the tolerance's own size is removed by a slightly
+longer t_E, up to one per cent longer once the rounds, or the time, are used up.
 
-Where limits are violated between collocation points.
-
-Where joints with Coulomb friction reverse: their torque rises by twice the friction within its own width.
-
-A width of 1e-5 rad/s is passed in microseconds, which no grid resolves. Between grid points the velocity of a joint is
-taken for the cubic that its velocities and accelerations there define.
+The torque of a joint with Coulomb friction rises by twice the friction where the joint
+reverses, within the friction's own width. A width of 1e-5 rad/s is passed in
+microseconds, which no grid resolves. Between grid points the velocity of a joint is
+therefore taken for the cubic that its velocities and accelerations define.
 """
 
 from __future__ import annotations
@@ -71,27 +70,31 @@ def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.nd
         (cubic.min(axis=0) < _NEAR_REVERSALS) & (cubic.max(axis=0) > -_NEAR_REVERSALS)
     )
     cubic = cubic[:, step, joint]
-    first, last = cubic[0, :, None] - _LEVELS, cubic[-1, :, None] - _LEVELS
+    first = cubic[0, :, None] - _LEVELS
+    last = cubic[-1, :, None] - _LEVELS
     which, level = np.nonzero(first * last < 0.0)
     crossing = _place(cubic[:, which] - _LEVELS[level])
     slopes = np.diff(cubic, axis=0)
     turns = np.flatnonzero(
         (slopes[0] * slopes[-1] < 0.0) & (np.abs(cubic).min(axis=0) < _NEAR_REVERSALS)
     )
-    which, u = np.append(which, turns), np.append(crossing, _place(slopes[:, turns]))
+    which = np.append(which, turns)
+    u = np.append(crossing, _place(slopes[:, turns]))
     return np.unique(times[step[which]] + u * h[step[which], 0])
 
 
 def _place(c: np.ndarray) -> np.ndarray:
     """Place in [0, 1] at which polynomials in Bernstein form, (m + 1, F), whose ends differ in sign are zero."""
-    low, high = np.zeros(c.shape[1]), np.ones(c.shape[1])
+    low = np.zeros(c.shape[1])
+    high = np.ones(c.shape[1])
     for _ in range(_BISECTIONS if c.size else 0):
         middle = 0.5 * (low + high)
         value = c
         while len(value) > 1:  # de Casteljau
             value = value[:-1] * (1.0 - middle) + value[1:] * middle
         same = value[0] * c[0] > 0.0
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
+        low = np.where(same, middle, low)
+        high = np.where(same, high, middle)
     return np.asarray(0.5 * (low + high))
 
 
@@ -136,7 +139,8 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
     """Largest violation of a phase, and where points are missing."""
     t_norm = dense.t_norm
     try:
-        table, of_means = dense.violation(x), dense.violation_of_means(x)
+        table = dense.violation(x)
+        of_means = dense.violation_of_means(x)
         centres = _suspects(t_norm, table, dense.knots, goal - _NEAR)
         heights = table.max(axis=1)[
             np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)
@@ -154,11 +158,9 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
                 break
             centres, heights = _zoomed(dense, x, centres, reach)
             kept = heights > goal - 0.1 * _NEAR
-            centres, heights, reach = (
-                centres[kept],
-                heights[kept],
-                reach[kept] * 2.0 / (_FINE - 1),
-            )
+            centres = centres[kept]
+            heights = heights[kept]
+            reach = reach[kept] * 2.0 / (_FINE - 1)
         places = np.unique(
             np.concatenate(
                 [
@@ -184,7 +186,8 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
 
 def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
     """Spread points t_norm over every piece of a path of several: a blend of millimetres lies between grid points."""
-    path, motion = dense.joint_map.path, dense.motion(x)
+    path = dense.joint_map.path
+    motion = dense.motion(x)
     breaks = np.empty(0) if path is None else path.breaks
     if len(breaks) <= 2:
         return np.empty(0)
@@ -193,10 +196,8 @@ def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
 
 def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List t_norm at which the path coordinate is where a limit changes abruptly."""
-    breaks, motion = (
-        np.concatenate([limit.breaks for limit in dense.limits]),
-        dense.motion(x),
-    )
+    breaks = np.concatenate([limit.breaks for limit in dense.limits])
+    motion = dense.motion(x)
     return motion.times_of(breaks) / motion.t_end
 
 
@@ -215,7 +216,8 @@ def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarr
 
 def _within_friction(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List t_norm at which a joint with Coulomb friction reverses, or nearly so: peaks as narrow as the friction."""
-    t_end, friction = dense.motion(x).t_end, dense.joint_map.robot.friction
+    t_end = dense.motion(x).t_end
+    friction = dense.joint_map.robot.friction
     return reversals(friction, dense.t_norm * t_end, dense.state(x)) / t_end
 
 
@@ -297,7 +299,8 @@ def _zoomed(
 
 def merged(phase: Phase, extra: np.ndarray) -> np.ndarray:
     """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
-    t_norm, jumps = phase.t_norm, phase.jumps
+    t_norm = phase.t_norm
+    jumps = phase.jumps
     sides = [np.searchsorted(jumps, times, side="right") for times in (extra, t_norm)]
     apart = np.where(
         sides[0][:, None] == sides[1], np.abs(extra[:, None] - t_norm), np.inf
@@ -461,7 +464,8 @@ def _time_scaled(
         if not dense.end_time(x) * factor <= longest:
             break
         x = dense.time_scaled(x, factor)
-        before, (violation, _) = violation, violations(dense, x, goal)
+        before = violation
+        (violation, _) = violations(dense, x, goal)
         best = min(best, (x, violation), key=lambda pair: pair[1])
         if violation > 0.99 * before:
             break

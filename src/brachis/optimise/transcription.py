@@ -53,7 +53,8 @@ def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
 
 def _boundary(problem: Problem, joint_map: JointMap) -> Boundary:
     """Write the task's boundary conditions in the coordinates of a joint map."""
-    task, given = problem.task, problem.task.boundary
+    task = problem.task
+    given = problem.task.boundary
     free = np.full(problem.robot.n, np.nan)
     start, end = (
         free if posture is None else posture for posture in (problem.start, problem.end)

@@ -9,9 +9,8 @@ from brachis.search.remedies import try_remedies
 from brachis.search.solving import (
     MARGINS,
     best_of_joints,
-    continued,
-    eased,
-    solve_with,
+    solve_by_margin_continuation,
+    solve_without_third_order_limits,
     solved_in_chart,
 )
 
@@ -21,15 +20,14 @@ __all__ = [
     "Record",
     "Stages",
     "best_of_joints",
-    "continued",
-    "eased",
     "find_fastest",
     "first_breaks",
     "first_map",
     "first_point",
     "given_start",
     "is_planned",
-    "solve_with",
+    "solve_by_margin_continuation",
+    "solve_without_third_order_limits",
     "solved_in_chart",
     "try_remedies",
 ]

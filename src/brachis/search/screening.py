@@ -17,15 +17,10 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
-from brachis.optimise.backends import (
-    SolverOptions,
-    SolverReport,
-    SolveStatus,
-    solver_named,
-)
+from brachis.optimise.backends import SolverOptions, solver_named
 from brachis.optimise.candidate import Start
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Solve
+from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem
 from brachis.search.phase_plane import first_point
@@ -148,24 +143,15 @@ def _roughly(problem: Problem) -> Problem:
     )
 
 
-def _solver(start: Start, deadline: Deadline) -> Solve:
-    """Make a function that solves roughly: an answer that nearly holds the limits will do."""
+def _solver(start: Start, deadline: Deadline) -> SolverSession:
+    """Make a session that solves roughly: an answer that nearly holds the limits will do."""
     curved = any(limit.where == "whole" for limit in start.problem.limits)
     backend = solver_named(start.problem.task.solver.name, curved=curved)[0]
 
-    def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(
-            _TOLERANCE, _ITERATIONS, deadline.left, _PROGRESS, _PATIENCE
-        )
-        report = backend.solve(program, x, options, None)
-        nearly = report.violation < _NEARLY and not report.status.usable
-        return (
-            dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)
-            if nearly
-            else report
-        )
-
-    return solve
+    options = SolverOptions(
+        _TOLERANCE, _ITERATIONS, np.inf, progress=_PROGRESS, patience=_PATIENCE
+    )
+    return SolverSession(backend, options, deadline, acceptable=_NEARLY)
 
 
 def _curves(program: Program, x: np.ndarray) -> np.ndarray:

@@ -1,12 +1,12 @@
-"""Solving one NLP from one starting point, with ever smaller branch margins.
+"""Solve one NLP from one starting point, with ever smaller branch margins.
 
-Solving in a chart that follows the motion, and in other coordinates than the chart's.
-
-A chart holds around its joint path. Where the motion that a solve ends at goes so far from it that the rows are no
-longer transversal there, or that the least singular value holds the motion back, a new chart is laid around that
-motion, and the solve goes on in it. At the optimum any rows that are transversal along the motion describe the same
-motions, but splines of them are not the same curves: over the same knots one measure of self-motion may be a few parts
-in a thousand faster than another. So the best of some of them, those of single joints, is taken.
+A chart holds around its joint path. Where a solve ends far from that path, the chart's
+rows may no longer be transversal, or the least singular value may hold the motion back.
+Then a new chart is laid around the motion, and the solve goes on in it. At the optimum
+any rows that are transversal along the motion describe the same motions, but splines of
+their coordinates are not the same curves: over the same knots one measure of
+self-motion may be a few parts in a thousand faster than another. So several choices of
+single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
@@ -17,43 +17,35 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.common.deadline import Deadline
-from brachis.common.progress import Iteration, Listener
 from brachis.errors import UnreachableError
 from brachis.kinematics import (
     ChartMap,
     ChartRows,
-    JointMap,
     Newton,
     chart_around,
     null_spaces,
     transversality,
 )
 from brachis.limits.safeguards import MARGIN
-from brachis.optimise.backends import Solver, SolverOptions, SolverReport, SolveStatus
+from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.guess import fitted, shortest_time
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Solve
 from brachis.optimise.transcription import phase_in
 from brachis.problem.problem import Problem
-from brachis.task import SolverSettings
 
 MARGINS = (0.1, 0.02, MARGIN)
-"""Branch margins that are tried in turn; see `continued`."""
+"""Branch margins that are tried in turn; see `solve_by_margin_continuation`."""
 HELD_BACK = 1e-4
 """A margin that is nearer to its bound than this holds the motion back."""
 _EASY = 2
-"""Order of the limits with which solves from afar are easy; see `eased`."""
+"""Order of the limits with which solves from afar are easy; see `solve_without_third_order_limits`."""
 _ON_ITS_WAY = 1e-3
-_STAGNATION = 1e-5, 10
-"""Progress and patience in charts; see `SolverOptions`."""
-_ITERATIONS = 100
-"""Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
 WORTH_IT = 2e-4
 """A smaller branch margin that shortens the motion by less than this fraction is not worth its sharper turns."""
 
 
-def continued(
+def solve_by_margin_continuation(
     program: Program, x: np.ndarray, solve: Solve, margins: Sequence[float]
 ) -> tuple[Program, tuple[SolverReport, ...]]:
     """Solve with ever smaller branch margins, each from the last answer.
@@ -112,7 +104,7 @@ def continued(
     return order[-1][0], tuple(report for _, report in order)
 
 
-def eased(
+def solve_without_third_order_limits(
     program: Program, x: np.ndarray, solve: Solve, margin: float
 ) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
     """Find a better starting point where limits ask for the third derivative: the answer without them, time-scaled.
@@ -144,50 +136,6 @@ def eased(
         with contextlib.suppress(UnreachableError):
             x = shortest_time(program, report.x)
     return x, (report,)
-
-
-def solve_with(
-    solver: Solver,
-    settings: SolverSettings,
-    joint_map: JointMap,
-    deadline: Deadline,
-    listener: Listener,
-) -> Solve:
-    """Make a function that runs one backend under the task's bounds.
-
-    Parameters
-    ----------
-    solver : Solver
-    settings : SolverSettings
-    joint_map : JointMap
-        Of what is solved. In a chart, where wandering among equally fast motions is common and no branch boundary slows
-        a solve down on its way, fewer iterates without gain are waited for.
-    deadline : Deadline
-    listener : callable
-
-    Returns
-    -------
-    callable
-    """
-    most = settings.max_iterations
-    if (
-        settings.name == "auto"
-        and most == SolverSettings.model_fields["max_iterations"].default
-    ):
-        most = _ITERATIONS * max(joint_map.r, 1)
-    stagnation = _STAGNATION if isinstance(joint_map, ChartMap) else ()
-
-    def progress(iteration: int, objective: float) -> None:
-        listener(
-            Iteration(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
-        )
-
-    def solve(program: Program, x: np.ndarray) -> SolverReport:
-        remaining = deadline.within(settings.time_limit).left
-        options = SolverOptions(settings.tolerance, most, remaining, *stagnation)
-        return solver.solve(program, x, options, progress)
-
-    return solve
 
 
 _TRANSVERSAL = 0.5
@@ -226,30 +174,34 @@ def solved_in_chart(
     reports : tuple of SolverReport
         Of all solves; the last one belongs to `program`.
     """
-    first, further = MARGINS[:1], MARGINS[1:]
-    program, reports = continued(program, x, solve, first)
+    first = MARGINS[:1]
+    further = MARGINS[1:]
+    program, reports = solve_by_margin_continuation(program, x, solve, first)
     if not reports[-1].status.usable and reports[-1].status not in _OUT_OF_TIME:
-        program, more = continued(program, x, solve, further)
+        program, more = solve_by_margin_continuation(program, x, solve, further)
         reports += more
     for _ in range(_RECENTRINGS):
         if not reports[-1].status.usable or _follows(program, reports[-1].x):
             break
-        moved = moved_to(problem, program, reports[-1].x)
+        moved = move_to_chart(problem, program, reports[-1].x)
         if moved is None:
             break
-        other, more = continued(*moved, solve, first)
+        other, more = solve_by_margin_continuation(*moved, solve, first)
         if not more[-1].status.usable:
             reports = (*more, *reports)
             break
         gained = more[-1].objective < (1.0 - WORTH_IT) * reports[-1].objective
-        program, reports = other, reports + more
+        program = other
+        reports = reports + more
         if not gained:
             break
     if (
         reports[-1].status.usable
         and program.safeguard_slack(reports[-1].x) <= HELD_BACK
     ):
-        other, more = continued(program, reports[-1].x, solve, further)
+        other, more = solve_by_margin_continuation(
+            program, reports[-1].x, solve, further
+        )
         if more[-1].status.usable:
             return other, reports + more
         reports = (*more, *reports)
@@ -259,7 +211,7 @@ def solved_in_chart(
 def best_of_joints(
     problem: Problem, program: Program, report: SolverReport, solve: Solve
 ) -> Solved:
-    """Solve again with joints in place of the chart's rows, and keep the fastest; see the module.
+    """Solve again with joints in place of the chart's rows, and keep the fastest.
 
     Parameters
     ----------
@@ -276,20 +228,22 @@ def best_of_joints(
     reports : tuple of SolverReport
         Of the further solves, then `report` if it belongs to `program`, else the one that does.
     """
-    best, last = program, report
+    best = program
+    last = report
     others: list[SolverReport] = []
     for rows in _selections(program, report.x):
-        moved = moved_to(problem, program, report.x, rows)
+        moved = move_to_chart(problem, program, report.x, rows)
         if moved is None:
             continue
-        other, reports = continued(*moved, solve, MARGINS)
+        other, reports = solve_by_margin_continuation(*moved, solve, MARGINS)
         others += reports
         if reports[-1].status.usable and reports[-1].objective < last.objective:
-            best, last = other, reports[-1]
+            best = other
+            last = reports[-1]
     return best, (*(each for each in others if each is not last), last)
 
 
-def moved_to(
+def move_to_chart(
     problem: Problem, program: Program, x: np.ndarray, rows: ChartRows | None = None
 ) -> tuple[Program, np.ndarray] | None:
     """Write a motion in a chart around itself; None where there is none.
@@ -309,7 +263,8 @@ def moved_to(
     x : (v,) ndarray
         The same motion but for what splines of the new coordinates cannot say.
     """
-    (phase,), (motion,) = program.phases, program.motions(x)
+    (phase,) = program.phases
+    (motion,) = program.motions(x)
     t_norm = np.linspace(0.0, 1.0, _DENSE * len(phase.t_norm) + 1)
     try:
         state = phase.joint_map.state(
@@ -326,7 +281,8 @@ def moved_to(
 
 def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
     """Bases of the null spaces of the task Jacobian, (K, n, r), along a motion."""
-    (state,), (phase,) = program.states(x), program.phases
+    (state,) = program.states(x)
+    (phase,) = program.phases
     chart = phase.joint_map
     assert isinstance(chart, ChartMap)
     return null_spaces(Newton(chart.task_map).placed(state.q)[1])
@@ -335,8 +291,10 @@ def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
 def _follows(program: Program, x: np.ndarray) -> bool:
     """Tell whether the chart still does for the motion."""
     try:
-        (phase,), null = program.phases, _self_motion(program, x)
-        chart, s = phase.joint_map, program.states(x)[0].y[:, 0]
+        (phase,) = program.phases
+        null = _self_motion(program, x)
+        chart = phase.joint_map
+        s = program.states(x)[0].y[:, 0]
         assert isinstance(chart, ChartMap)
         own = transversality(chart.rows.at(s)[0], null).min()
         return program.safeguard_slack(x) > HELD_BACK and bool(own >= _TRANSVERSAL)

@@ -43,11 +43,12 @@ from brachis.optimise.backends import solver_named
 from brachis.optimise.phase import Motion
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Refined, RefinementOptions, refine
+from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
 from brachis.robot.task_map import JOINTS
-from brachis.search.solving import MARGINS, solve_with
+from brachis.search.solving import MARGINS
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def _answers(
     for backend in solver_named(task.solver.name, curved=curved):
         if deadline.passed:
             return
-        solve = solve_with(
+        solve = SolverSession.for_task(
             backend,
             task.solver,
             program.phases[0].joint_map,

@@ -2,6 +2,7 @@
 
 from brachis.optimise.backends.monitor import residual
 from brachis.optimise.backends.protocol import (
+    FEASIBLE,
     Problem,
     Progress,
     Solver,
@@ -13,6 +14,7 @@ from brachis.optimise.backends.registry import AUTO_ORDER, NAMES, solver_named
 
 __all__ = [
     "AUTO_ORDER",
+    "FEASIBLE",
     "NAMES",
     "Problem",
     "Progress",

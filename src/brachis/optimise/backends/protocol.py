@@ -11,7 +11,7 @@ import numpy as np
 
 from brachis.common.summary import Summary
 
-_FEASIBLE = 1e-5
+FEASIBLE = 1e-5
 """Violation of rows and bounds, dimensionless, that refinement mends."""
 
 
@@ -131,7 +131,7 @@ class SolverReport(Summary):
     @property
     def feasible(self) -> bool:
         """True where the answer is a motion within the limits at the collocation points, however the solve ended."""
-        return self.violation <= _FEASIBLE
+        return self.violation <= FEASIBLE
 
 
 Progress = Callable[[int, float], None]

@@ -47,7 +47,8 @@ def solve(
     from scipy.optimize import Bounds, minimize
 
     watch = Watch(problem, options, progress)
-    below, above = np.isfinite(problem.lower), np.isfinite(problem.upper)
+    below = np.isfinite(problem.lower)
+    above = np.isfinite(problem.upper)
     shape = (len(problem.lower), len(x))
     last = x.copy()
 
@@ -117,7 +118,8 @@ def _is_stationary(problem: Problem, x: np.ndarray) -> bool:
     from scipy.optimize import nnls
 
     try:
-        rows, entries = problem.rows(x), problem.jacobian(x)
+        rows = problem.rows(x)
+        entries = problem.jacobian(x)
     except UnreachableError:
         return False
     shape = (len(rows), len(x))

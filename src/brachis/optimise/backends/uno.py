@@ -58,7 +58,8 @@ def solve(
             stall = _Stall(watch, units)
             result = _run(watch, x, units, radius, stall)
             x = units * np.array(result.primal_solution)
-            ending, found = result.optimization_status.name, result.solution_status.name
+            ending = result.optimization_status.name
+            found = result.solution_status.name
             if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
                 watch.interrupt = KeyboardInterrupt()
             broken_down = (
@@ -135,7 +136,8 @@ def _run(
     """One call of Uno, which is untyped; its variables are x in units."""
     import unopy
 
-    problem, options = watch.problem, watch.options
+    problem = watch.problem
+    options = watch.options
     bounds = (problem.x_lower / units).tolist(), (problem.x_upper / units).tolist()
     model = unopy.Model(
         unopy.PROBLEM_NONLINEAR, len(x), *bounds, unopy.ZERO_BASED_INDEXING
