@@ -35,7 +35,7 @@ from brachis.common.arrays import cross
 from brachis.ik.arm import determinant, largest_determinant, random_postures
 from brachis.ik.by_sign import SignSolver
 from brachis.ik.polish import EXACT, Poses, polished
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import across, dot, wrap
 from brachis.robot import TaskMap
@@ -260,8 +260,6 @@ class EaikSolver(SignSolver):
 
     Holds nothing of EAIK's own, which cannot be pickled.
     """
-
-    kind: Kind = "closed_form"
 
     def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
         rest = complement(geometry.n, redundant)

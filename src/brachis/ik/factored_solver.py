@@ -39,7 +39,7 @@ from brachis.ik.arm import (
     perpendicular,
     random_postures,
 )
-from brachis.ik.protocol import IKSolver, Kind, NotApplicableError
+from brachis.ik.protocol import IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews
 from brachis.ik.vectors import wrap
 
@@ -424,8 +424,6 @@ class FactoredSolver(IKSolver, Generic[S]):
     redundant : tuple of int
     structure : Structure
     """
-
-    kind: Kind = "closed_form"
 
     def __init__(
         self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: S

@@ -224,11 +224,8 @@ class Polished(IKSolver):
         task_map: TaskMap,
         redundant: tuple[int, ...],
     ) -> None:
-        self.branches, self.alternatives, self.kind = (
-            solver.branches,
-            solver.alternatives,
-            solver.kind,
-        )
+        self.branches = solver.branches
+        self.alternatives = solver.alternatives
         self._solver = solver
         self._geometry = geometry
         self._task_map = task_map

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import wrap
 from brachis.robot import TaskMap
@@ -239,8 +239,6 @@ _LABELS = {
 
 class PlanarSolver(IKSolver):
     """Closed form of a planar chain; see the module's formulas."""
-
-    kind: Kind = "closed_form"
 
     def __init__(
         self, chain: PlanarChain, redundant: tuple[int, ...], *, yaw: bool

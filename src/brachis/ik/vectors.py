@@ -74,19 +74,6 @@ def cosine_roots(
     return middle - half, middle + half
 
 
-def perpendiculars(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors that make a right-handed frame with a unit axis: ``first x second = axis``, each (3, ...).
-
-    T. Duff et al., "Building an orthonormal basis, revisited", Journal of Computer Graphics Techniques 6(1), 2017.
-    """
-    x, y, z = axis
-    sign = np.copysign(1.0, z)
-    scale = -1.0 / (sign + z)
-    mixed = x * y * scale
-    first = np.stack([1.0 + sign * x * x * scale, sign * mixed, -sign * x])
-    return first, np.stack([mixed, sign + y * y * scale, -y])
-
-
 def meeting_point(
     axis: np.ndarray, point: np.ndarray, other: np.ndarray, through: np.ndarray
 ) -> np.ndarray:
