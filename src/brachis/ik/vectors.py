@@ -26,7 +26,8 @@ def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Turn a vector about a unit axis (Rodrigues' formula), shape (3, ...)."""
-    cos, sin = np.cos(angle), np.sin(angle)
+    cos = np.cos(angle)
+    sin = np.sin(angle)
     return (
         vector * cos
         + cross(axis, vector) * sin
@@ -53,7 +54,8 @@ def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndar
 
     These parts are taken off first: what is left may be small, and its direction is all that matters.
     """
-    start, end = across(axis, start), across(axis, end)
+    start = across(axis, start)
+    end = across(axis, end)
     return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
 
 
