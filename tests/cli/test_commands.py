@@ -405,7 +405,7 @@ def test_version(run):
 def test_inspect(run):
     outcome = run("inspect", SCARA, "--task-space", "x,y")
     assert outcome.code == 0
-    assert outcome.out.count("closed_form") == 3
+    assert outcome.out.count(" planar ") == 3
     data = json.loads(run("inspect", SCARA, "--task-space", "x,y", "--json").out)
     assert data["degree_of_redundancy"] == 1
     assert [row["redundant joints"] for row in data["decompositions"]] == [

@@ -32,18 +32,18 @@ def published(name: str) -> Path:
 
 
 def inspected(run, urdf: Path, *options: str) -> tuple[dict[str, str], list[str], str]:
-    """Kind of every choice of redundant joints, remarks, and what people read, after a look at what else is printed."""
+    """Solver of every choice of redundant joints, remarks, and the printed text, after a check of the rest."""
     outcome = run("inspect", urdf, *options, "--json")
     assert outcome.code == 0, outcome.err
     data = json.loads(outcome.out)
     assert len(data["joints"]) >= 2
     for row in data["decompositions"]:
         assert (row["solver"] == "-") == bool(row["why not"]), row
-        assert (row["kind"] == "-") == (row["branches"] == 0)
+        assert (row["solver"] == "-") == (row["branches"] == 0)
     text = run("inspect", urdf, *options)
     assert text.code == 0
     return (
-        {row["redundant joints"]: row["kind"] for row in data["decompositions"]},
+        {row["redundant joints"]: row["solver"] for row in data["decompositions"]},
         data["remarks"],
         text.out,
     )
@@ -58,15 +58,15 @@ def decompositions(run, urdf: Path, *options: str) -> dict[str, str]:
 )
 def test_every_robot_of_the_repository(run, urdf):
     choices = WITHOUT_CLOSED_FORM.get(urdf.parent.name)
-    kinds, remarks, text = inspected(run, urdf)
-    assert ("closed_form" in kinds.values()) == (choices is None)
+    solvers, remarks, text = inspected(run, urdf)
+    assert (set(solvers.values()) == {"-"}) == (choices is not None)
     assert (
         (ik.NO_CLOSED_FORM in remarks)
         == (ik.NO_CLOSED_FORM in text)
         == (choices is not None)
     )
     if choices is not None:
-        assert (len(kinds), set(kinds.values())) == (choices, {"-"})
+        assert (len(solvers), set(solvers.values())) == (choices, {"-"})
 
 
 def test_all_robots_without_a_closed_form_are_looked_at():
@@ -82,30 +82,24 @@ def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
 
 
 def test_tx90l_on_its_rail(run):
-    kinds = decompositions(run, ROOT / "robots/tx90l_rail/robot.urdf")
-    assert [joint for joint, kind in kinds.items() if kind == "closed_form"] == [
+    solvers = decompositions(run, ROOT / "robots/tx90l_rail/robot.urdf")
+    assert [joint for joint, solver in solvers.items() if solver != "-"] == [
         "rail",
         "joint_1",
         "joint_2",
         "joint_3",
     ]
-    assert [joint for joint, kind in kinds.items() if kind == "polynomial"] == [
-        "joint_4",
-        "joint_5",
-        "joint_6",
-    ]
 
 
 def test_ur10_on_its_rail(run):
-    kinds = decompositions(run, ROOT / "robots/ur10_rail/robot.urdf")
-    closed = [joint for joint, kind in kinds.items() if kind == "closed_form"]
+    solvers = decompositions(run, ROOT / "robots/ur10_rail/robot.urdf")
+    closed = [joint for joint, solver in solvers.items() if solver != "-"]
     assert closed == ["rail", "shoulder_pan_joint", "wrist_2_joint", "wrist_3_joint"]
-    assert set(kinds.values()) == {"closed_form", "polynomial"}
 
 
 def test_iiwa_has_none_for_its_elbow(run):
-    kinds = decompositions(run, ROOT / "robots/iiwa14/robot.urdf")
-    assert [joint for joint, kind in kinds.items() if kind == "-"] == ["joint_4"]
+    solvers = decompositions(run, ROOT / "robots/iiwa14/robot.urdf")
+    assert [joint for joint, solver in solvers.items() if solver == "-"] == ["joint_4"]
     row = json.loads(run("inspect", ROOT / "robots/iiwa14/robot.urdf", "--json").out)[
         "decompositions"
     ][3]
@@ -114,23 +108,22 @@ def test_iiwa_has_none_for_its_elbow(run):
 
 @pytest.mark.parametrize("name", [name for name in PUBLISHED if name != "Baxter"])
 def test_published_robots(run, name):
-    kinds = decompositions(run, published(name))
-    assert kinds
-    assert set(kinds.values()) <= {"closed_form", "polynomial", "-"}
+    solvers = decompositions(run, published(name))
+    assert solvers
 
 
-def test_kinds_of_published_robots(run):
+def test_solvers_of_published_robots(run):
     pytest.importorskip("eaik.pybindings.EAIK")  # which comes along where it has wheels
     panda = decompositions(run, published("Panda"))
-    closed = [joint for joint, kind in panda.items() if kind == "closed_form"]
+    closed = [joint for joint, solver in panda.items() if solver != "-"]
     assert closed == [f"panda_joint{i}" for i in (4, 5, 6, 7)]
-    assert decompositions(run, published("UR5")) == {"none": "closed_form"}
+    assert decompositions(run, published("UR5")) == {"none": "parallel_axes"}
 
 
 def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
     panda = decompositions(run, published("Panda"))
-    assert [joint for joint, kind in panda.items() if kind == "closed_form"] == [
+    assert [joint for joint, solver in panda.items() if solver != "-"] == [
         "panda_joint4",
         "panda_joint7",
     ]
@@ -170,15 +163,15 @@ def test_of_several_arms_the_first_one_is_shown(run):
         "from which several limbs part; --base-frame names another one"
     )
     assert "--tool-frame names another one" in data["remarks"][1]
-    kinds = decompositions(run, published("Baxter"), "--tool-frame", "left_gripper")
-    assert set(kinds.values()) == {"-"}  # offsets at the shoulder and the wrist
+    solvers = decompositions(run, published("Baxter"), "--tool-frame", "left_gripper")
+    assert set(solvers.values()) == {"-"}  # offsets at the shoulder and the wrist
 
 
 def test_free_roll_and_unknown_words(run):
-    kinds = decompositions(
+    solvers = decompositions(
         run, ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "pose_free_roll"
     )
-    assert kinds["tool_roll"] == "closed_form"
+    assert solvers["tool_roll"] != "-"
     outcome = run(
         "inspect", ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "poses"
     )
@@ -218,7 +211,7 @@ def test_rails_leave_the_arm_s_tool_frame_alone(run, tmp_path):
         "60",
     )
     assert run("compose", published("UR5"), *options, "--out", out).code == 0
-    assert decompositions(run, out)["rail"] == "closed_form"
+    assert decompositions(run, out)["rail"] == "parallel_axes"
 
 
 def test_tables_may_be_in_degrees_and_json_stays_in_rad(run):

@@ -73,7 +73,7 @@ def test_export_verify_inspect(run, files, tmp_path):
     outcome = run("inspect", files / "robot.urdf", "--posture", "0.2", "--json")
     assert outcome.code == 0, outcome.err
     (found,) = json.loads(outcome.out)["decompositions"]
-    assert found["kind"] == "closed_form"
+    assert found["solver"] != "-"
 
 
 @pytest.mark.parametrize("name", ["task.yaml", "result.npz"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,8 @@ from brachis.ik import (
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndYaw
 from support.chains import Joint, chain_urdf, planar_robot
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -129,8 +133,6 @@ def test_order_of_the_redundant_joints_does_not_matter():
 class Wrapped(IKSolver):
     """A solver that changes another one's answers."""
 
-    kind = "closed_form"
-
     def __init__(self, inner, change):
         self.branches, self._inner, self._change = inner.branches, inner, change
 
@@ -218,3 +220,11 @@ def test_a_family_of_others_that_breaks_down_is_named_and_passed_over(arm, plane
     candidate = find(arm, plane, ["j3"], families=[broken])
     assert candidate.family == "planar"
     assert candidate.reasons["broken"] == "its code failed: KeyError: 'nothing'"
+
+
+def test_a_choice_without_a_closed_form_names_those_that_have_one():
+    robot = Robot.from_urdf(ROOT / "robots/tx90l_rail/robot.urdf")
+    with pytest.raises(DecompositionError) as caught:
+        find(robot, task_map_of(robot, "pose"), ["joint_5"])
+    names = [joints for (joints,) in caught.value.available]
+    assert names == ["rail", "joint_1", "joint_2", "joint_3"]

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
-
-import pytest
 
 from brachis.search.chart_starts import SCREENED
 from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.schedule import looked_at
 
 PAGE = Path(__file__).parents[2] / "docs/fastest_motion.md"
 
@@ -48,35 +44,3 @@ def test_the_documented_efforts_are_the_real_ones():
             str(level.in_closed_forms) if level.in_closed_forms < 10_000 else "all"
         )
         assert refined == str(level.refined)
-
-
-@pytest.mark.parametrize(
-    ("rooms", "start", "expected"),
-    [
-        ([0.5, 0.05], [0.0], ["closed_form", "closed_form"]),
-        ([0.09, 0.05], [0.0], ["closed_form", "closed_form", "polynomial"]),
-        ([0.0, 0.0], None, ["closed_form", "closed_form"]),
-        ([], [0.0], ["polynomial"]),
-    ],
-)
-@pytest.mark.parametrize("given", ["start", "end"])
-def test_polynomials_are_looked_at_where_every_closed_form_is_cramped(
-    rooms, start, expected, given
-):
-    start, end = (start, None) if given == "start" else (None, start)
-
-    def decomposition(kind, clearance):
-        solver = SimpleNamespace(kind=kind)
-        problem = SimpleNamespace(start=start, end=end)
-        return SimpleNamespace(
-            match=SimpleNamespace(solver=solver), clearance=clearance, problem=problem
-        )
-
-    decompositions = [
-        *(decomposition("closed_form", clearance) for clearance in rooms),
-        decomposition("polynomial", 0.6),
-    ]
-    (fast,) = SEARCH_LEVELS["fast"]
-    assert [
-        found.match.solver.kind for found in looked_at(decompositions, fast)
-    ] == expected

@@ -207,14 +207,12 @@ def test_a_free_start_is_in_the_turn_from_which_the_given_end_is_reached(turned)
     task |= back_from(end, robot, [0.0, 0.4, 0.0])
     found = 0
     for decomposition in decompositions_of(Problem.of(robot, brachis.load_task(task))):
-        if decomposition.match.solver.kind == "closed_form":
-            joint_paths = ClosedFormLattice(decomposition).joint_paths(2)
-            assert not isinstance(joint_paths, DeadEnd)
-            assert all(
-                np.abs(joint_path.q[-1] - end).max() < 1e-9
-                for joint_path in joint_paths
-            )
-            found += 1
+        joint_paths = ClosedFormLattice(decomposition).joint_paths(2)
+        assert not isinstance(joint_paths, DeadEnd)
+        assert all(
+            np.abs(joint_path.q[-1] - end).max() < 1e-9 for joint_path in joint_paths
+        )
+        found += 1
     assert found == 4
 
 

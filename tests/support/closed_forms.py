@@ -71,7 +71,6 @@ class Bench:
         candidate = self.find(redundant, families)
         solver, rest, q = candidate.solver, self.rest(redundant), self.q
         assert solver is not None
-        assert solver.kind == "closed_form"
         answers = solver.solve(self.targets, q[:, list(redundant)])
         assert answers.shape == (len(q), len(solver.branches), 1, self.space.m)
         answers = answers[:, :, 0]

@@ -59,7 +59,8 @@ class RemainingJoints:
         q_r = np.random.default_rng(0).uniform(
             -np.pi, np.pi, (_SAMPLES, len(redundant))
         )
-        held, kept = geometry.held(redundant, q_r), list(rest)
+        held = geometry.held(redundant, q_r)
+        kept = list(rest)
         names = tuple(geometry.joint_names[i] for i in rest)
         return cls(
             names,
@@ -195,7 +196,8 @@ def meeting(joints: RemainingJoints, *places: int) -> Anchor | None:
 
 def _nearest(joints: RemainingJoints, i: int, j: int) -> np.ndarray:
     """Point (3, S) on the axis of i that is nearest to that of j; any one where they are parallel."""
-    first, second = joints.axes[:, i], joints.axes[:, j]
+    first = joints.axes[:, i]
+    second = joints.axes[:, j]
     normal = cross(first, second)
     size = dot(normal, normal)
     along = dot(cross(joints.points[:, j] - joints.points[:, i], second), normal)

@@ -89,12 +89,14 @@ def _checked_ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
 
     Of far ranges what is near zero: positions in kilometres are not precise to the tolerances.
     """
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
+    lower = robot.limits.position_lower
+    upper = robot.limits.position_upper
     ranged = (
         (np.array(robot.position_units) == "m")
         & np.isfinite(lower)
         & np.isfinite(upper)
     )
     near = np.clip(0.0, lower, upper)
-    lower, upper = np.maximum(lower, near - _FAR), np.minimum(upper, near + _FAR)
+    lower = np.maximum(lower, near - _FAR)
+    upper = np.minimum(upper, near + _FAR)
     return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)

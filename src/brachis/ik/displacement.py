@@ -80,16 +80,6 @@ class Displacement:
             translation=-apply_inverse(self.rotation, self.translation),
         )
 
-    def __getitem__(self, samples: np.ndarray) -> Displacement:
-        """Return some of the equations, repeated where their indices are."""
-        return Displacement(
-            axes=np.take(self.axes, samples, axis=2),
-            points=np.take(self.points, samples, axis=2),
-            revolute=self.revolute,
-            rotation=np.take(self.rotation, samples, axis=2),
-            translation=np.take(self.translation, samples, axis=1),
-        )
-
     def screws(self) -> tuple[Screw, ...]:
         """Screws of the joints: (3, 1, 1, 1, K), with room for three alternatives."""
         axes, points = (
@@ -99,7 +89,3 @@ class Displacement:
             Screw(axes[:, i], points[:, i], bool(turns))
             for i, turns in enumerate(self.revolute)
         )
-
-    def moved(self, position: np.ndarray) -> np.ndarray:
-        """Apply D to positions (3, K)."""
-        return apply(self.rotation, position) + self.translation

@@ -35,7 +35,7 @@ from brachis.common.arrays import cross
 from brachis.ik.arm import determinant, largest_determinant, random_postures
 from brachis.ik.by_sign import SignSolver
 from brachis.ik.polish import EXACT, Poses, polished
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import across, dot, wrap
 from brachis.robot import TaskMap
@@ -122,10 +122,8 @@ class EaikChain:
             _ask(robot, pose) for (robot, _), pose in zip(robots, poses, strict=True)
         ]
         samples = np.repeat(np.arange(len(found)), [len(joints) for joints in found])
-        joints, slack = (
-            np.concatenate(found),
-            np.array([slack for _, slack in robots])[samples],
-        )
+        joints = np.concatenate(found)
+        slack = np.array([slack for _, slack in robots])[samples]
         finite = np.isfinite(joints).all(axis=1)
         return joints[finite], samples[finite], slack[finite]
 
@@ -236,7 +234,9 @@ def _meeting(axes: np.ndarray, points: np.ndarray, tolerance: float) -> np.ndarr
         np.abs(dot(normal, np.diff(points, axis=1))) < tolerance * np.sqrt(size)
     )
     for first in range(axes.shape[1] - 1):
-        before, axis, start = axes[:, first], axes[:, first + 1], points[:, first]
+        before = axes[:, first]
+        axis = axes[:, first + 1]
+        start = points[:, first]
         gap = points[:, first + 1] - start
         along = dot(cross(gap, axis), normal[:, first]) / size[first]
         along = np.where(np.abs(along) < tolerance, 0.0, along)
@@ -261,17 +261,17 @@ class EaikSolver(SignSolver):
     Holds nothing of EAIK's own, which cannot be pickled.
     """
 
-    kind: Kind = "closed_form"
-
     def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
         rest = complement(geometry.n, redundant)
-        first, last = rest[0], rest[-1]
+        first = rest[0]
+        last = rest[-1]
         self._geometry = geometry
         self._before = [i for i in redundant if i < first]
         self._behind = [i for i in redundant if i > last]
         self._inner = slice(len(self._before), len(redundant) - len(self._behind))
         self._between = slice(first, last + 1)
-        chain, six = _part(geometry, self._between), [i - first for i in rest]
+        chain = _part(geometry, self._between)
+        six = [i - first for i in rest]
         self._held = [i - first for i in redundant[self._inner]]
         self._eaik = EaikChain(chain, self._held)
         self._tool = Poses.of_tool(geometry.held([], np.empty((1, 0))))
@@ -298,7 +298,8 @@ class EaikSolver(SignSolver):
         return joints
 
     def _solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        wanted, values = self._wanted(targets, q_r), q_r[:, self._inner]
+        wanted = self._wanted(targets, q_r)
+        values = q_r[:, self._inner]
         joints, samples, slack = self._eaik.answers(wanted.targets(), values)
         q = np.empty((len(joints), self._chain.n))
         q[:, self._held] = values[samples]
@@ -323,8 +324,10 @@ class EaikSolver(SignSolver):
         right : (R,) int ndarray
             Which postures reach their poses, and are not singular.
         """
-        posed, six = self._chain.posed(q), self._joints
-        miss, determinants = wanted.miss(posed), determinant(posed, six)
+        posed = self._chain.posed(q)
+        six = self._joints
+        miss = wanted.miss(posed)
+        determinants = determinant(posed, six)
         near = np.flatnonzero((miss > EXACT) & (miss < slack))
         joints = polished(self._chain, six, q[near], wanted[near])
         converged = np.isfinite(joints[:, 0])
@@ -339,7 +342,9 @@ class EaikSolver(SignSolver):
 
     def _wanted(self, targets: np.ndarray, q_r: np.ndarray) -> Poses:
         """Targets of the chain in between, G_1^-1 T (G_2 M)^-1 M; `held` returns G M."""
-        wanted, geometry, inner = Poses.of_targets(targets), self._geometry, self._inner
+        wanted = Poses.of_targets(targets)
+        geometry = self._geometry
+        inner = self._inner
         if self._before:
             placed = Poses.of_tool(geometry.held(self._before, q_r[:, : inner.start]))
             wanted = self._tool @ placed.inverse() @ wanted

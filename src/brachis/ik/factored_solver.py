@@ -39,7 +39,7 @@ from brachis.ik.arm import (
     perpendicular,
     random_postures,
 )
-from brachis.ik.protocol import IKSolver, Kind, NotApplicableError
+from brachis.ik.protocol import IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews
 from brachis.ik.vectors import wrap
 
@@ -234,7 +234,8 @@ def on_cylinder(joints: RemainingJoints) -> bool:
     )
 
 
-_FRONT, _UP = ("front", "back"), ("up", "down")
+_FRONT = ("front", "back")
+_UP = ("up", "down")
 _OUT = "does not move {point} out of the plane in which"
 _AWAY = "does not change the distance between {point} and the point where the axes of"
 
@@ -346,7 +347,8 @@ def recipe_for(joints: RemainingJoints, point: str) -> tuple[Recipe, Anchor | No
 
 def _relation(joints: RemainingJoints, i: int, j: int) -> str:
     """How two neighbours lie to each other."""
-    first, second = joints.names[i], joints.names[j]
+    first = joints.names[i]
+    second = joints.names[j]
     if joints.revolute[i] and joints.revolute[j]:
         if aligned(joints, i, j):
             return f"the axes of {first} and {second} are parallel"
@@ -425,8 +427,6 @@ class FactoredSolver(IKSolver, Generic[S]):
     structure : Structure
     """
 
-    kind: Kind = "closed_form"
-
     def __init__(
         self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: S
     ) -> None:
@@ -475,7 +475,8 @@ def fitted(geometry: ChainGeometry, joints: J, fits: Sequence[Callable[[J], S]])
     NotApplicableError
         J_nr is singular everywhere, or no structure fits; says why.
     """
-    structure, reasons = None, []
+    structure = None
+    reasons = []
     for fit in fits:
         try:
             structure = fit(joints)

@@ -78,7 +78,8 @@ def idealised(
         None where the chain is ideal as it is.
     """
     chain = _Chain([] if isinstance(task_map, Pose) else list(np.eye(3)), tolerance)
-    axes, points = np.empty_like(geometry.axes), np.zeros_like(geometry.points)
+    axes = np.empty_like(geometry.axes)
+    points = np.zeros_like(geometry.points)
     for i, revolute in enumerate(geometry.revolute):
         axes[i] = chain.direction(
             geometry.axes[i], geometry.points[i], revolute=revolute
@@ -110,7 +111,8 @@ class _Chain:
     """
 
     def __init__(self, fixed: list[np.ndarray], tolerance: float) -> None:
-        self.rotation, self.offset = np.eye(3), np.zeros(3)
+        self.rotation = np.eye(3)
+        self.offset = np.zeros(3)
         self.turned = self.shifted = 0.0
         self._tolerance = tolerance
         self._fixed = fixed
@@ -146,8 +148,11 @@ class _Chain:
                 before = self._point
             if parallel or np.linalg.norm(np.cross(self._axis, axis)) > _SKEW:
                 self._shift(before - here)
-                here, meets = before, self._meets or not parallel
-        self._axis, self._point, self._meets = axis, here, meets
+                here = before
+                meets = self._meets or not parallel
+        self._axis = axis
+        self._point = here
+        self._meets = meets
         return here
 
     def place_tool(self, position: np.ndarray) -> None:
@@ -224,11 +229,8 @@ class Polished(IKSolver):
         task_map: TaskMap,
         redundant: tuple[int, ...],
     ) -> None:
-        self.branches, self.alternatives, self.kind = (
-            solver.branches,
-            solver.alternatives,
-            solver.kind,
-        )
+        self.branches = solver.branches
+        self.alternatives = solver.alternatives
         self._solver = solver
         self._geometry = geometry
         self._task_map = task_map

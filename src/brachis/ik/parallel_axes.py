@@ -201,7 +201,8 @@ def _arrangements(six: PoseJoints) -> list[ParallelStructure]:
     """All ways to see the structure in one order of the joints."""
     structures = []
     for first, one_after in _LAST_FIRST.items():
-        before, after = range(first), range(one_after, 6)
+        before = range(first)
+        after = range(one_after, 6)
         turns = [place for place in before if six.revolute[place]]
         slides = [place for place in before if not six.revolute[place]]
         if (
@@ -213,7 +214,8 @@ def _arrangements(six: PoseJoints) -> list[ParallelStructure]:
             continue
         if first == 2 and len(turns) != 1:
             continue
-        turn, slide = turns[0] if turns else None, slides[0] if slides else None
+        turn = turns[0] if turns else None
+        slide = slides[0] if slides else None
         structures.append(ParallelStructure(six, first, turn, slide))
     return structures
 
@@ -233,14 +235,14 @@ class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
         equation = Displacement.of(
             self._geometry, self._redundant, targets, q_r, mirrored=mirrored
         )
-        arm, rotation = (
-            structure.arm(equation.screws()),
-            equation.rotation[:, :, None, None, None],
-        )
+        arm = structure.arm(equation.screws())
+        rotation = equation.rotation[:, :, None, None, None]
         place = apply(rotation, arm.centre) + equation.translation[:, None, None, None]
         values, angle, image = self._outer(arm, rotation, place)
         a, b, c, d = (arm.screws[i] for i in (structure.turn or 0, *structure.parallel))
-        place, n, slide = a.inverse.orbit(place).at(angle), b.axis, structure.slide
+        place = a.inverse.orbit(place).at(angle)
+        n = b.axis
+        slide = structure.slide
         theta = angle_about(
             n, arm.screws[structure.first + 3].axis, rotate(a.axis, -angle, image)
         )
@@ -264,13 +266,14 @@ class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
         self, arm: Arm, rotation: np.ndarray, place: np.ndarray
     ) -> tuple[dict[int, np.ndarray], np.ndarray, np.ndarray]:
         """Solve for the turning joints beside the parallel ones; return them, the angle of a, and R_D R_post^T e."""
-        structure, angle = self._structure, np.zeros(1)
-        n, turn, wrist = (
-            arm.screws[structure.first].axis,
-            structure.turn,
-            structure.elbow + 1,
-        )
-        a, e, f = arm.screws[turn or 0], arm.screws[4], arm.screws[5]
+        structure = self._structure
+        angle = np.zeros(1)
+        n = arm.screws[structure.first].axis
+        turn = structure.turn
+        wrist = structure.elbow + 1
+        a = arm.screws[turn or 0]
+        e = arm.screws[4]
+        f = arm.screws[5]
         if structure.first == 1:
             if turn is not None:
                 angle = a.inverse.orbit(place).component(
@@ -285,7 +288,8 @@ class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
                 -apply_inverse(rotation, a.axis), -dot(a.axis, n), wrist
             )
             angle = angle_about(a.axis, n, apply(rotation, rotate(f.axis, -last, n)))
-            values, image = {5: last}, f.axis
+            values = {5: last}
+            image = f.axis
         if turn is not None:
             values[turn] = angle
         return values, angle, apply(rotation, image)

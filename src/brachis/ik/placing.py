@@ -32,7 +32,9 @@ from brachis.ik.arm import Arm
 from brachis.ik.screws import Screw
 from brachis.ik.vectors import across, angle_about, dot
 
-FRONT, UP, FLIP = 0, 1, 2
+FRONT = 0
+UP = 1
+FLIP = 2
 """Slots of the two steps of a recipe, and of the wrist's."""
 
 Values = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -81,7 +83,8 @@ def within_first_factor(arm: Arm) -> np.ndarray:
 def meeting_of_first(arm: Arm, target: np.ndarray) -> Values:
     """Solve for c by the distance from the point where a and b meet."""
     a, b, c = arm.base
-    outer, away = c.orbit(arm.centre), target - arm.meeting
+    outer = c.orbit(arm.centre)
+    away = target - arm.meeting
     third = outer.distance(arm.meeting, dot(away, away), UP)
     inner = b.orbit(outer.at(third))
     second = inner.component(a.axis, dot(a.axis, target), FRONT)
@@ -101,9 +104,11 @@ def along_first_factor(arm: Arm) -> np.ndarray:
 def meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
     """Solve for a by the distance from the point where b and c meet."""
     a, b, c = arm.base
-    outer, away = a.inverse.orbit(target), arm.centre - arm.meeting
+    outer = a.inverse.orbit(target)
+    away = arm.centre - arm.meeting
     first = outer.distance(arm.meeting, dot(away, away), UP)
-    end, inner = outer.at(first), c.orbit(arm.centre)
+    end = outer.at(first)
+    inner = c.orbit(arm.centre)
     third = inner.component(b.axis, dot(b.axis, end), FRONT)
     return (
         first,
@@ -125,8 +130,10 @@ def along_second_factor(arm: Arm) -> np.ndarray:
 def cylinder(arm: Arm, target: np.ndarray) -> Values:
     """Solve for the centre's place in front of, or behind, the common direction of a and b; then for c."""
     a, b, c = arm.base
-    front, away = cross(b.axis, c.axis), target - b.point
-    radius, side = across(b.axis, away), dot(c.axis, arm.centre - b.point)
+    front = cross(b.axis, c.axis)
+    away = target - b.point
+    radius = across(b.axis, away)
+    side = dot(c.axis, arm.centre - b.point)
     reach = np.sqrt(dot(radius, radius) - side * side)
     orbit = c.orbit(arm.centre)
     third = orbit.component(
@@ -164,14 +171,17 @@ def within_plane(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Two joints that bring `start` to `end` within the plane in which both move."""
     if first.revolute:
-        orbit, away = second.orbit(start), end - first.point
+        orbit = second.orbit(start)
+        away = end - first.point
         inner = orbit.distance(first.point, dot(away, away), slot)
         return angle_about(first.axis, orbit.at(inner) - first.point, away), inner
     if second.revolute:
-        orbit, away = first.inverse.orbit(end), start - second.point
+        orbit = first.inverse.orbit(end)
+        away = start - second.point
         outer = orbit.distance(second.point, dot(away, away), slot)
         return outer, angle_about(second.axis, away, orbit.at(outer) - second.point)
-    normal, way = cross(first.axis, second.axis), end - start
+    normal = cross(first.axis, second.axis)
+    way = end - start
     size = dot(normal, normal)
     return dot(cross(way, second.axis), normal) / size, dot(
         cross(first.axis, way), normal

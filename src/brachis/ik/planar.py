@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import wrap
 from brachis.robot import TaskMap
@@ -151,17 +151,17 @@ class PlanarChain:
         turns: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         for i in range(len(self.revolute) - 1, -1, -1):
             if self.revolute[i]:
-                cos, sin = np.cos(q[:, i]), self.sigma[i] * np.sin(q[:, i])
-                dx, dy = x - self.centre[i].real, y - self.centre[i].imag
+                cos = np.cos(q[:, i])
+                sin = self.sigma[i] * np.sin(q[:, i])
+                dx = x - self.centre[i].real
+                dy = y - self.centre[i].imag
                 x = self.centre[i].real + cos * dx - sin * dy
                 y = self.centre[i].imag + sin * dx + cos * dy
                 levers[i] = (self.centre[i].imag - y, x - self.centre[i].real)
                 turns[i] = (cos, sin)
             else:
-                x, y = (
-                    x + self.slide[i].real * q[:, i],
-                    y + self.slide[i].imag * q[:, i],
-                )
+                x = x + self.slide[i].real * q[:, i]
+                y = y + self.slide[i].imag * q[:, i]
                 levers[i] = (
                     np.full_like(angle, self.slide[i].real),
                     np.full_like(angle, self.slide[i].imag),
@@ -240,8 +240,6 @@ _LABELS = {
 class PlanarSolver(IKSolver):
     """Closed form of a planar chain; see the module's formulas."""
 
-    kind: Kind = "closed_form"
-
     def __init__(
         self, chain: PlanarChain, redundant: tuple[int, ...], *, yaw: bool
     ) -> None:
@@ -314,7 +312,8 @@ class PlanarSolver(IKSolver):
 
     def _single(self, targets: np.ndarray, known: np.ndarray) -> np.ndarray:
         """One joint for one position row: row = Re(conj(nu) z)."""
-        chain, joint = self._chain, self._pair[0]
+        chain = self._chain
+        joint = self._pair[0]
         nu = chain.to_plane[0, 0] + 1j * chain.to_plane[0, 1]
         alpha, beta = chain.compose(range(joint), known)
         after_alpha, after_beta = chain.compose(range(joint + 1, self._n), known)
@@ -391,7 +390,8 @@ class PlanarSolver(IKSolver):
         self, h: np.ndarray, u: np.ndarray, lever: np.ndarray, turning: int
     ) -> np.ndarray:
         """Solve h = u t + exp(i theta) lever, u of unit length; answers (t, theta)."""
-        across, along = (np.conj(u) * h).imag, (np.conj(u) * h).real
+        across = (np.conj(u) * h).imag
+        along = (np.conj(u) * h).real
         root = np.sqrt(np.abs(lever) ** 2 - across**2)
         slide = along[:, None] + np.stack([root, -root], axis=1)
         angle = np.angle((h[:, None] - u[:, None] * slide) / lever[:, None])
@@ -399,7 +399,8 @@ class PlanarSolver(IKSolver):
 
     def _with_yaw(self, targets: np.ndarray, known: np.ndarray) -> np.ndarray:
         """Three joints for a point and an angle: (K, 2, 3)."""
-        chain, last = self._chain, self._last
+        chain = self._chain
+        last = self._last
         turned = targets[:, 2] - chain.yaw
         after_last = chain.compose(range(last + 1, self._n), known)
         world = np.exp(1j * turned) / after_last[0]
@@ -436,7 +437,8 @@ class PlanarSolver(IKSolver):
         directions: list[np.ndarray],
     ) -> np.ndarray:
         """Two joints of which one or both are slides after the last revolute joint, along known world directions."""
-        chain, last = self._chain, self._last
+        chain = self._chain
+        last = self._last
         if not early:
             alpha, beta = chain.compose(range(last), known)
             return _lines(

@@ -172,7 +172,8 @@ def polished(
     (N, m) ndarray
         Positions of these joints, NaN where the method does not converge to an answer beside the given posture.
     """
-    q, columns = q.copy(), list(joints)
+    q = q.copy()
+    columns = list(joints)
     answers = np.full((len(q), len(columns)), np.nan)
     left = np.arange(len(q))
     for _ in range(_ROUNDS):
@@ -181,7 +182,9 @@ def polished(
         converged, shrinking = _round(chain, columns, q, goal)
         answers[left[converged]] = q[converged][:, columns]
         again = np.flatnonzero(shrinking & ~converged)
-        left, q, goal = left[again], q[again], goal[again]
+        left = left[again]
+        q = q[again]
+        goal = goal[again]
     return answers
 
 
@@ -192,7 +195,8 @@ def _round(
     posed = chain.posed(q)
     size = 1.0 + np.abs(q).max(axis=1)
     inverse = _inverses(np.moveaxis(goal.rows(posed.jacobian_columns(columns)), 2, 0))
-    gaps, steps = [], []
+    gaps = []
+    steps = []
     for again in (False, True):
         gap = goal.gap(chain.posed(q) if again else posed)
         step = (inverse @ gap[:, :, None])[:, :, 0]

@@ -101,10 +101,8 @@ class PositioningSolver(FactoredSolver[ToolStructure]):
         """See `FactoredSolver.steps`."""
         structure = self._structure
         posed = self._geometry.held(self._redundant, q_r)
-        tool, target = (
-            posed.tool_position[:, None, None],
-            targets.T[self._order, None, None],
-        )
+        tool = posed.tool_position[:, None, None]
+        target = targets.T[self._order, None, None]
         start, end = (target, tool) if structure.joints.mirrored else (tool, target)
         arm = structure.arm(structure.joints.screws(posed, alternatives=2), start)
         return arm, structure.recipe.solve(arm, end)

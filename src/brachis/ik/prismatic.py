@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
@@ -19,8 +19,6 @@ _SAMPLES = 64
 
 class PrismaticSolver(IKSolver):
     """Linear solver for prismatic non-redundant joints; see the module's formula."""
-
-    kind: Kind = "closed_form"
 
     def __init__(
         self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]

@@ -5,14 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from brachis.ik.screws import ChainGeometry
 from brachis.robot import TaskMap
-
-Kind = Literal["closed_form", "polynomial"]
 
 
 class IKSolver(ABC):
@@ -26,13 +23,10 @@ class IKSolver(ABC):
     alternatives : int
         How many answers a branch may have, A: those that no geometric choice tells apart. Along a curve they are told
         apart by continuity alone. One, unless a family says otherwise.
-    kind : str
-        ``closed_form``, or ``polynomial`` where the roots of a polynomial are found numerically.
     """
 
     branches: tuple[str, ...]
     alternatives: int = 1
-    kind: Kind
 
     @abstractmethod
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:

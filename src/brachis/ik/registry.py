@@ -28,7 +28,6 @@ from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.idealised import TOLERANCE, Ideal, Polished, idealised
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar
-from brachis.ik.polynomial import polynomial
 from brachis.ik.positioning import positioning
 from brachis.ik.prismatic import prismatic
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError
@@ -45,7 +44,6 @@ BUILTIN: tuple[Family, ...] = (
     spherical_wrist,
     parallel_axes,
     eaik,
-    polynomial,
 )
 
 _NEAR = 2e-3

@@ -154,7 +154,8 @@ class PosedScrews:
     def jacobian_columns(self, joints: Sequence[int]) -> np.ndarray:
         """Columns (6, len(joints), K) of the tool's Jacobian: linear, then angular velocity, in world axes."""
         chosen = list(joints)
-        axes, turns = self.axes[:, chosen], self.revolute[chosen][:, None]
+        axes = self.axes[:, chosen]
+        turns = self.revolute[chosen][:, None]
         lever = self.tool_position[:, None] - self.points[:, chosen]
         return np.concatenate(
             [np.where(turns, cross(axes, lever), axes), np.where(turns, axes, 0.0)]
@@ -193,7 +194,8 @@ class ChainGeometry:
         zero = np.zeros(robot.n)
         data = robot.model.createData()
         columns = pin.computeJointJacobians(robot.model, data, zero).reshape(6, robot.n)
-        linear, angular = columns[:3].T, columns[3:].T
+        linear = columns[:3].T
+        angular = columns[3:].T
         revolute = np.linalg.norm(angular, axis=1) > 0.5
         placement = robot.tool_placement(zero)
         return cls(
@@ -252,10 +254,8 @@ class ChainGeometry:
         """Move joints one after the other; q is (n, K), and `moving` says which of them move at all."""
         count = q.shape[1]
         axes, points = (np.empty((3, self.n, count), dtype=q.dtype) for _ in range(2))
-        rotation, offset = (
-            np.eye(3, dtype=q.dtype)[:, :, None],
-            np.zeros((3, 1), dtype=q.dtype),
-        )
+        rotation = np.eye(3, dtype=q.dtype)[:, :, None]
+        offset = np.zeros((3, 1), dtype=q.dtype)
         placed = 0
         for i in np.flatnonzero(moving).tolist():
             here = slice(placed, i + 1)

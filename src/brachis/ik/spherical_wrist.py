@@ -141,10 +141,8 @@ class SphericalWristSolver(FactoredSolver[WristStructure]):
         equation = Displacement.of(
             self._geometry, self._redundant, targets, q_r, mirrored=mirrored
         )
-        rotation, translation = (
-            equation.rotation[:, :, None, None, None],
-            equation.translation[:, None, None, None],
-        )
+        rotation = equation.rotation[:, :, None, None, None]
+        translation = equation.translation[:, None, None, None]
         arm = self._structure.arm(equation.screws())
         base = self._structure.recipe.solve(
             arm, apply(rotation, arm.centre) + translation
@@ -171,7 +169,8 @@ def _wrist(
     start = apply_inverse(rotation, start)
     orbit = Circle.of(v.axis, w.axis)
     bend = orbit.component(-u.axis, -dot(u.axis, end), FLIP)
-    cos, sin = np.cos(bend), np.sin(bend)
+    cos = np.cos(bend)
+    sin = np.sin(bend)
     first = angle_about(u.axis, orbit.turned(cos, sin), end)
     last = angle_about(w.axis, start, Circle.of(v.axis, u.axis).turned(cos, -sin))
     return first, bend, last

@@ -26,7 +26,8 @@ def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Turn a vector about a unit axis (Rodrigues' formula), shape (3, ...)."""
-    cos, sin = np.cos(angle), np.sin(angle)
+    cos = np.cos(angle)
+    sin = np.sin(angle)
     return (
         vector * cos
         + cross(axis, vector) * sin
@@ -53,7 +54,8 @@ def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndar
 
     These parts are taken off first: what is left may be small, and its direction is all that matters.
     """
-    start, end = across(axis, start), across(axis, end)
+    start = across(axis, start)
+    end = across(axis, end)
     return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
 
 
@@ -72,19 +74,6 @@ def cosine_roots(
         half = np.arccos(c / np.sqrt(a * a + b * b))
     middle = np.arctan2(b, a)
     return middle - half, middle + half
-
-
-def perpendiculars(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors that make a right-handed frame with a unit axis: ``first x second = axis``, each (3, ...).
-
-    T. Duff et al., "Building an orthonormal basis, revisited", Journal of Computer Graphics Techniques 6(1), 2017.
-    """
-    x, y, z = axis
-    sign = np.copysign(1.0, z)
-    scale = -1.0 / (sign + z)
-    mixed = x * y * scale
-    first = np.stack([1.0 + sign * x * x * scale, sign * mixed, -sign * x])
-    return first, np.stack([mixed, sign + y * y * scale, -y])
 
 
 def meeting_point(

@@ -189,9 +189,8 @@ def decompositions_of(
     Returns
     -------
     list of Decomposition
-        With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first, and closed
-        forms before polynomials; none where the robot has no closed form, or the path is one of joints. At least one
-        if the task names the joints.
+        With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first; none where
+        the robot has no closed form, or the path is one of joints. At least one if the task names the joints.
 
     Raises
     ------
@@ -241,13 +240,7 @@ def decompositions_of(
         raise refusals[0]
     if not allowed:
         check_regular(task_map, problem.start, problem.end)
-    return sorted(
-        allowed,
-        key=lambda decomposition: (
-            decomposition.match.solver.kind != "closed_form",
-            -decomposition.clearance,
-        ),
-    )
+    return sorted(allowed, key=lambda decomposition: -decomposition.clearance)
 
 
 def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:

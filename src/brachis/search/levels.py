@@ -14,8 +14,6 @@ class SearchLevel:
     ----------
     decompositions : int
         Decompositions that are looked at; those farthest from singularity at the start come first.
-    polynomial : bool
-        Whether decompositions whose inverse kinematics is a polynomial's roots are looked at beside closed forms.
     joint_paths : int
         Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
     numeric : int
@@ -35,7 +33,6 @@ class SearchLevel:
     """
 
     decompositions: int
-    polynomial: bool
     joint_paths: int
     numeric: int
     in_charts: int
@@ -50,7 +47,6 @@ class SearchLevel:
 _LEVELS = {
     "single": SearchLevel(
         1,
-        polynomial=False,
         joint_paths=1,
         numeric=0,
         in_charts=1,
@@ -61,7 +57,6 @@ _LEVELS = {
     ),
     "fast": SearchLevel(
         6,
-        polynomial=False,
         joint_paths=4,
         numeric=0,
         in_charts=4,
@@ -72,7 +67,6 @@ _LEVELS = {
     ),
     "thorough": SearchLevel(
         20,
-        polynomial=True,
         joint_paths=8,
         numeric=8,
         in_charts=8,
@@ -84,7 +78,6 @@ _LEVELS = {
     ),
     "exhaustive": SearchLevel(
         10_000,
-        polynomial=True,
         joint_paths=30,
         numeric=8,
         in_charts=12,

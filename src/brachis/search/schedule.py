@@ -28,7 +28,6 @@ from brachis.search.starts import joint_space_start, lattice_starts, numeric_sta
 from brachis.search.too_fast import refuse_hopeless_speeds
 
 _SIZE = 12
-_NEAR_SINGULAR = 0.1
 _LATTICE_SHARE = 0.4
 """Part of the time that is left in which the starts of a level are looked for; those found by then are planned."""
 Note = Callable[[Decomposition | None, DeadEnd | None], None]
@@ -121,9 +120,8 @@ def _in_closed_forms(
             yield Batch(
                 (), 0, last_resort=True
             )  # the search may end here, before lattices are looked at
-        allowed = looked_at(decompositions, level)
         starts: list[Start] = []
-        rest = allowed or list(decompositions)
+        rest = list(decompositions)
         while (
             rest and not starts
         ):  # decompositions without a joint path make room for others
@@ -158,7 +156,7 @@ def _in_closed_forms(
         start.with_solver(solver) for start in known[:_SIZE] for solver in solvers[1:2]
     )
     yield Batch(again, many, last_resort=True)
-    for decomposition in (allowed or decompositions)[: level.decompositions]:
+    for decomposition in decompositions[: level.decompositions]:
         for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
             if (start.joint_map.redundant_joints, start.origin) not in tried:
                 yield Batch(
@@ -220,28 +218,6 @@ def _in_charts(
             len(known),
             last_resort=True,
         )
-
-
-def looked_at(
-    decompositions: Sequence[Decomposition], level: SearchLevel
-) -> list[Decomposition]:
-    """Return the decompositions of a level: closed forms; polynomials where asked for, or where all are near-singular.
-
-    That is where the given start, or else end, posture is near the branch boundary of every closed form.
-    """
-    closed = [
-        decomposition
-        for decomposition in decompositions
-        if decomposition.match.solver.kind == "closed_form"
-    ]
-    problem = decompositions[0].problem
-    given = problem.start is not None or problem.end is not None
-    near_singular = (
-        given
-        and max((decomposition.clearance for decomposition in closed), default=0.0)
-        < _NEAR_SINGULAR
-    )
-    return list(decompositions) if level.polynomial or near_singular else closed
 
 
 def _from_lattices(

@@ -32,7 +32,6 @@ METRE = 1.0
 class PolarSolver(IKSolver):
     """Turn, tilt and reach for batches of targets; see the module's formulas."""
 
-    kind = "closed_form"
     branches = ("forwards", "backwards")
 
     def __init__(self, geometry: ChainGeometry) -> None:

@@ -357,7 +357,6 @@ def _decompositions(candidates: Sequence[ik.Candidate]) -> list[dict[str, Any]]:
             {
                 "redundant joints": ", ".join(candidate.redundant_joints) or "none",
                 "solver": candidate.family or "-",
-                "kind": solver.kind if solver else "-",
                 "branches": len(solver.branches) if solver else 0,
                 "labels": _labels(solver) if solver else "",
                 "why not": "" if solver else why,
@@ -379,7 +378,6 @@ def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:
     columns = [
         "redundant joints",
         "solver",
-        "kind",
         "branches",
         *(["remark"] if any(r["remark"] for r in solved) else []),
     ]
