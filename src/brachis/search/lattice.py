@@ -291,9 +291,10 @@ class Lattice(ABC):
         if not len(layer.q):
             return {NO_ANSWER: 1}
         inside = self._inside(layer.q, layer.q)
-        if not inside.all(axis=1).any():
+        within = np.flatnonzero(inside.all(axis=1))
+        if not len(within):
             return beyond_ranges(self._robot, inside)
-        return self._keep(layer[inside.all(axis=1)], self._choose_starts)
+        return self._keep(layer[within], self._choose_starts)
 
     def _next(
         self, before: Layer, station: int, rng: np.random.Generator
