@@ -556,7 +556,8 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
     if not task_map.axes:  # of joints
         return
     s = np.linspace(0.0, 1.0, _STATIONS)
-    robot, axes = task_map.robot, list(task_map.axes)
+    robot = task_map.robot
+    axes = list(task_map.axes)
     base = np.array(robot.model.jointPlacements[1].translation)[axes]
     away = np.linalg.norm(path.sample(s).target[:, : len(axes)] - base, axis=1)
     far = reach(robot)

@@ -226,7 +226,8 @@ def solved_in_chart(
     reports : tuple of SolverReport
         Of all solves; the last one belongs to `program`.
     """
-    first, further = MARGINS[:1], MARGINS[1:]
+    first = MARGINS[:1]
+    further = MARGINS[1:]
     program, reports = continued(program, x, solve, first)
     if not reports[-1].status.usable and reports[-1].status not in _OUT_OF_TIME:
         program, more = continued(program, x, solve, further)
@@ -242,7 +243,8 @@ def solved_in_chart(
             reports = (*more, *reports)
             break
         gained = more[-1].objective < (1.0 - WORTH_IT) * reports[-1].objective
-        program, reports = other, reports + more
+        program = other
+        reports = reports + more
         if not gained:
             break
     if (
@@ -276,7 +278,8 @@ def best_of_joints(
     reports : tuple of SolverReport
         Of the further solves, then `report` if it belongs to `program`, else the one that does.
     """
-    best, last = program, report
+    best = program
+    last = report
     others: list[SolverReport] = []
     for rows in _selections(program, report.x):
         moved = moved_to(problem, program, report.x, rows)
@@ -285,7 +288,8 @@ def best_of_joints(
         other, reports = continued(*moved, solve, MARGINS)
         others += reports
         if reports[-1].status.usable and reports[-1].objective < last.objective:
-            best, last = other, reports[-1]
+            best = other
+            last = reports[-1]
     return best, (*(each for each in others if each is not last), last)
 
 
@@ -336,7 +340,8 @@ def _follows(program: Program, x: np.ndarray) -> bool:
     """Tell whether the chart still does for the motion."""
     try:
         (phase,), null = program.phases, _self_motion(program, x)
-        chart, s = phase.joint_map, program.states(x)[0].y[:, 0]
+        chart = phase.joint_map
+        s = program.states(x)[0].y[:, 0]
         assert isinstance(chart, ChartMap)
         own = transversality(chart.rows.at(s)[0], null).min()
         return program.safeguard_slack(x) > HELD_BACK and bool(own >= _TRANSVERSAL)
