@@ -135,7 +135,8 @@ def _beyond_range(
     robot: Robot, postures: np.ndarray, tolerance: float
 ) -> tuple[int, str, dict[str, Any]] | None:
     """Find the first joint that is out of its range in postures, (K, n): where most, its name, and what is told."""
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
+    lower = robot.limits.position_lower
+    upper = robot.limits.position_upper
     beyond = np.maximum(
         lower - postures, postures - upper
     ) - tolerance * position_measure(lower, upper)
@@ -144,12 +145,10 @@ def _beyond_range(
         return None
     i = int(joints[0])
     k = int(np.argmax(beyond[:, i]))
-    value, unit, low, high = (
-        float(postures[k, i]),
-        robot.position_units[i],
-        float(lower[i]),
-        float(upper[i]),
-    )
+    value = float(postures[k, i])
+    unit = robot.position_units[i]
+    low = float(lower[i])
+    high = float(upper[i])
     found, first, last = write_apart(value, low, high, digits=6)
     facts: dict[str, Any] = {
         "found": f"{found} {unit}",
@@ -363,7 +362,8 @@ def check_end_branch(
 
 def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
     """Index of the branch in whose inside a posture lies."""
-    robot, solver = task_map.robot, match.solver
+    robot = task_map.robot
+    solver = match.solver
     redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
     rest = complement(robot.n, redundant)
     target = task_map.value(posture)

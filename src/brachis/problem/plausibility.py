@@ -1,8 +1,7 @@
-"""What a task asks for: places, limits of the tool, points, end time.
+"""Implausible figures of a task or a robot: unusually large ones look like another unit.
 
-The robot: limits, friction, lengths, masses, payload.
-
-Limits of the joints beside what the URDF says of the robot: its limits, its ranges, its weight.
+`USUAL` is the table of the largest usual figures; `RULES` are those of joint limits, which
+are also compared with the URDF's and with the arm's weight.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -30,17 +29,76 @@ if TYPE_CHECKING:
     from brachis.path import Path
 
 _TURN = 2.0 * math.pi
-_WINDING = 5.0
-"""Turns of a joint without a range that a path of joints may ask for: in degrees, 30 are nearly as many."""
-_ROUNDED = 1e-3
 _STATIONS = 401
 _THOUSAND = 1000.0
-_HARDLY = 3.0
-"""A path that is so much farther away than the robot reaches is not a path that is a little too long."""
-_EIGHTHS, _ROUNDING = 16, 2e-3
-"""Angles in rad up to two turns are looked for, within so many rad: 3.14 is half a turn, 5.5 is not seven eighths."""
-_OPEN = 1e5
-"""A limit beyond this is written for "no limit"."""
+_OR_NULL = ", or null for no limit"
+_OF_SIZE = " for an arm of this size"
+_OF_MASS = " for this mass"
+
+
+@dataclass(frozen=True)
+class UsualFigure:
+    """What is usual of one figure.
+
+    Attributes
+    ----------
+    message : str
+        What a larger figure looks like.
+    largest : float
+        Largest usual figure in `unit`, or its ratio to the robot's own measure.
+    unit : str
+    aside : str
+        What is said behind what is usual.
+    """
+
+    message: str
+    largest: float
+    unit: str
+    aside: str = ""
+
+    def at(self, where: str, value: float, scale: float = 1.0) -> Figure:
+        """Compare a value with `scale` times the largest one."""
+        usual = self.largest * scale
+        return Figure(where, self.message, value, usual, self.unit, self.aside)
+
+
+USUAL = {
+    # Delta robots move at 10 m/s, and accelerate with 15 g.
+    "tool_limits.speed": UsualFigure(
+        "the limit looks like mm/s", 50.0, "m/s", _OR_NULL
+    ),
+    "tool_limits.process_speed": UsualFigure(
+        "the limit looks like mm/s", 50.0, "m/s", _OR_NULL
+    ),
+    "tool_limits.acceleration": UsualFigure(
+        "the limit looks like mm/s^2", 300.0, "m/s^2", _OR_NULL
+    ),
+    "tool_limits.angular_speed": UsualFigure(
+        "the limit looks like degrees per second", 60.0, "rad/s", _OR_NULL
+    ),
+    "path_start": UsualFigure("yaw looks like degrees", 1.0, "rad"),  # turns
+    "path": UsualFigure("the turn of yaw looks like degrees", 2.0, "rad"),  # turns
+    "link": UsualFigure("the distance from the joint before looks like mm", 20.0, "m"),
+    "robot.tool_offset.xyz": UsualFigure(  # times the arm's length
+        "the distance looks like mm", 2.0, "m", _OF_SIZE
+    ),
+    "robot.mounting.xyz": UsualFigure("the distance looks like mm", 200.0, "m"),
+    "robot.gravity": UsualFigure("the acceleration looks like mm/s^2", 100.0, "m/s^2"),
+    # The strongest arms of 1 m reach carry 130 kg, and more with the square of the reach.
+    "robot.payload.mass": UsualFigure("the mass looks like g", 150.0, "kg", _OF_SIZE),
+    "robot.payload.com": UsualFigure(  # times the arm's length
+        "the distance from the tool frame looks like mm", 1.0, "m", _OF_SIZE
+    ),
+    "robot.payload.inertia": UsualFigure(  # times mass and length squared
+        "the inertia looks like kg mm^2", 1.0, "kg m^2", _OF_MASS
+    ),
+    # A body of the heaviest arms weighs 150 kg for each square metre of their reach.
+    "body mass": UsualFigure("the mass looks like g", 1e3, "kg", _OF_SIZE),
+    "body inertia": UsualFigure(  # times the mass: bodies 10 m wide
+        "the inertia looks like kg mm^2", 100.0, "kg m^2", _OF_MASS
+    ),
+}
+"""The largest usual figures, by the key of the task or the part of the robot."""
 
 
 def of_task(task: Task) -> tuple[Remark, ...]:
@@ -101,30 +159,24 @@ def _places(
         )
         for name, turns, values, within in columns:
             if turns:
-                most = 2.0 if within else (1.0 if along is None else _WINDING)
-                usual, value = most * _TURN, float(values[np.argmax(np.abs(values))])
-                looks, shown = "the position looks like degrees", f"{value:.6g}"
-                aside = f"; {shown} degrees are {math.radians(value):.6g} rad"
+                # Along a path a joint without a range may wind up five times.
+                turns_allowed = 2.0 if within else (1.0 if along is None else 5.0)
+                value = float(values[np.argmax(np.abs(values))])
+                shown = f"{value:.6g}"
                 yield Figure(
                     f"{key}.{name}",
-                    looks,
+                    "the position looks like degrees",
                     abs(value),
-                    usual + _ROUNDED,
+                    turns_allowed * _TURN + 1e-3,
                     "rad",
-                    aside,
+                    f"; {shown} degrees are {math.radians(value):.6g} rad",
                     shown,
                 )
     if YAW in task_map.rows:
         yaw = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target[:, -1]
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
-        yield Figure("path_start", "yaw looks like degrees", begins, _TURN, "rad")
-        yield Figure(
-            "path",
-            "the turn of yaw looks like degrees",
-            float(np.ptp(yaw)),
-            2.0 * _TURN,
-            "rad",
-        )
+        yield USUAL["path_start"].at("path_start", begins, _TURN)
+        yield USUAL["path"].at("path", float(np.ptp(yaw)), _TURN)
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
@@ -144,46 +196,32 @@ def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
 
 def _tool(task: Task) -> Iterator[Figure]:
     """Look at the largest of every kind of limit; feed rates have units of their own."""
-    limits, ends = task.tool_limits, task.boundary
-    meant_at_ends = "degrees per second" if task.task_space == "joints" else "mm/s"
-    speeds = (
-        limits.speed.speed if isinstance(limits.speed, SpeedTable) else [limits.speed]
-    )
-    processes = [part.speed for part in limits.process_speed]
-    # Delta robots move at 10 m/s, and accelerate with 15 g.
-    for where, values, most, unit, meant in (
-        ("tool_limits.speed", speeds, 50.0, "m/s", "mm/s"),
-        ("tool_limits.process_speed", processes, 50.0, "m/s", "mm/s"),
-        ("tool_limits.acceleration", [limits.acceleration], 300.0, "m/s^2", "mm/s^2"),
-        (
-            "tool_limits.angular_speed",
-            [limits.angular_speed],
-            60.0,
-            "rad/s",
-            "degrees per second",
-        ),
-        (
-            "boundary.start_speed",
-            [ends.start_speed],
-            50.0,
-            task.speed_unit,
-            meant_at_ends,
-        ),
-        ("boundary.end_speed", [ends.end_speed], 50.0, task.speed_unit, meant_at_ends),
-    ):
-        largest = max(
-            (value for value in values if value is not None and value < _OPEN),
-            default=0.0,
-        )
-        limit = where.startswith("tool_limits")
-        what, aside = ("limit", ", or null for no limit") if limit else ("speed", "")
-        yield Figure(
-            where, f"the {what} looks like {meant}", largest, most, unit, aside
-        )
+    limits = task.tool_limits
+    speed = limits.speed
+    values = {
+        "tool_limits.speed": speed.speed if isinstance(speed, SpeedTable) else [speed],
+        "tool_limits.process_speed": [part.speed for part in limits.process_speed],
+        "tool_limits.acceleration": [limits.acceleration],
+        "tool_limits.angular_speed": [limits.angular_speed],
+    }
+    for key, given in values.items():
+        yield USUAL[key].at(key, _largest(given))
+    meant = "degrees per second" if task.task_space == "joints" else "mm/s"
+    usual = UsualFigure(f"the speed looks like {meant}", 50.0, task.speed_unit)
+    yield usual.at("boundary.start_speed", _largest([task.boundary.start_speed]))
+    yield usual.at("boundary.end_speed", _largest([task.boundary.end_speed]))
+
+
+def _largest(values: Iterable[float | None]) -> float:
+    """Return the largest value; those from 1e5 on are written for "no limit"."""
+    return max((one for one in values if one is not None and one < 1e5), default=0.0)
 
 
 def _angles(task: Task) -> Iterator[Remark]:
-    """Look for eighths of a turn in rad where degrees belong."""
+    """Look for eighths of up to two turns in rad where degrees belong.
+
+    They are written with two decimals: 3.14 is half a turn, 5.5 is not seven eighths.
+    """
     robot = {
         key: getattr(task.robot, key).model_dump()
         for key in ("mounting", "tool_offset")
@@ -191,10 +229,7 @@ def _angles(task: Task) -> Iterator[Remark]:
     path = [segment.model_dump(exclude={"bspline", "spline"}) for segment in task.path]
     for key, degrees in _in_degrees("", {"robot": robot, "path": path}):
         eighths = round(degrees / (0.125 * _TURN))
-        if (
-            1 <= abs(eighths) <= _EIGHTHS
-            and abs(degrees - 0.125 * _TURN * eighths) < _ROUNDING
-        ):
+        if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * _TURN * eighths) < 2e-3:
             usual = f"{math.degrees(degrees):.4g} deg for that angle"
             yield Remark(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
 
@@ -222,21 +257,8 @@ def _points(task: Task) -> Iterator[Remark]:
             )
 
 
-_G = 9.81
 _HOLDS = 50.0
 """Arms hold a tenth to five times their own weight at full reach."""
-_WIDEST = {"rad": 120.0, "m": 50.0}
-"""Joints with cables make two turns either way, others may be given a dozen turns; in degrees, few ranges are narrower
-than 120. Few rails are longer than 30 m."""
-_WIDER, _AT_LEAST_WIDE = 5.0, {"rad": 4.0 * math.pi, "m": 5.0}
-"""So much wider than the URDF's, and than these, is no range of the same joint."""
-_OPEN_END = {"rad": 800.0, "m": 1e5}
-"""A range end beyond this is written for "no limit": in degrees, ranges end at two turns, 720."""
-_UNKNOWN = 1.0
-"""Written in URDFs for a limit that nobody knows."""
-_MILLI = 1e3
-_NO_LOAD = 5.0
-"""Motors without load turn at up to twice the rated speed; rpm are 9.5 times rad/s, and a gear makes it more."""
 
 
 @dataclass(frozen=True)
@@ -335,7 +357,7 @@ def _placeholder(value: float, rule: Rule, usual: float, stated: float | None) -
         return True
     if not round(math.log10(value), 9).is_integer():
         return False
-    return not rule.weighed or value == stated or value > _MILLI * usual
+    return not rule.weighed or value == stated or value > 1e3 * usual
 
 
 def _stated(robot: Robot, rule: Rule, joint: int) -> float | None:
@@ -350,16 +372,18 @@ def _usual(robot: Robot, rule: Rule) -> Callable[[int], float]:
     """Return what gives the largest usual limit of a joint."""
     weight = (
         sum(inertia.mass for inertia in list(robot.model.inertias)[1:])
-        * _G
+        * 9.81
         * sum(link_lengths(robot))
     )
 
     def of_joint(joint: int) -> float:
-        unit, stated = robot.position_units[joint], _stated(robot, rule, joint)
+        unit = robot.position_units[joint]
+        stated = _stated(robot, rule, joint)
         most = [rule.most[unit]]
         if rule.weighed and unit == "rad" and weight > 0.0:
             most.append(_HOLDS * weight)
-        if stated and stated != _UNKNOWN:
+        # URDFs state 1 for a limit that nobody knows.
+        if stated and stated != 1.0:
             most.append(max(rule.times * stated, rule.least))
         return float(min(most))
 
@@ -367,7 +391,8 @@ def _usual(robot: Robot, rule: Rule) -> Callable[[int], float]:
 
 
 def _ranges(robot: Robot) -> Iterator[Figure]:
-    limits, stated = robot.limits, {"rad": "degrees", "m": "mm"}
+    """Look at position ranges: joints with cables make a dozen turns at most."""
+    limits = robot.limits
     columns = zip(
         robot.joint_names,
         robot.position_units,
@@ -377,23 +402,25 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
         strict=True,
     )
     for name, unit, lower, upper, known in columns:
-        usual = _WIDEST[unit]
+        # In degrees, few ranges are narrower than 120; few rails are longer than 30 m.
+        usual = 120.0 if unit == "rad" else 50.0
         if (
             known.lower is not None
             and known.upper is not None
             and known.upper > known.lower
         ):
-            usual = min(
-                usual, max(_WIDER * (known.upper - known.lower), _AT_LEAST_WIDE[unit])
-            )
-        if max(abs(lower), abs(upper)) <= _OPEN_END[unit]:
-            message, shown = (
-                f"the position range looks like {stated[unit]}",
-                f"[{lower:.6g}, {upper:.6g}]",
-            )
-            key = f"robot.limits.position.{name}"
+            least = 4.0 * math.pi if unit == "rad" else 5.0
+            usual = min(usual, max(5.0 * (known.upper - known.lower), least))
+        # An end beyond this is written for "no limit": in degrees, ranges end at 720.
+        if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
             yield Figure(
-                key, message, upper - lower, usual, unit, " wide, or open (null)", shown
+                f"robot.limits.position.{name}",
+                f"the position range looks like {'degrees' if unit == 'rad' else 'mm'}",
+                upper - lower,
+                usual,
+                unit,
+                " wide, or open (null)",
+                f"[{lower:.6g}, {upper:.6g}]",
             )
 
 
@@ -401,17 +428,16 @@ def _curves(robot: Robot) -> Iterator[Figure]:
     """Look at the torques and the speeds of torque-speed curves."""
     scale = robot.settings.limits.scale.torque
     torque = _usual(robot, _TORQUE)
-    velocity = _usual(robot, Rule({}, FASTEST, "velocity", _NO_LOAD, _NO_LOAD))
+    # Without load motors turn at up to twice the rated speed; rpm are 9.5 times rad/s.
+    velocity = _usual(robot, Rule({}, FASTEST, "velocity", 5.0, 5.0))
     rows = zip(
         robot.joint_names, robot.position_units, robot.limits.torque_speed, strict=True
     )
     for i, (name, unit, curve) in enumerate(rows):
         if not curve:
             continue
-        key, meant = (
-            f"robot.limits.torque_speed.{name}",
-            {"rad": "rpm", "m": "mm per second"}[unit],
-        )
+        key = f"robot.limits.torque_speed.{name}"
+        meant = {"rad": "rpm", "m": "mm per second"}[unit]
         said = "the last speed of the curve looks like"
         aside = "; at the joint, behind its gear"
         yield Figure(
@@ -424,23 +450,6 @@ def _curves(robot: Robot) -> Iterator[Figure]:
         )
         said = f"the torque of the curve looks like {_TORQUE.looks[unit]}"
         yield Figure(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])
-
-
-_LARGEST_SCALE = 10.0
-_LONGEST_LINK = 20.0
-_HEAVIEST = 1e3
-"""A moving body of the heaviest arms weighs 150 kg for each square metre of their reach."""
-_WIDEST_BODY = 10.0
-_HEAVIEST_PAYLOAD = 150.0
-"""What an arm of 1 m carries, and more with the square of its reach: the strongest ones carry 130 kg there."""
-_TIMES_ITSELF = 3.0
-"""The strongest arms carry as much as they weigh."""
-_LONGEST_OFFSET = 2.0
-"""Times the arm's own length."""
-_FARTHEST_BASE = 200.0
-"""m; halls are smaller."""
-_MOST_GRAVITY = 100.0
-_OF_SIZE = " for an arm of this size"
 
 
 def of_robot(robot: Robot) -> tuple[Remark, ...]:
@@ -460,7 +469,7 @@ def of_robot(robot: Robot) -> tuple[Remark, ...]:
 
 def _scales(robot: Robot) -> Iterator[Remark]:
     for kind, factor in robot.settings.limits.scale.model_dump().items():
-        if factor > _LARGEST_SCALE:
+        if factor > 10.0:
             message = "the factor raises limits far beyond what was stated"
             yield Remark(
                 f"robot.limits.scale.{kind}",
@@ -472,9 +481,9 @@ def _scales(robot: Robot) -> Iterator[Remark]:
 
 def _friction(robot: Robot) -> Iterator[Remark]:
     """Look at damping of the URDF, which is often there to calm a simulation."""
-    limits, stated = robot.limits, robot.stated.friction["viscous"]
-    for i, damping in enumerate(stated):
-        fastest, torque = limits.velocity[i], limits.torque[i]
+    for i, damping in enumerate(robot.stated.friction["viscous"]):
+        fastest = robot.limits.velocity[i]
+        torque = robot.limits.torque[i]
         slow = (
             np.isfinite([fastest, torque]).all()
             and fastest <= FASTEST[robot.position_units[i]]
@@ -492,38 +501,19 @@ def _friction(robot: Robot) -> Iterator[Remark]:
 
 
 def _lengths(robot: Robot) -> Iterator[Figure]:
-    """Look at the way from joint to joint, the tool offset, and where the robot is mounted."""
+    """Look at the way from joint to joint, tool offset, mounting and gravity."""
     *links, last = link_lengths(robot)
-    offset, mounted = (
-        math.hypot(*placed.xyz)
-        for placed in (robot.settings.tool_offset, robot.settings.mounting)
-    )
-    looks = "the distance from the joint before looks like mm"
+    settings = robot.settings
+    offset = math.hypot(*settings.tool_offset.xyz)
     for name, length in zip(robot.joint_names[1:], links, strict=True):
-        yield Figure(f"URDF origin of {name}", looks, length, _LONGEST_LINK, "m")
-    yield Figure(
-        f"URDF origin of {robot.tool_frame}", looks, last - offset, _LONGEST_LINK, "m"
-    )
-    size = _LONGEST_OFFSET * max(1.0, sum(links))
-    yield Figure(
-        "robot.tool_offset.xyz",
-        "the distance looks like mm",
-        offset,
-        size,
-        "m",
-        _OF_SIZE,
-    )
-    yield Figure(
-        "robot.mounting.xyz", "the distance looks like mm", mounted, _FARTHEST_BASE, "m"
-    )
-    pull = math.hypot(*robot.settings.gravity)
-    yield Figure(
-        "robot.gravity",
-        "the acceleration looks like mm/s^2",
-        pull,
-        _MOST_GRAVITY,
-        "m/s^2",
-    )
+        yield USUAL["link"].at(f"URDF origin of {name}", length)
+    yield USUAL["link"].at(f"URDF origin of {robot.tool_frame}", last - offset)
+    for key, value, scale in (
+        ("robot.tool_offset.xyz", offset, max(1.0, sum(links))),
+        ("robot.mounting.xyz", math.hypot(*settings.mounting.xyz), 1.0),
+        ("robot.gravity", math.hypot(*settings.gravity), 1.0),
+    ):
+        yield USUAL[key].at(key, value, scale)
 
 
 def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
@@ -532,53 +522,28 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
     if payload is None:
         return
     size = max(1.0, sum(link_lengths(robot)) if robot.revolute.any() else reach(robot))
+    usual = USUAL["robot.payload.mass"]
+    # The strongest arms carry as much as they weigh.
     moved = sum(inertia.mass for inertia in list(bare.model.inertias)[1:])
-    heaviest = min(_HEAVIEST_PAYLOAD * size**2, _TIMES_ITSELF * moved or math.inf)
-    yield Figure(
-        "robot.payload.mass",
-        "the mass looks like g",
-        payload.mass,
-        heaviest,
-        "kg",
-        _OF_SIZE,
-    )
-    away = math.hypot(*payload.com)
-    message = "the distance from the tool frame looks like mm"
-    yield Figure("robot.payload.com", message, away, size, "m", _OF_SIZE)
+    heaviest = min(usual.largest * size**2, 3.0 * moved or math.inf)
     inertia = payload.inertia
     moment = max(inertia.ixx, inertia.iyy, inertia.izz) if inertia else 0.0
-    most = payload.mass * size**2
-    yield Figure(
-        "robot.payload.inertia",
-        "the inertia looks like kg mm^2",
-        moment,
-        most,
-        "kg m^2",
-        " for this mass",
-    )
+    for key, value, scale in (
+        ("robot.payload.mass", payload.mass, heaviest / usual.largest),
+        ("robot.payload.com", math.hypot(*payload.com), size),
+        ("robot.payload.inertia", moment, payload.mass * size**2),
+    ):
+        yield USUAL[key].at(key, value, scale)
 
 
 def _masses(robot: Robot) -> Iterator[Figure]:
-    heaviest = _HEAVIEST * max(1.0, reach(robot)) ** 2
-    for name, inertia in zip(
-        robot.joint_names, list(robot.model.inertias)[1:], strict=True
-    ):
+    bodies = list(robot.model.inertias)[1:]
+    size = max(1.0, reach(robot))
+    for name, body in zip(robot.joint_names, bodies, strict=True):
         where = f"URDF inertials that joint {name} moves"
-        yield Figure(
-            where, "the mass looks like g", inertia.mass, heaviest, "kg", _OF_SIZE
-        )
-        moment, most = (
-            float(np.linalg.eigvalsh(inertia.inertia)[-1]),
-            inertia.mass * _WIDEST_BODY**2,
-        )
-        yield Figure(
-            where,
-            "the inertia looks like kg mm^2",
-            moment,
-            most,
-            "kg m^2",
-            " for this mass",
-        )
+        moment = float(np.linalg.eigvalsh(body.inertia)[-1])
+        yield USUAL["body mass"].at(where, body.mass, size**2)
+        yield USUAL["body inertia"].at(where, moment, body.mass)
 
 
 def check_within_reach(task_map: TaskMap, path: Path) -> None:
@@ -591,16 +556,18 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
     if not task_map.axes:  # of joints
         return
     s = np.linspace(0.0, 1.0, _STATIONS)
-    robot, axes = task_map.robot, list(task_map.axes)
+    robot = task_map.robot
+    axes = list(task_map.axes)
     base = np.array(robot.model.jointPlacements[1].translation)[axes]
     away = np.linalg.norm(path.sample(s).target[:, : len(axes)] - base, axis=1)
     far = reach(robot)
-    if not away.max() > far * (1.0 + _ROUNDED):
+    if not away.max() > far * (1.0 + 1e-3):
         return
     beyond = s[away > far]
     furthest = float(away.max())
     found, most = write_apart(furthest, far)
-    looks = furthest > _HARDLY * far and furthest / _THOUSAND < _HARDLY * far
+    # A path that is only a little too long is no more than three times as far.
+    looks = furthest / _THOUSAND < 3.0 * far < furthest
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on",
         s_interval=(float(beyond[0]), float(beyond[-1])),

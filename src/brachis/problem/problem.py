@@ -202,7 +202,9 @@ def decompositions_of(
     UnknownNameError
         There is no such joint or branch.
     """
-    task, robot, task_map = problem.task, problem.robot, problem.task_map
+    task = problem.task
+    robot = problem.robot
+    task_map = problem.task_map
     if isinstance(task_map, JointSpace):
         return []
     if task.redundant_joints != "auto":
@@ -256,7 +258,9 @@ def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
 
 def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
     """Find the branches on which a motion may begin."""
-    robot, task_map, wanted = problem.robot, problem.task_map, problem.task.branch
+    robot = problem.robot
+    task_map = problem.task_map
+    wanted = problem.task.branch
     redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
     labels = match.solver.branches
     if problem.start is not None:

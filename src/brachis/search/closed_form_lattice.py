@@ -1,15 +1,15 @@
 """The lattice of one choice of redundant joints, whose closed form gives the postures.
 
-The redundant joints are cut into cells. Every node (a cell, a branch and the posture that the closed form gives there)
-is joined to the cells around it at the next station, on the same branch and clear of its boundary. One redundant joint
-is searched completely at the lattice's spacing. Of several, all neighbours along one joint at a time and random ones,
-and a layer keeps a bounded number of nodes, half of them the nearest and half far from each other.
-
-Cells of the redundant joints, from which the lattice is made.
+The redundant joints are cut into cells. Every node (a cell, a branch and the posture that
+the closed form gives there) is joined to the cells around it at the next station, on the
+same branch and clear of its boundary. One redundant joint is searched completely at the
+lattice's spacing. Of several, all neighbours along one joint at a time and random ones,
+and a layer keeps a bounded number of nodes, half of them the nearest and half far apart.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,16 +17,8 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.joints import TURN, complement
-from brachis.search.joint_path import NO_ANSWER, OTHER_BRANCH, beyond_ranges, causes_of
-from brachis.search.lattice import LARGEST_STEP, Lattice, Layer, shortest
-
-_CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
-_REACH = 2.0  # m
-_FAR = 20.0  # rad or m: nobody goes further, and every cell takes memory
-_WINDOW = 1.0 / 8.0  # of a turn
-_RANDOM = 24
-_SPREAD = 2.5
-_SINGLE = (1, 2, 4, 8)
+from brachis.search.joint_path import OTHER_BRANCH
+from brachis.search.lattice import LARGEST_STEP, Edges, Lattice, Layer
 
 
 @dataclass(frozen=True)
@@ -64,39 +56,27 @@ class Cells:
         closed ranges, a turn of an open revolute joint, and what of an open prismatic joint is near where the path
         begins.
         """
-        given, joints = decomposition.problem, list(decomposition.redundant)
+        given = decomposition.problem
+        joints = list(decomposition.redundant)
         turning = given.robot.revolute[joints]
-        low, high = (
-            given.robot.limits.position_lower[joints],
-            given.robot.limits.position_upper[joints],
-        )
+        low = given.robot.limits.position_lower[joints]
+        high = given.robot.limits.position_upper[joints]
         size = cell_sizes(turning, cells_per_turn)
         if posture is not None:
             origin = posture[joints]
         else:
-            places = [
+            near = [
                 0.0 if turns else _nearby(given, joint)
                 for joint, turns in zip(joints, turning, strict=True)
             ]
-            origin = np.clip(places, low, high)
+            origin = np.clip(near, low, high)
+        reach = np.where(turning, 0.5 * TURN, 2.0 + given.path.length)
+        # Closed ranges are covered whole, up to 20 rad or m: every cell takes memory.
         closed = np.isfinite(low) & np.isfinite(high)
-        reach = np.where(turning, 0.5 * TURN, _REACH + given.path.length)
-        reach = np.where(closed, np.maximum(reach, _FAR), reach)
-        lowest, highest = (
-            np.maximum(low, origin - reach),
-            np.minimum(high, origin + reach),
-        )
-        first, last = (
-            np.ceil((lowest - origin) / size),
-            np.floor((highest - origin) / size),
-        )
-        return cls(
-            origin,
-            size,
-            first.astype(int),
-            last.astype(int),
-            round(_WINDOW * cells_per_turn),
-        )
+        reach = np.where(closed, np.maximum(reach, 20.0), reach)
+        first = np.ceil((np.maximum(low, origin - reach) - origin) / size).astype(int)
+        last = np.floor((np.minimum(high, origin + reach) - origin) / size).astype(int)
+        return cls(origin, size, first, last, round(cells_per_turn / 8.0))
 
     @property
     def r(self) -> int:
@@ -108,7 +88,7 @@ class Cells:
         return np.asarray(self.origin + cells * self.size)
 
     def near(self, positions: np.ndarray) -> np.ndarray:
-        """Cell, (r,), in which positions (r,) are."""
+        """Cells, (..., r), in which positions, (..., r), are."""
         return np.rint((positions - self.origin) / self.size).astype(int)
 
     def everywhere(self, most: int, rng: np.random.Generator) -> np.ndarray:
@@ -128,18 +108,18 @@ class Cells:
         single = [
             sign * step * row
             for row in np.eye(self.r, dtype=int)
-            for step in _SINGLE
+            for step in (1, 2, 4, 8)
             for sign in (-1, 1)
         ]
-        random = np.rint(rng.normal(0.0, _SPREAD, (_RANDOM, self.r))).astype(int)
+        random = np.rint(rng.normal(0.0, 2.5, (24, self.r))).astype(int)
         return np.unique(
             np.vstack([np.zeros((1, self.r), dtype=int), single, random]), axis=0
         )
 
 
 def cell_sizes(revolute: np.ndarray, cells_per_turn: int) -> np.ndarray:
-    """Sizes of the cells of joints, (n,), rad or m, of which a mask tells the revolute ones."""
-    return np.where(revolute, TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
+    """Return cell sizes, (n,): rad for the joints of the mask `revolute`, m for others."""
+    return np.where(revolute, TURN, 3.0) / cells_per_turn
 
 
 def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -153,20 +133,17 @@ def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _nearby(given: Problem, joint: int) -> float:
     """Where a prismatic joint takes the tool, with the other joints at zero, nearest to the path's beginning, m."""
+    axes = list(given.task_map.axes)
     q = np.zeros(given.robot.n)
     there = np.array(given.robot.tool_placement(q).translation)
     q[joint] = 1.0
-    axis = (np.array(given.robot.tool_placement(q).translation) - there)[
-        list(given.task_map.axes)
-    ]
-    wanted = given.path.sample(np.zeros(1)).target[0, : len(given.task_map.axes)]
-    return float(
-        axis @ (wanted - there[list(given.task_map.axes)]) / max(axis @ axis, 1e-12)
-    )
+    axis = (np.array(given.robot.tool_placement(q).translation) - there)[axes]
+    wanted = given.path.sample(np.zeros(1)).target[0, : len(axes)]
+    return float(axis @ (wanted - there[axes]) / max(axis @ axis, 1e-12))
 
 
 _CLEAR = 0.02
-_STARTS = 4  # times the nodes of a layer
+"""Branch margin that nodes keep, where a given posture has twice as much."""
 
 
 class ClosedFormLattice(Lattice):
@@ -200,8 +177,10 @@ class ClosedFormLattice(Lattice):
         super().__init__(
             given, turning, density=density, nodes=nodes, seed=seed, deadline=deadline
         )
-        self.decomposition, self._solver = decomposition, decomposition.match.solver
-        self._turns = np.flatnonzero(turning)
+        self.decomposition = decomposition
+        self._solver = decomposition.match.solver
+        self._modulo = turning
+        self._given_branch = decomposition.branches[0]
         self._cells = Cells.of(decomposition, cells_per_turn, self._origin)
         self._clear = _CLEAR
         if self._origin is not None:
@@ -211,130 +190,80 @@ class ClosedFormLattice(Lattice):
             self._clear = float(np.minimum(_CLEAR, 0.5 * at_origin.min(initial=np.inf)))
 
     def _at_end(self, last: Layer) -> np.ndarray:
-        """See `Lattice`: the motion ends in another posture of the end's cell, from which the plan goes on to it."""
+        """Tell which nodes, (K,) bool, are in the end's cell: the plan goes on to the end."""
         assert self.problem.end is not None
         allowed = np.full(self._robot.n, LARGEST_STEP)
         allowed[self._redundant] = self._cells.size
         return np.asarray(np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1))
 
-    def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
-        """Make the node of the given posture, or nodes all over the ranges where none is given, or say why not."""
-        r = self._cells.r
-        if self._origin is not None:
-            none, q = np.zeros(1, dtype=int), self._origin[None].astype(float)
-            return Layer(
-                np.zeros((1, r), dtype=int),
-                none + self.decomposition.branches[0],
-                q,
-                q,
-                q,
-                np.zeros(1),
-                none,
-            )
-        cells = self._cells.everywhere(_STARTS * self._nodes, rng)
-        answers = self._answers(cells, 0)[:, self.decomposition.branches]
-        which, branch, alternative = np.nonzero(np.isfinite(answers).all(axis=3))
-        if not len(which):
-            return {NO_ANSWER: len(cells)}
-        q = np.empty((len(which), self._robot.n))
-        q[:, self._redundant] = self._cells.positions(cells[which])
-        q[:, self._rest] = answers[which, branch, alternative]
-        within = self._inside(q, q)
-        inside = within.all(axis=1)
-        if not inside.any():
-            return beyond_ranges(self._robot, within)
-        cell, branch, q = (
-            cells[which[inside]],
-            np.array(self.decomposition.branches)[branch[inside]],
-            q[inside],
-        )
-        nothing = np.zeros(len(q))
-        return self._kept(Layer(cell, branch, q, q, q, nothing, nothing.astype(int)))
+    def _start_nodes(self, rng: np.random.Generator) -> Layer:
+        """Make nodes all over the ranges of the redundant joints."""
+        cells = self._cells.everywhere(4 * self._nodes, rng)
+        branches = np.array(self.decomposition.branches)
+        answers = self._solve(cells, 0)[:, branches]
+        cell, branch, alternative = np.nonzero(np.isfinite(answers).all(axis=3))
+        q = self._postures(cells[cell], answers[cell, branch, alternative])
+        return Layer.start(q, branches[branch])
 
-    def _answers(self, cells: np.ndarray, station: int) -> np.ndarray:
+    def _solve(self, cells: np.ndarray, station: int) -> np.ndarray:
         """Non-redundant joints of all branches, (C, B, A, m)."""
         target = np.repeat(self._targets[station][None], len(cells), axis=0)
         return self._solver.solve(target, self._cells.positions(cells))
 
-    def _edges(
-        self, before: Layer, station: int, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of parents, (E,), and cells, (E, r), that may be joined; at the very end the given end's, too."""
+    def _postures(self, cells: np.ndarray, answers: np.ndarray) -> np.ndarray:
+        """Postures, (K, n), of cells, (K, r), with non-redundant joints, (K, m)."""
+        q = np.empty((len(cells), self._robot.n))
+        q[:, self._redundant] = self._cells.positions(cells)
+        q[:, self._rest] = answers
+        return q
+
+    def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
+        """List edges to the cells around; at the very end to the given end's, too."""
         offsets = self._cells.neighbours(rng)
-        parent = np.repeat(np.arange(len(before.branch)), len(offsets))
-        edges = before.cell[parent] + np.tile(offsets, (len(before.branch), 1))
+        count = len(before.branch)
+        nodes = np.arange(count)
+        parent = np.repeat(nodes, len(offsets))
+        own = self._cells.near(before.q[:, self._redundant])
+        around = own[parent] + np.tile(offsets, (count, 1))
         end = self.problem.end
         if self._to_end and end is not None and station == len(self.s) - 1:
-            aim = np.tile(
-                self._cells.near(end[self._redundant]), (len(before.branch), 1)
-            )
-            parent = np.append(parent, np.arange(len(before.branch)))
-            edges = np.vstack([edges, aim])
-        return parent, edges
-
-    def _next(
-        self, before: Layer, station: int, rng: np.random.Generator
-    ) -> Layer | dict[str, int]:
-        """Join the nodes of a layer to the next station, or say why none can be."""
-        parent, edges = self._edges(before, station, rng)
-        cells, where = unique(edges)
-        answers = self._answers(cells, station)
-        exists, several = np.isfinite(answers).all(axis=3), self._solver.alternatives
+            aim = np.tile(self._cells.near(end[self._redundant]), (count, 1))
+            parent = np.append(parent, nodes)
+            around = np.vstack([around, aim])
+        cells, where = unique(around)
+        answers = self._solve(cells, station)
+        several = self._solver.alternatives
         alternative = np.tile(np.arange(several), len(parent))
-        parent, where = np.repeat(parent, several), np.repeat(where, several)
+        parent = np.repeat(parent, several)
+        where = np.repeat(where, several)
         branch = before.branch[parent]
-        q = np.empty((len(parent), self._robot.n))
-        q[:, self._redundant] = self._cells.positions(cells)[where]
-        q[:, self._rest] = answers[where, branch, alternative]
-        step = q - before.q[parent]
-        turn = -np.round(step[:, self._turns] / TURN)
-        step[:, self._turns] += TURN * turn
-        q = before.q[parent] + step
-        low, high = (
-            np.minimum(before.low[parent], q),
-            np.maximum(before.high[parent], q),
-        )
-        found = exists[where, branch, alternative]
-        with np.errstate(invalid="ignore"):
-            inside = self._inside(low, high)
-            near = np.all(np.abs(step) <= LARGEST_STEP, axis=1)
-        good = found & inside.all(axis=1) & near
-        if not good.any():
-            return causes_of(
-                self._robot, exists.any(axis=(1, 2))[where], found, inside, near
-            )
-        parent, where, step = parent[good], where[good], step[good]
-        length = before.length[parent] + self._lengths(before.q, step, parent)
-        layer = Layer(
-            cells[where], branch[good], q[good], low[good], high[good], length, parent
-        )
-        turn = np.where(self._telling[self._turns], turn[good], 0.0)
-        return self._kept(
-            layer[
-                shortest(
-                    length,
-                    np.column_stack([where, layer.branch, alternative[good], turn]),
-                )
-            ]
+        q = self._postures(cells[where], answers[where, branch, alternative])
+        step = self._step(before.q[parent], q)
+        turns = np.nan_to_num(np.round((before.q[parent] + step - q) / TURN))
+        return Edges(
+            parent,
+            step,
+            np.column_stack([where, branch, alternative, turns[:, self._counts_turns]]),
+            np.isfinite(answers).all(axis=3).any(axis=(1, 2))[where],
+            np.ones(len(parent), dtype=bool),
         )
 
-    def _kept(self, layer: Layer) -> Layer | dict[str, int]:
-        """Keep nodes clear of the branch boundary that can be held against gravity, not too many of them."""
+    def _keep(
+        self, layer: Layer, choose: Callable[[Layer], Layer]
+    ) -> Layer | dict[str, int]:
+        """Choose among the nodes clear of the branch boundary that can be held."""
         clear = np.ones(len(layer.branch), dtype=bool)
         for branch in np.unique(layer.branch):
             own = layer.branch == branch
             margins = self._solver.branch_margins(layer.q[own], int(branch))
             clear[own] = margins.min(axis=1, initial=np.inf) >= self._clear
-        held, refused = self._held(layer.q[clear])
-        if not held.any():
-            return refused | (
-                {OTHER_BRANCH: int((~clear).sum())} if not clear.all() else {}
-            )
-        kept = layer[np.flatnonzero(clear)[held]]
-        return (
-            kept
-            if self._cells.r <= 1
-            else kept.bounded(
-                self._nodes, kept.length, self._robot, self.problem.limits
-            )
-        )
+        kept = super()._keep(layer[clear], choose)
+        if isinstance(kept, Layer) or clear.all():
+            return kept
+        return kept | {OTHER_BRANCH: int((~clear).sum())}
+
+    def _thin(self, layer: Layer) -> Layer:
+        """Keep a bounded number of nodes where there are several redundant joints."""
+        if self._cells.r <= 1:
+            return layer
+        return layer.thin(self._nodes, layer.length, self._robot, self.problem.limits)

@@ -14,7 +14,10 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.kinematics import ClosedFormMap
 
-_FEWEST_STEPS, _MOST_STEPS, _STEP_LENGTH = 24, 1000, 0.05  # metres a step
+# metres a step
+_FEWEST_STEPS = 24
+_MOST_STEPS = 1000
+_STEP_LENGTH = 0.05
 _DAMPING = 1e-6
 _CORRECTIONS = 5
 _UNFOLDING_STEPS = 20

@@ -113,10 +113,8 @@ def reason_out_of_reach(
     )
     for possible, problem, hint, remedies in reasons:
         if not possible.all():
-            first, last = (
-                float(s[int(np.argmin(possible))]),
-                float(s[np.flatnonzero(~possible)[-1]]),
-            )
+            first = float(s[int(np.argmin(possible))])
+            last = float(s[np.flatnonzero(~possible)[-1]])
             error = PathError(
                 problem.format(first=first), s_interval=(first, last), hint=hint
             )
@@ -156,12 +154,11 @@ def _answers_along(
 
     `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
     """
-    robot, redundant, rest = (
-        joint_map.robot,
-        joint_map.redundant,
-        joint_map.nonredundant,
-    )
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
+    robot = joint_map.robot
+    redundant = joint_map.redundant
+    rest = joint_map.nonredundant
+    lower = robot.limits.position_lower
+    upper = robot.limits.position_upper
     turning = robot.revolute
     wide = np.isin(np.arange(robot.n), redundant) & opened
     near = np.clip(joint_map.start, lower, upper)
@@ -222,11 +219,9 @@ def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> s
     )
     nearest = beyond[np.argmin(beyond.max(axis=1))]
     joint = int(np.argmax(nearest))
-    unit, low, high = (
-        robot.position_units[joint],
-        robot.limits.position_lower[joint],
-        robot.limits.position_upper[joint],
-    )
+    unit = robot.position_units[joint]
+    low = robot.limits.position_lower[joint]
+    high = robot.limits.position_upper[joint]
     return (
         f" (the nearest one has joint {robot.joint_names[joint]!r} {nearest[joint]:.2g} {unit} beyond its range, "
         f"{low:.4g} to {high:.4g} {unit})"

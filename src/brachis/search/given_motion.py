@@ -104,7 +104,8 @@ def _chart(
     problem: Problem, motion: Trajectory, s: np.ndarray, q: np.ndarray
 ) -> ChartMap:
     """Lay a chart around postures, with the motion's own rows where these do for it."""
-    robot, names = problem.robot, motion.redundant_joints
+    robot = problem.robot
+    names = motion.redundant_joints
     selected = np.eye(robot.n)[[robot.joint_names.index(name) for name in names]]
     saved = (
         ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)

@@ -66,10 +66,8 @@ def explain_holding(
             if limit.where != "whole":
                 continue
             values = limit.values(Moments.at_rest(q))
-            ratios, means = (
-                np.abs(limit.ratio(values)),
-                np.abs(limit.ratio(values.mean(axis=0, keepdims=True)))[0],
-            )
+            ratios = np.abs(limit.ratio(values))
+            means = np.abs(limit.ratio(values.mean(axis=0, keepdims=True)))[0]
             measure = ratios.min(axis=0) if everywhere else means
             column = int(np.argmax(measure))
             if worst is None or measure[column] > worst[0]:
@@ -96,7 +94,8 @@ def _error(
     """Make the error that names the limit."""
     label = limit.labels[column]
     figure = next(bound.figure for bound in limit.bounds if bound.column == column)
-    low, high = figure * ratios.min(), figure * ratios.max()
+    low = figure * ratios.min()
+    high = figure * ratios.max()
     taken = (
         f"{low:.4g} to {high:.4g} {label.unit}"
         if f"{low:.4g}" != f"{high:.4g}"

@@ -98,10 +98,8 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
     -------
     list of JointPath
     """
-    branches, q = (
-        np.array([joint_path.branch for joint_path in joint_paths]),
-        np.array([joint_path.q for joint_path in joint_paths]),
-    )
+    branches = np.array([joint_path.branch for joint_path in joint_paths])
+    q = np.array([joint_path.q for joint_path in joint_paths])
     length = np.array([joint_path.length for joint_path in joint_paths])
     problem = joint_paths[0].problem
     weights = weights_near(problem.robot, problem.limits, q[0, q.shape[1] // 2])

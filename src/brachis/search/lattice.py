@@ -1,30 +1,29 @@
-"""Joint paths along the path, from a lattice of postures.
+"""The lattice: joint paths along the path, by dynamic programming over postures.
 
-The path is cut into stations. Layer by layer from the given start, the nodes of a layer (postures that meet the target
-at its station) are joined to postures at the next station that are within the joint ranges, near, and allowed at rest
-(the torque limits hold the arm against gravity). Of all edges into a node the one with the least total length stays
-(dynamic programming). Where the end posture is given and the start is not, the layers run backwards from the end. Which
-postures there are, and which may be joined, is the matter of the two kinds: `closed_form_lattice` keeps to one branch
-of one choice of redundant joints, `posture_lattice` goes wherever the arm can.
+The path is cut into stations. Layer by layer from the given start, the nodes of a layer
+(postures that meet the target at its station) are joined to postures at the next station
+that are within the joint ranges, near, and allowed at rest (the torque limits hold the
+arm against gravity). Of all edges into a node the one with the least total length stays.
+Where the end posture is given and the start is not, the layers run backwards from the
+end. `ClosedFormLattice` takes its nodes from the closed form of one choice of redundant
+joints, `PostureLattice` from Newton's method.
 
-Turns of angles by 2 pi follow the joint path. From a given posture, nodes in different turns are different nodes. Where
-neither end is given, all turns of a joint path exist at once: a node keeps how far its joints have gone, and is within
-the ranges as long as some multiple of 2 pi brings the whole joint path there. The length of an edge,
+Turns of angles by 2 pi follow the joint path. From a given posture, nodes in different
+turns are different nodes. Where neither end is given, all turns of a joint path are
+equivalent: a node keeps how far its joints have gone, and is within the ranges as long as
+some multiple of 2 pi brings the whole joint path there. The length of an edge,
 
     max |A(q) dq|  +  T max |B(q) dq|
 
-with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not depend on how fast the joint
-path is followed: with the first term alone the time of a straight one is 2 sqrt(length).
-
-Nodes of the lattice at one station.
-
-Stations along the path at which the lattice has its layers.
+with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not
+depend on how fast the joint path is followed: with the first term alone the time of a
+straight one is 2 sqrt(length).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -35,7 +34,16 @@ from brachis.path import Path
 from brachis.problem.problem import Problem
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import TURN
-from brachis.search.joint_path import JUMPS, DeadEnd, JointPath, distinct, weights_near
+from brachis.search.joint_path import (
+    JUMPS,
+    NO_ANSWER,
+    DeadEnd,
+    JointPath,
+    beyond_ranges,
+    causes_of,
+    distinct,
+    weights_near,
+)
 
 
 @dataclass(frozen=True)
@@ -44,8 +52,6 @@ class Layer:
 
     Attributes
     ----------
-    cell : (K, r) int ndarray
-        Of the redundant joints of a closed form; (K, 0) without one.
     branch : (K,) int ndarray
         What joint paths keep: index into the closed form's branches, or where they began.
     q : (K, n) ndarray
@@ -58,7 +64,6 @@ class Layer:
         Its last node in the layer before.
     """
 
-    cell: np.ndarray
     branch: np.ndarray
     q: np.ndarray
     low: np.ndarray
@@ -70,35 +75,64 @@ class Layer:
         """Return some of the nodes, by index or mask."""
         return Layer(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def bounded(
+    @classmethod
+    def start(cls, q: np.ndarray, branch: np.ndarray) -> Layer:
+        """Make nodes, (K, n), with which joint paths begin, and their branches, (K,)."""
+        return cls(branch, q, q, q, np.zeros(len(q)), np.zeros(len(q), dtype=int))
+
+    def thin(
         self, most: int, cost: np.ndarray, robot: Robot, limits: Sequence[Limit]
     ) -> Layer:
-        """Keep `most` nodes: half of them of least `cost`, (K,), the others far from each other and from those."""
+        """Keep `most` nodes: half of least `cost`, (K,), the others far from each other."""
         if len(self.branch) <= most:
             return self
         order = np.argsort(cost, kind="stable")
         half = most // 2
-        nearest, others = self[order[:half]], self[order[half:]]
-        weights = weights_near(robot, limits, self.q[order[0]])
-        chosen = farthest(others.q * weights, nearest.q * weights, most - half)
-        return self[
-            np.sort(np.concatenate([order[:half], order[half:][np.unique(chosen)]]))
-        ]
+        scaled = self.q[order] * weights_near(robot, limits, self.q[order[0]])
+        far = half + np.unique(farthest(scaled[half:], scaled[:half], most - half))
+        return self[np.sort(np.concatenate([order[:half], order[far]]))]
 
 
-def farthest(places: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
-    """Choose among places (K, n), one after the other, the one that is farthest from all that are kept, (H, n)."""
-    distance = np.abs(places[:, None] - kept[None]).max(axis=2).min(axis=1)
+def farthest(points: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
+    """Choose points, (K, n), each the farthest from all that are kept, (H, n)."""
+    distance = np.abs(points[:, None] - kept[None]).max(axis=2).min(axis=1)
     chosen: list[int] = []
     for _ in range(count):
         chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.abs(places - places[chosen[-1]]).max(axis=1))
+        distance = np.minimum(distance, np.abs(points - points[chosen[-1]]).max(axis=1))
     return chosen
 
 
-_STEP_LENGTH, _STEP_ANGLE = 0.05, 0.25  # m, rad
-_FEWEST, _MOST = 24, 600
-_DENSE = 2000
+def shortest(length: np.ndarray, keys: np.ndarray) -> np.ndarray:
+    """Return where each different row of `keys`, (E, k), has its least `length`, (E,)."""
+    order = np.lexsort((length, *keys.T[::-1]))
+    rows = keys[order]
+    return np.asarray(order[np.append(True, np.any(rows[1:] != rows[:-1], axis=1))])
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Pairs of a node and a posture at the next station.
+
+    Attributes
+    ----------
+    parent : (E,) int ndarray
+        Node in the layer before.
+    step : (E, n) ndarray
+        From the node to the posture, NaN where there is none.
+    key : (E, k) int ndarray
+        Equal for edges to the same node.
+    elsewhere : (E,) bool ndarray
+        Whether there is a posture on any branch.
+    allowed : (E,) bool ndarray
+        Whether the step is one that a motion may make.
+    """
+
+    parent: np.ndarray
+    step: np.ndarray
+    key: np.ndarray
+    elsewhere: np.ndarray
+    allowed: np.ndarray
 
 
 def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
@@ -116,21 +150,20 @@ def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
     (S + 1,) ndarray
         From 0 to 1.
     """
-    targets = path.sample(np.linspace(0.0, 1.0, _DENSE + 1)).target
+    targets = path.sample(np.linspace(0.0, 1.0, 2001)).target
     moves = np.diff(targets[:, : len(task_map.axes)], axis=0)
     sizes = np.linalg.norm(moves, axis=1)
     along = moves[sizes > 0.0] / sizes[sizes > 0.0, None]
     bends = np.arccos(np.clip(np.sum(along[1:] * along[:-1], axis=1), -1.0, 1.0)).sum()
     turns = task_map.norms(task_map.difference(targets[1:], targets[:-1]))[1].sum()
-    steps = max(path.length / _STEP_LENGTH, max(bends, turns) / _STEP_ANGLE, _FEWEST)
-    return np.linspace(0.0, 1.0, int(min(np.ceil(density * steps), _MOST)) + 1)
+    # No step between stations is longer than 0.05 m, and none turns by more than 0.25 rad.
+    steps = max(path.length / 0.05, max(bends, turns) / 0.25, 24)
+    return np.linspace(0.0, 1.0, int(min(np.ceil(density * steps), 600)) + 1)
 
 
 LARGEST_STEP = 0.8
-"""Of any joint between stations, rad or m."""
-_TYPICAL_TIME = 0.5  # s
+"""Largest step of a joint between stations, rad or m."""
 _SLACK = 1e-9
-_LONGEST = 4.0
 
 
 class Lattice(ABC):
@@ -164,39 +197,50 @@ class Lattice(ABC):
         self.problem = problem
         self.s = stations(problem.path, problem.task_map, density)
         self._robot = problem.robot
-        self._nodes, self._seed, self._deadline = nodes, seed, deadline
+        self._nodes = nodes
+        self._seed = seed
+        self._deadline = deadline
         self._backwards = problem.start is None and problem.end is not None
         self._origin = problem.end if self._backwards else problem.start
         self._targets = problem.path.sample(self.s).target
-        # In which turn the angles of a free origin are is open until the joint path is known.
+        # The turns of a free start stay open until the joint path is known.
         self._static = [
             limit for limit in problem.limits if limit.static and not limit.whole_turns
         ]
         limits = problem.robot.limits
-        self._lower, self._upper = (
-            limits.position_lower - _SLACK,
-            limits.position_upper + _SLACK,
-        )
-        self._loose = turning & (self._origin is None)
-        # Turns of a free origin exist all at once, and nobody asks which turn an angle without a range is in, unless a
-        # given end has to be met.
+        self._lower = limits.position_lower - _SLACK
+        self._upper = limits.position_upper + _SLACK
+        self._open_turns = turning & (self._origin is None)
+        # With a free start all turns are equivalent; a joint without a range needs no
+        # turn, unless a given end has to be met.
         self._to_end = problem.end is not None and not self._backwards
         ranged = np.isfinite(self._lower) | np.isfinite(self._upper) | self._to_end
-        self._telling = turning & ranged & ~self._loose
+        self._counts_turns = turning & ranged & ~self._open_turns
+
+    _given_branch: int = 0
+    """Branch of the given start or end posture."""
+    _modulo: np.ndarray
+    """Joints, (n,) bool, whose steps are taken modulo 2 pi."""
 
     @abstractmethod
-    def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
-        """Make the nodes with which joint paths begin, or say why there are none: causes and how often each is met."""
+    def _start_nodes(self, rng: np.random.Generator) -> Layer:
+        """Make nodes at a free start, joint ranges left out of account."""
 
     @abstractmethod
-    def _next(
-        self, before: Layer, station: int, rng: np.random.Generator
-    ) -> Layer | dict[str, int]:
-        """Join the nodes of a layer to the next station, or say why none can be."""
+    def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
+        """List edges from the nodes of a layer to postures at the next station."""
+
+    @abstractmethod
+    def _thin(self, layer: Layer) -> Layer:
+        """Keep no more nodes than a layer may have."""
+
+    def _choose_starts(self, layer: Layer) -> Layer:
+        """Choose among the nodes of a free start."""
+        return self._thin(layer)
 
     @abstractmethod
     def _at_end(self, last: Layer) -> np.ndarray:
-        """Which nodes of the last layer, (K,) bool, meet the given end posture."""
+        """Tell which nodes of the last layer, (K,) bool, meet the given end posture."""
 
     def joint_paths(self, most: int) -> list[JointPath] | DeadEnd:
         """Find joint paths along the path.
@@ -228,15 +272,69 @@ class Lattice(ABC):
         ends = self._ends(layers[-1])
         if not len(ends):
             return DeadEnd(1.0, {JUMPS: 1})
-        q = self._traced(layers, ends)
-        lengths, branches = layers[-1].length[ends], layers[-1].branch[ends]
+        q = self._trace(layers, ends)
+        last = layers[-1][ends]
         found = [
             JointPath(self.problem, self.s, joint_path, float(length), int(branch))
-            for branch, joint_path, length in zip(branches, q, lengths, strict=True)
+            for joint_path, length, branch in zip(
+                q, last.length, last.branch, strict=True
+            )
         ]
-        return self._chosen(found, layers[-1][ends], most)
+        return self._choose(found, last, most)
 
-    def _chosen(
+    def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
+        """Make the nodes with which joint paths begin, or count why there are none."""
+        if self._origin is not None:
+            branch = np.array([self._given_branch])
+            return Layer.start(self._origin[None].astype(float), branch)
+        layer = self._start_nodes(rng)
+        if not len(layer.q):
+            return {NO_ANSWER: 1}
+        inside = self._inside(layer.q, layer.q)
+        within = np.flatnonzero(inside.all(axis=1))
+        if not len(within):
+            return beyond_ranges(self._robot, inside)
+        return self._keep(layer[within], self._choose_starts)
+
+    def _next(
+        self, before: Layer, station: int, rng: np.random.Generator
+    ) -> Layer | dict[str, int]:
+        """Join the nodes of a layer to the next station, or count why none can be."""
+        edges = self._edges(before, station, rng)
+        parent = edges.parent
+        if not len(parent):
+            return {NO_ANSWER: len(before.q)}
+        q = before.q[parent] + edges.step
+        low = np.minimum(before.low[parent], q)
+        high = np.maximum(before.high[parent], q)
+        exists = np.isfinite(q).all(axis=1)
+        with np.errstate(invalid="ignore"):
+            inside = self._inside(low, high)
+            near = edges.allowed & np.all(np.abs(edges.step) <= LARGEST_STEP, axis=1)
+        good = exists & inside.all(axis=1) & near
+        if not good.any():
+            return causes_of(self._robot, edges.elsewhere, exists, inside, near)
+        parent = parent[good]
+        length = before.length[parent] + self._lengths(
+            before.q, edges.step[good], parent
+        )
+        branch = before.branch[parent]
+        layer = Layer(branch, q[good], low[good], high[good], length, parent)
+        return self._keep(layer[shortest(length, edges.key[good])], self._thin)
+
+    def _keep(
+        self, layer: Layer, choose: Callable[[Layer], Layer]
+    ) -> Layer | dict[str, int]:
+        """Choose among the nodes that can be held against gravity."""
+        held, refused = self._check_held(layer.q)
+        return choose(layer[held]) if held.any() else refused
+
+    def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Return the steps, (E, n), from postures to others, modulo 2 pi."""
+        step = q - before
+        return np.where(self._modulo, step - TURN * np.round(step / TURN), step)
+
+    def _choose(
         self, found: list[JointPath], _ends: Layer, most: int
     ) -> list[JointPath]:
         """Choose up to `most` of the joint paths found, which end at these nodes: some that differ."""
@@ -247,11 +345,12 @@ class Lattice(ABC):
         order = np.argsort(last.length, kind="stable")
         if self._to_end:
             order = order[self._at_end(last)[order]]
-        return order[last.length[order] <= _LONGEST * last.length[order[:1]] + _SLACK]
+        return order[last.length[order] <= 4.0 * last.length[order[:1]] + _SLACK]
 
-    def _traced(self, layers: list[Layer], ends: np.ndarray) -> np.ndarray:
+    def _trace(self, layers: list[Layer], ends: np.ndarray) -> np.ndarray:
         """Trace joint paths back from their ends, (E,): postures (E, S + 1, n), in their turns."""
-        nodes, q = ends, []
+        nodes = ends
+        q = []
         for layer in reversed(layers):
             q.append(layer.q[nodes])
             nodes = layer.parent[nodes]
@@ -263,7 +362,7 @@ class Lattice(ABC):
         first, last = self._turns_within(nodes.low, nodes.high)
         with np.errstate(invalid="ignore"):  # inf - inf
             middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / TURN
-        wanted = np.where(self._loose & np.isfinite(middle), np.round(middle), 0.0)
+        wanted = np.where(self._open_turns & np.isfinite(middle), np.round(middle), 0.0)
         return np.clip(wanted, first, last)
 
     def _turns_within(
@@ -275,10 +374,10 @@ class Lattice(ABC):
         least is then above the largest.
         """
         first = np.where(
-            self._loose, np.ceil((self._lower - low) / TURN), low < self._lower
+            self._open_turns, np.ceil((self._lower - low) / TURN), low < self._lower
         )
         last = np.where(
-            self._loose,
+            self._open_turns,
             np.floor((self._upper - high) / TURN),
             -1.0 * (high > self._upper),
         )
@@ -293,7 +392,8 @@ class Lattice(ABC):
         self, q: np.ndarray, step: np.ndarray, origin: np.ndarray
     ) -> np.ndarray:
         """Lengths of steps, (E, n), from the postures q[origin]; see the module."""
-        by_acceleration, by_velocity = np.zeros(len(step)), np.zeros(len(step))
+        by_acceleration = np.zeros(len(step))
+        by_velocity = np.zeros(len(step))
         for limit in self.problem.limits:
             for length, rows in zip(
                 (by_acceleration, by_velocity), limit.step_rows(q), strict=True
@@ -301,21 +401,15 @@ class Lattice(ABC):
                 if rows is not None:
                     parts = np.abs(np.einsum("eij,ej->ei", rows[origin], step))
                     np.maximum(length, parts.max(axis=1), out=length)
-        return by_acceleration + _TYPICAL_TIME * by_velocity
+        return by_acceleration + 0.5 * by_velocity  # T = 0.5 s
 
-    def _held(self, q: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
+    def _check_held(self, q: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
         """Which postures, (K, n), can be held against gravity, (K,) bool, and what refuses how many of the others."""
-        still, held = Moments.at_rest(q), np.ones(len(q), dtype=bool)
+        still = Moments.at_rest(q)
+        held = np.ones(len(q), dtype=bool)
         refused: dict[str, int] = {}
         for limit in self._static:
             allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)
             refused[f"the {limit.name} limit {limit.refusal}"] = int((~allowed).sum())
             held &= allowed
         return held, {cause: count for cause, count in refused.items() if count}
-
-
-def shortest(length: np.ndarray, keys: np.ndarray) -> np.ndarray:
-    """Return where each different row of `keys`, (E, k), has its least `length`, (E,)."""
-    order = np.lexsort((length, *keys.T[::-1]))
-    rows = keys[order]
-    return np.asarray(order[np.append(True, np.any(rows[1:] != rows[:-1], axis=1))])

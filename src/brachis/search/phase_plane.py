@@ -157,7 +157,8 @@ def _lines(
         for order in orders
     ]
     lines = [limit.lines(places, *joints) for limit in limits]
-    floor, ceiling = np.zeros(len(places)), np.full(len(places), np.inf)
+    floor = np.zeros(len(places))
+    ceiling = np.full(len(places), np.inf)
     sloped = []
     for line in lines:
         if line is None:
@@ -174,7 +175,8 @@ def _lines(
     a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
     # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
     a = np.where(np.abs(a) < _SLOWEST, _SLOWEST, a)
-    first, second = (1.0 - c) / a, (-1.0 - c) / a
+    first = (1.0 - c) / a
+    second = (-1.0 - c) / a
     return _Lines(
         (-b / a, -b / a),
         (np.maximum(first, second), np.minimum(first, second)),
@@ -187,7 +189,8 @@ def _controllable(
     lines: _Lines, steps: np.ndarray, last: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Go backwards: the intervals of x, (S,), from which the end can be reached with x = `last`; None where empty."""
-    slope, offset = lines.slope, lines.offset
+    slope = lines.slope
+    offset = lines.offset
     count = len(lines.ceiling)
     if (
         not lines.floor[-1] * (1.0 - _ROUNDING)
@@ -195,7 +198,8 @@ def _controllable(
         <= lines.ceiling[-1] * (1.0 + _ROUNDING)
     ):
         return None
-    low, high = np.full(count, last), np.full(count, last)
+    low = np.full(count, last)
+    high = np.full(count, last)
     for i in range(count - 2, -1, -1):
         step = steps[i]
         # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
@@ -211,7 +215,8 @@ def _controllable(
         clearance = (up[1][:, None] - down[1][None]).ravel()
         if np.any((clearance < 0.0) & (np.abs(tilt) < _SLOWEST)):
             return None
-        falling, rising = tilt < -_SLOWEST, tilt > _SLOWEST
+        falling = tilt < -_SLOWEST
+        rising = tilt > _SLOWEST
         high[i] = min(
             lines.ceiling[i],
             np.min(clearance[falling] / -tilt[falling], initial=np.inf),
@@ -253,14 +258,16 @@ _FIRST_INTERVALS = 60
 """Of a mesh that is refined."""
 _STEADY = 1e-2
 """Changes of the acceleration below this, in paths per square of the duration, are rounding."""
-_LEAST, _BISECTIONS = (1e-5, 1.0), 60
+_LEAST = (1e-5, 1.0)
+_BISECTIONS = 60
 """Between which lengths, in normalised time, that of intervals at a switch is sought, and how; with more intervals than
 are needed for the least one all of them become shorter, as slopes over 1e-9 of the time would say nothing."""
 
 
 def first_breaks(start: Start) -> np.ndarray:
     """Choose the ends of the knot intervals in normalised time, (N + 1,), for a plan from a start."""
-    breaks, paced = breaks_of(start.problem.task), _paced(start)
+    breaks = breaks_of(start.problem.task)
+    paced = _paced(start)
     if paced is None:
         return breaks
     switches = _switches(*paced)
@@ -357,7 +364,8 @@ def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
 
 def _timed(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and when the phase plane passes them, (S,), s."""
-    problem, joint_path = start.problem, start.joint_path
+    problem = start.problem
+    joint_path = start.joint_path
     s = np.linspace(0.0, 1.0, _STATIONS)
     q = start.joint_map.postures(along(joint_path, s))
     if not np.isfinite(q).all():

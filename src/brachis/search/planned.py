@@ -51,7 +51,8 @@ class PlannedMotion(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
-        trajectory, last = self.trajectory, self.solver_report
+        trajectory = self.trajectory
+        last = self.solver_report
         left = {"undone": "; ".join(self.undone)} if self.undone else {}
         remarks = (
             {"warnings": "; ".join(remark.message for remark in self.warnings)}

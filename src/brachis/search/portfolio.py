@@ -173,12 +173,10 @@ class _Search:
         deadline: Deadline,
         listener: Listener,
     ) -> None:
-        self._decompositions, self._stages, self._deadline, self._listener = (
-            decompositions,
-            stages,
-            deadline,
-            listener,
-        )
+        self._decompositions = decompositions
+        self._stages = stages
+        self._deadline = deadline
+        self._listener = listener
         self._task = problem.task
         self.record = Record(refined=self._task.refinement.max_rounds > 0)
 
@@ -226,7 +224,8 @@ class _Search:
 
     def _solve(self, batch: Batch) -> list[Numbered]:
         """Solve the starts of a batch coarsely, and rank those that differ."""
-        record, known = self.record, len(self.record.solved)
+        record = self.record
+        known = len(self.record.solved)
         record.begin(len(batch.starts))
         limit = self._deadline if record.content else self._deadline.part(_COARSE_SHARE)
         share = self._task.search.time_limit * min(
@@ -247,7 +246,8 @@ class _Search:
 
     def _finish(self, ranked: Sequence[Numbered], most: int) -> None:
         """Refine and verify attempts in the order of their end times while they may be the fastest."""
-        jobs, left = self._jobs, most
+        jobs = self._jobs
+        left = most
         for first in range(0, len(ranked), jobs):
             batch = ranked[first : first + jobs]
             if not self._goes_on(ranked[first:], left):

@@ -1,14 +1,14 @@
-"""The lattice of all postures of the arm, whatever branch or choice of redundant joints they belong to.
+"""The lattice of all postures of the arm, whatever branch or choice of joints they are of.
 
-At every node the r joints that move most in the arm's self-motion there are cut into cells; the postures at the cells
-around, at the next station, follow by Newton's method. So every posture that a continuous motion reaches from the
-nodes before is found, at the spacing of the cells, and no closed form ends it. Where neither end is given, the first
-layer comes from all closed forms there are, which see the whole self-motion manifold, or, for arms without one, from
-random postures. Two postures are joined if no joint moves far and the step is along the self-motion: what the next
-target asks of the joints apart, most of it lies in the null space of the Jacobian. Of several redundant joints, cells
-are sampled, and a layer keeps a bounded number of nodes.
-
-Postures at the beginning of a path whose start is free.
+At every node the r joints that move most in the arm's self-motion there are cut into
+cells; the postures at the cells around, at the next station, follow by Newton's method.
+So every posture that a continuous motion reaches from the nodes before is found, at the
+spacing of the cells, and no closed form ends it. Where neither end is given, the first
+layer comes from all closed forms there are, which see the whole self-motion manifold, or,
+for arms without one, from random postures. Two postures are joined if no joint moves far
+and the step is along the self-motion: what the next target asks of the joints apart, most
+of it lies in the null space of the Jacobian. Of several redundant joints, cells are
+sampled, and a layer keeps a bounded number of nodes.
 """
 
 from __future__ import annotations
@@ -24,20 +24,18 @@ from brachis.kinematics import Newton, moving_most, null_spaces, solved_each
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.joints import TURN, complement
 from brachis.search.closed_form_lattice import Cells, cell_sizes
-from brachis.search.joint_path import (
-    NO_ANSWER,
-    JointPath,
-    beyond_ranges,
-    causes_of,
-    distinct,
+from brachis.search.joint_path import JointPath, distinct
+from brachis.search.lattice import (
+    LARGEST_STEP,
+    Edges,
+    Lattice,
+    Layer,
+    farthest,
+    shortest,
 )
-from brachis.search.lattice import LARGEST_STEP, Lattice, Layer, farthest, shortest
-
-_REACH = 10.0
-"""Half of what is drawn of a slide without a range, m."""
 
 
-def beginnings(
+def start_postures(
     problem: Problem,
     decompositions: Sequence[Decomposition],
     newton: Newton,
@@ -69,7 +67,7 @@ def beginnings(
     """
     target = problem.path.sample(np.zeros(1)).target
     if not decompositions:
-        drawn = _drawn(problem, count, rng)
+        drawn = _draw(problem, count, rng)
         q = newton.nearest(np.repeat(target, count, axis=0), drawn)
         q = q[np.isfinite(q).all(axis=1)]
         return q, np.full(len(q), -1)
@@ -89,13 +87,12 @@ def beginnings(
     )
 
 
-def _drawn(problem: Problem, count: int, rng: np.random.Generator) -> np.ndarray:
+def _draw(problem: Problem, count: int, rng: np.random.Generator) -> np.ndarray:
     """Draw postures, (count, n), from the ranges; of joints without one from a turn or from twice the reach."""
-    limits, reach = (
-        problem.robot.limits,
-        np.where(problem.robot.revolute, np.pi, _REACH),
-    )
-    lower, upper = limits.position_lower, limits.position_upper
+    limits = problem.robot.limits
+    reach = np.where(problem.robot.revolute, np.pi, 10.0)
+    lower = limits.position_lower
+    upper = limits.position_upper
     low = np.where(
         np.isfinite(lower),
         lower,
@@ -105,15 +102,10 @@ def _drawn(problem: Problem, count: int, rng: np.random.Generator) -> np.ndarray
     return rng.uniform(low, high, (count, problem.robot.n))
 
 
-_NEIGHBOURS = (-2, -1, 0, 1, 2)
-_STEPS, _RANDOM, _SPREAD = (1.0, 4.0), 6, 2.5  # cells
-_COARSE, _SAME = 0.5, 1e-3  # rad or m
-_ALONG = 0.7
-"""Least part of a step that is self-motion; postures across a fold of the manifold differ in other directions."""
-_AROUND = 3.0  # cells
-_BEGINNINGS, _LEAST_NODES = 12, 10
-"""Free starts of several redundant joints, and nodes that the joint paths from each keep at least."""
-_STARTS = 4  # times the nodes of a layer
+_SAME = 1e-3
+"""Spacing, rad or m, below which postures are the same node."""
+_AROUND = 3.0
+"""Distance, in cells, within which nodes are neighbours on the self-motion manifold."""
 
 
 class PostureLattice(Lattice):
@@ -153,34 +145,36 @@ class PostureLattice(Lattice):
             deadline=deadline,
         )
         self._only_minima = only_minima
-        self._decompositions, self._cells_per_turn = decompositions, cells_per_turn
+        self._decompositions = decompositions
+        self._cells_per_turn = cells_per_turn
         revolute = problem.robot.revolute
         self._r = problem.robot.n - problem.task_map.m
         self._size = cell_sizes(revolute, cells_per_turn)
         self._newton = Newton(problem.task_map)
-        self._modulo = revolute & ~self._telling
-        self._begun: tuple[np.ndarray, np.ndarray] | None = None
+        self._modulo = revolute & ~self._counts_turns
+        self._seeds: tuple[np.ndarray, np.ndarray] | None = None
 
     def _at_end(self, last: Layer) -> np.ndarray:
-        """See `Lattice`."""
+        """Tell which nodes of the last layer, (K,) bool, are the given end posture."""
         assert self.problem.end is not None
         return np.asarray(np.abs(last.q - self.problem.end).max(axis=1) < _SAME)
 
-    def _chosen(
+    def _choose(
         self, found: list[JointPath], ends: Layer, most: int
     ) -> list[JointPath]:
-        """See `Lattice`: those that are no longer than any to a node around theirs, then others that differ.
-
-        Of several redundant joints the nodes are samples, among which there are no such minima.
-        """
+        """Choose joint paths, and name the closed forms from which they start."""
         return [
-            dataclasses.replace(each, seed=self._begun_by(each.q[0]))
-            for each in self._distinct(found, ends, most)
+            dataclasses.replace(each, seed=self._seed_of(each.q[0]))
+            for each in self._choose_minima(found, ends, most)
         ]
 
-    def _distinct(
+    def _choose_minima(
         self, found: list[JointPath], ends: Layer, most: int
     ) -> list[JointPath]:
+        """Choose those no longer than any to a node around theirs, then some that differ.
+
+        Of several redundant joints the nodes are samples: there are no such minima.
+        """
         if self._r > 1:
             return distinct(found, most)
         first, second = self._near(ends.q, ends.q, _AROUND * float(self._size.max()))
@@ -202,53 +196,41 @@ class PostureLattice(Lattice):
         ]
         return minima + others[: most - len(minima)]
 
-    def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
-        """See `Lattice`."""
-        if self._origin is not None:
-            return _layer(self._origin[None].astype(float), np.zeros(1, dtype=int))
-        count = _STARTS * self._nodes
-        self._begun = beginnings(
+    def _start_nodes(self, rng: np.random.Generator) -> Layer:
+        """Make nodes all over the self-motion manifold, one in a cell."""
+        self._seeds = start_postures(
             self.problem,
             self._decompositions,
             self._newton,
             self._cells_per_turn,
-            count,
+            4 * self._nodes,
             rng,
         )
-        q, _ = self._begun
-        if not len(q):
-            return {NO_ANSWER: 1}
+        q, seeds = self._seeds
         _, kept = np.unique(self._key(q, self._size), axis=0, return_index=True)
-        q = q[kept]
-        within = self._inside(q, q)
-        if not within.all(axis=1).any():
-            return beyond_ranges(self._robot, within)
-        q = q[within.all(axis=1)]
-        held, refused = self._held(q)
-        return _layer(*self._told_apart(q[held])) if held.any() else refused
+        return Layer.start(q[kept], seeds[kept])
 
-    def _begun_by(self, q: np.ndarray) -> str:
-        """Tell whose closed form gave a posture, (n,), of the first layer; empty where it was given."""
-        if self._begun is None:
+    def _seed_of(self, q: np.ndarray) -> str:
+        """Name the closed form that gave the start, (n,); empty where it was given."""
+        if self._seeds is None:
             return ""
-        postures, seeds = self._begun
+        postures, seeds = self._seeds
         nearest = int(np.abs(self._step(q, postures)).max(axis=1).argmin())
-        return (
-            "random"
-            if seeds[nearest] < 0
-            else self._decompositions[seeds[nearest]].name
-        )
+        if seeds[nearest] < 0:
+            return "random"
+        return self._decompositions[seeds[nearest]].name
 
-    def _told_apart(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return starts, (K, n), and labels, (K,): joint paths of different labels do not displace each other.
+    def _choose_starts(self, layer: Layer) -> Layer:
+        """Label the starts: joint paths of different labels do not displace each other.
 
-        Of one redundant joint the parts of the self-motion manifold, which hang together; of several, a few postures
-        far from each other, each for itself.
+        Of one redundant joint a label is a connected component of the self-motion
+        manifold; of several, a few postures far from each other have one each.
         """
+        q = layer.q
         if self._r > 1:
             scaled = q / self._size
-            chosen = np.unique([0, *farthest(scaled, scaled[:1], _BEGINNINGS - 1)])
-            return q[chosen], np.arange(len(chosen))
+            chosen = np.unique([0, *farthest(scaled, scaled[:1], 11)])
+            return Layer.start(q[chosen], np.arange(len(chosen)))
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -256,18 +238,16 @@ class PostureLattice(Lattice):
         graph = coo_array(
             (np.ones(len(first)), (first, second)), shape=(len(q), len(q))
         )
-        return q, connected_components(graph, directed=False)[1]
+        return Layer.start(q, connected_components(graph, directed=False)[1])
 
     def _key(self, q: np.ndarray, size: np.ndarray | float) -> np.ndarray:
-        """Whole numbers, (K, n), by which postures are told apart at a spacing; turns that nobody asks for left out."""
+        """Round postures to whole numbers of a spacing, (K, n), without turns that do not count."""
         return np.rint(np.where(self._modulo, np.remainder(q, TURN), q) / size).astype(
             int
         )
 
-    def _next(
-        self, before: Layer, station: int, rng: np.random.Generator
-    ) -> Layer | dict[str, int]:
-        """See `Lattice`."""
+    def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
+        """List edges to the postures at the cells around the nodes, along self-motion."""
         values, jacobian = self._newton.placed(before.q)
         null = null_spaces(jacobian)
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
@@ -275,46 +255,25 @@ class PostureLattice(Lattice):
         square = np.concatenate([jacobian, np.swapaxes(null, 1, 2)], axis=1)
         needed = solved_each(square, np.concatenate([wanted, still], axis=1))
         if self._r <= 1:
-            parent, q = self._pairs(
-                before.q, self._at_cells(before.q, jacobian, null, wanted, station)
-            )
+            around = self._at_cells(before.q, jacobian, null, wanted, station)
+            parent, q = self._pairs(before.q, around)
         else:
-            parent, q = self._sampled(before.q, null, needed, station, rng)
+            parent, q = self._sample(before.q, null, needed, station, rng)
         if self._to_end and station == len(self.s) - 1:
-            own, end = self._pairs(before.q, np.array([self.problem.end]))
-            parent, q = np.append(parent, own), np.vstack([q, end])
-        if not len(q):
-            return {NO_ANSWER: len(before.q)}
+            node, end = self._pairs(before.q, np.array([self.problem.end]))
+            parent = np.append(parent, node)
+            q = np.vstack([q, end])
         step = self._step(before.q[parent], q)
-        near = np.all(np.abs(step) <= LARGEST_STEP, axis=1)
         own = step - needed[parent]
-        near &= np.all(np.abs(own) <= self._size, axis=1) | (
-            np.linalg.norm(np.einsum("eir,ei->er", null[parent], own), axis=1)
-            >= _ALONG * np.linalg.norm(own, axis=1)
-        )
-        low, high = (
-            bound(part[parent], before.q[parent] + step)
-            for bound, part in ((np.minimum, before.low), (np.maximum, before.high))
-        )
-        inside = self._inside(low, high)
-        good = near & inside.all(axis=1)
-        if not good.any():
-            every = np.ones(len(q), dtype=bool)
-            return causes_of(self._robot, every, every, inside, near)
-        parent, step, q = parent[good], step[good], q[good]
-        length = before.length[parent] + self._lengths(before.q, step, parent)
-        branch = before.branch[parent]
-        layer = Layer(
-            _no_cells(branch),
-            branch,
-            before.q[parent] + step,
-            low[good],
-            high[good],
-            length,
+        small = np.all(np.abs(own) <= self._size, axis=1)
+        # Postures across a fold of the manifold differ in other directions.
+        along = np.linalg.norm(np.einsum("eir,ei->er", null[parent], own), axis=1)
+        return Edges(
             parent,
-        )
-        return self._kept(
-            layer[shortest(length, np.column_stack([branch, self._key(q, _SAME)]))]
+            step,
+            np.column_stack([before.branch[parent], self._key(q, _SAME)]),
+            np.ones(len(parent), dtype=bool),
+            small | (along >= 0.7 * np.linalg.norm(own, axis=1)),
         )
 
     def _pairs(
@@ -340,11 +299,6 @@ class PostureLattice(Lattice):
         )
         return pairs["i"], pairs["j"]
 
-    def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Return the steps, (E, n), from postures to others; modulo 2 pi where nobody asks for turns."""
-        step = q - before
-        return np.where(self._modulo, step - TURN * np.round(step / TURN), step)
-
     def _at_cells(
         self,
         q: np.ndarray,
@@ -355,11 +309,10 @@ class PostureLattice(Lattice):
     ) -> np.ndarray:
         """Postures (C, n) at the cells around nodes with postures (K, n), on the way to the next station's target."""
         joints = moving_most(null / self._size[:, None])
-        rows, size = np.eye(self._robot.n)[joints], self._size[joints]
+        rows = np.eye(self._robot.n)[joints]
+        size = self._size[joints]
         at = np.take_along_axis(q, joints, axis=1)
-        offsets = (
-            np.array(_NEIGHBOURS)[:, None] if self._r else np.zeros((1, 0), dtype=int)
-        )
+        offsets = np.arange(-2, 3)[:, None] if self._r else np.zeros((1, 0), dtype=int)
         cells = np.rint(at / size).astype(int)[:, None] + offsets
         levels = cells * size[:, None]
         moved = levels - at[:, None]
@@ -380,16 +333,18 @@ class PostureLattice(Lattice):
         which, begun, cells, levels = (
             part[regular] for part in (which, begun, cells, levels)
         )
-        keys = np.concatenate([joints[which], cells, self._key(begun, _COARSE)], axis=1)
+        keys = np.concatenate([joints[which], cells, self._key(begun, 0.5)], axis=1)
         far = np.tile(np.abs(offsets).sum(axis=1), len(q))[regular]
         chosen = shortest(far.astype(float), keys)
-        found = self._met(begun[chosen], rows[which[chosen]], levels[chosen], station)
+        found = self._project(
+            begun[chosen], rows[which[chosen]], levels[chosen], station
+        )
         found = found[np.isfinite(found).all(axis=1)]
         return np.asarray(
             found[np.unique(self._key(found, _SAME), axis=0, return_index=True)[1]]
         )
 
-    def _sampled(
+    def _sample(
         self,
         q: np.ndarray,
         null: np.ndarray,
@@ -401,14 +356,14 @@ class PostureLattice(Lattice):
         single = [
             sign * step * row
             for row in np.eye(self._r)
-            for step in _STEPS
+            for step in (1.0, 4.0)
             for sign in (-1.0, 1.0)
         ]
         offsets = np.vstack(
             [
                 np.zeros((1, self._r)),
                 single,
-                rng.normal(0.0, _SPREAD, (_RANDOM, self._r)),
+                rng.normal(0.0, 2.5, (6, self._r)),
             ]
         )
         aside = np.einsum("kij,oj->koi", null, offsets) * self._size
@@ -421,11 +376,13 @@ class PostureLattice(Lattice):
         parent = np.repeat(np.arange(len(q)), aside.shape[1])
         begun = ((q + needed)[:, None] + aside).reshape(len(parent), -1)
         rows = np.swapaxes(null, 1, 2)[parent]
-        found = self._met(begun, rows, _product(rows, begun), station)
+        found = self._project(
+            begun, rows, np.einsum("kij,kj->ki", rows, begun), station
+        )
         exists = np.isfinite(found).all(axis=1)
         return parent[exists], found[exists]
 
-    def _met(
+    def _project(
         self, q: np.ndarray, rows: np.ndarray, levels: np.ndarray, station: int
     ) -> np.ndarray:
         """Postures (C, n) near given ones that meet a station's target; see `Newton.solve`."""
@@ -433,52 +390,24 @@ class PostureLattice(Lattice):
             np.repeat(self._targets[station][None], len(q), axis=0), q, rows, levels
         )
 
-    def _kept(self, layer: Layer) -> Layer | dict[str, int]:
-        """Keep nodes that can be held against gravity, not too many of them."""
-        held, refused = self._held(layer.q)
-        if not held.any():
-            return refused
-        kept = layer[held]
+    def _thin(self, layer: Layer) -> Layer:
+        """Keep a bounded number of nodes of each label, of several redundant joints."""
         if self._r <= 1:
-            return kept
-        cost = kept.length
+            return layer
+        cost = layer.length
         if self._to_end:
-            cost = cost + self._lengths(
-                kept.q, self.problem.end - kept.q, np.arange(len(kept.q))
-            )
-        own = [
-            np.flatnonzero(kept.branch == branch) for branch in np.unique(kept.branch)
-        ]
-        most = max(_LEAST_NODES, self._nodes // len(own))
-        parts = [
-            kept[nodes].bounded(most, cost[nodes], self._robot, self.problem.limits)
-            for nodes in own
-        ]
+            left = self.problem.end - layer.q
+            cost = cost + self._lengths(layer.q, left, np.arange(len(left)))
+        labels = np.unique(layer.branch)
+        most = max(10, self._nodes // len(labels))
+        parts = []
+        for label in labels:
+            own = layer.branch == label
+            part = layer[own].thin(most, cost[own], self._robot, self.problem.limits)
+            parts.append(part)
         return Layer(
             *(
                 np.concatenate([getattr(part, each.name) for part in parts])
                 for each in fields(Layer)
             )
         )
-
-
-def _layer(q: np.ndarray, branch: np.ndarray) -> Layer:
-    """Nodes, (K, n), with which joint paths begin, and what tells these apart, (K,)."""
-    return Layer(
-        _no_cells(branch),
-        branch,
-        q,
-        q,
-        q,
-        np.zeros(len(q)),
-        np.zeros(len(q), dtype=int),
-    )
-
-
-def _no_cells(branch: np.ndarray) -> np.ndarray:
-    """Cells of nodes that have none, (K, 0)."""
-    return np.zeros((len(branch), 0), dtype=int)
-
-
-def _product(rows: np.ndarray, q: np.ndarray) -> np.ndarray:
-    return np.asarray(np.einsum("kij,kj->ki", rows, q))

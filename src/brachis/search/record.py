@@ -171,7 +171,8 @@ class Record:
             parts.append(
                 f"the lattice of {' | '.join(self._left_out)} was not searched to its end"
             )
-        total, waiting = len(self.attempts), len(self._waiting)
+        total = len(self.attempts)
+        waiting = len(self._waiting)
         counts = [f"{self._unsolved} not planned"] * bool(self._unsolved) + [
             f"{waiting} not refined"
         ] * bool(waiting)
@@ -228,11 +229,9 @@ def _agree(first: Attempt, second: Attempt) -> bool:
     return bool(np.abs(postures[0] - postures[1]).max() < _SAME_MOTION)
 
 
-WORDS, TIMES, STATUS = (
-    ("joints", "branch", "origin"),
-    ("coarse [s]", "t_end [s]"),
-    "status",
-)
+WORDS = ("joints", "branch", "origin")
+TIMES = ("coarse [s]", "t_end [s]")
+STATUS = "status"
 """The columns; named as in the JSON."""
 
 

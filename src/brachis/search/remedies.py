@@ -18,11 +18,13 @@ _TRIALS = 10
 """Largest number of trials of one number."""
 _NEAR = 1.04
 """The search ends where the smallest change that is enough is known up to this factor."""
-_FASTER, _LARGEST_STEP = 3, 2.0
+_FASTER = 3
+_LARGEST_STEP = 2.0
 """Power by which the factor between two numbers grows while they are all enough, or none is; its largest value."""
 _ALONE = 3
 """Share of the time for a number that is tried once, where others have as many as they have trials."""
-_DIGITS, _ROUNDING = 3, 0.01
+_DIGITS = 3
+_ROUNDING = 0.01
 """Digits of numbers that are tried, and what they leave out of a ratio."""
 
 Trial = Callable[[Task, Deadline, int | None], bool | None]

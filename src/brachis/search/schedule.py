@@ -125,7 +125,8 @@ def _in_closed_forms(
         while (
             rest and not starts
         ):  # decompositions without a joint path make room for others
-            batch, rest = rest[: level.decompositions], rest[level.decompositions :]
+            batch = rest[: level.decompositions]
+            rest = rest[level.decompositions :]
             if task.search.guesses == "numeric":
                 starts = [
                     start
@@ -148,10 +149,8 @@ def _in_closed_forms(
                 level.refined,
                 level.last_resort,
             )
-    many, tried = (
-        len(known) + len(STRATEGIES),
-        {(start.joint_map.redundant_joints, start.origin) for start in known},
-    )
+    many = len(known) + len(STRATEGIES)
+    tried = {(start.joint_map.redundant_joints, start.origin) for start in known}
     again = tuple(
         start.with_solver(solver) for start in known[:_SIZE] for solver in solvers[1:2]
     )

@@ -27,15 +27,21 @@ from brachis.search.phase_plane import first_point
 from brachis.search.processes import each, processes
 from brachis.search.solving import solved_in_chart
 
-_INTERVALS, _DEGREE = 12, 2
+_INTERVALS = 12
+_DEGREE = 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few say most."""
-_TOLERANCE, _ITERATIONS, _NEARLY = 1e-3, 25, 1e-2
+_TOLERANCE = 1e-3
+_ITERATIONS = 25
+_NEARLY = 1e-2
 _PLACES = 97
-_PROGRESS, _PATIENCE = 5e-3, 3
+_PROGRESS = 5e-3
+_PATIENCE = 3
 """A quick solve ends where so many feasible iterates differ by no more than this fraction."""
-_SAME_TIME, _SAME_PATH = 0.02, 0.15
+_SAME_TIME = 0.02
+_SAME_PATH = 0.15
 """Starts are the same where their end times differ by less than this fraction, and no joint by more, rad or m."""
-_SAME_LEAST, _OFTEN = 1.003, 4
+_SAME_LEAST = 1.003
+_OFTEN = 4
 """No further start is looked at where so many quick solves, or as many as are kept, end within this factor of the
 least end time."""
 _ALIKE = 2

@@ -34,7 +34,8 @@ from brachis.search.phase_plane import least_time, least_times
 PIECES = (3, 8)
 """Pieces of the splines that smooth a joint path; more where it cannot be followed so."""
 _START_WEIGHT = 1e3
-_FINER, _DENSER = 3, 2.0
+_FINER = 3
+_DENSER = 2.0
 _FINEST = 96
 
 
@@ -59,11 +60,10 @@ def lattice_starts(
     list of Start or DeadEnd
         Empty where the time was up.
     """
-    cells, nodes, most = (
-        level.cells_per_turn,
-        level.nodes,
-        max(1, level.joint_paths // max(1, len(decomposition.redundant)))
-        * len(decomposition.branches),
+    cells = level.cells_per_turn
+    nodes = level.nodes
+    most = max(1, level.joint_paths // max(1, len(decomposition.redundant))) * len(
+        decomposition.branches
     )
     lattice = ClosedFormLattice(
         decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline
@@ -91,7 +91,8 @@ def _start_along(
     decomposition: Decomposition, joint_path: JointPath, origin: str
 ) -> Start:
     """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
-    s, redundant = joint_path.s, joint_path.q[:, list(decomposition.redundant)]
+    s = joint_path.s
+    redundant = joint_path.q[:, list(decomposition.redundant)]
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
     places = fine_places(s)
     for pieces in PIECES:
@@ -100,7 +101,9 @@ def _start_along(
         if np.isfinite(q).all() and _clear(joint_map, q):
             break
     else:
-        places, stations, q = s, np.column_stack([s, redundant]), joint_path.q
+        places = s
+        stations = np.column_stack([s, redundant])
+        q = joint_path.q
     estimate = least_time(decomposition.problem.limits, places, q)
     return Start(
         decomposition.problem,
@@ -174,7 +177,8 @@ def numeric_starts(
     ]
 
 
-_LARGEST, _SIZES = 1.0 / 16.0, 4
+_LARGEST = 1.0 / 16.0
+_SIZES = 4
 """Standard deviation of the largest waves, in turns, and how many sizes there are, each half the one before."""
 
 
@@ -196,7 +200,8 @@ def varied(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[Joint
         are meant.
     """
     rng = np.random.default_rng(seed)
-    robot, limits = joint_paths[0].problem.robot, joint_paths[0].problem.robot.limits
+    robot = joint_paths[0].problem.robot
+    limits = joint_paths[0].problem.robot.limits
     size = _LARGEST * cell_sizes(robot.revolute, 1)
     found = []
     for number in range(most):
@@ -216,7 +221,8 @@ def varied(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[Joint
 
 def _waves(joint_path: JointPath) -> np.ndarray:
     """Displacements over s, (W, S + 1): zero at the ends that are given."""
-    s, problem = joint_path.s, joint_path.problem
+    s = joint_path.s
+    problem = joint_path.problem
     waves = [np.sin(np.pi * s), 0.5 * np.sin(2.0 * np.pi * s)]
     if problem.start is None:
         waves.append(1.0 - s)
@@ -273,7 +279,8 @@ def _refuse_beyond(
     )
     if beyond[station, column] <= 0.0:
         return
-    where, label = s[beyond[:, column] > 0.0], limit.labels[column]
+    where = s[beyond[:, column] > 0.0]
+    label = limit.labels[column]
     found, allowed = in_figures(limit, column, float(values[station, column]))
     error = PathError(
         f"the {label.kind} limit of {label.subject!r} {limit.refusal}",

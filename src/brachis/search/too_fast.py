@@ -29,9 +29,13 @@ from brachis.problem.feasibility import in_figures
 from brachis.problem.problem import Problem
 from brachis.search.phase_plane import along, fastest, graded
 
-_EXACT, _HOPELESS, _UNLIKELY = 0.97, 0.5, 0.8
+_EXACT = 0.97
+_HOPELESS = 0.5
+_UNLIKELY = 0.8
 """Share of a speed above which it may be possible yet: where the phase plane is exact, where not, and after plans."""
-_STATIONS, _BISECTIONS, _SAMPLES = 401, 10, 400
+_STATIONS = 401
+_BISECTIONS = 10
+_SAMPLES = 400
 _AT_REST = (0.0, 0.0)
 _FIRST = 0.96
 """Part of the largest speed in the phase plane that is tried first: splines fall a little short of it."""
@@ -138,7 +142,8 @@ def _others(problem: Problem) -> Iterator[Limit]:
 
 def _in_phase_plane(start: Start) -> TooFast | None:
     """Tell which speed no motion along the start's joint path has; None where all are possible, or none is asked."""
-    problem, rates = start.problem, start.problem.end_rates
+    problem = start.problem
+    rates = start.problem.end_rates
     asked = any(limit.least_speed for limit in problem.limits)
     if problem.task.boundary.periodic or not (asked or any(rates)):
         return None
@@ -146,7 +151,8 @@ def _in_phase_plane(start: Start) -> TooFast | None:
     q = start.joint_map.postures(along(start.joint_path, s))
     if not np.isfinite(q).all():
         return None
-    stations, others = graded(problem.limits), list(_others(problem))
+    stations = graded(problem.limits)
+    others = list(_others(problem))
     if fastest(problem.limits, s, q, rates, stations) is not None:
         return None
     rate = fastest(others, s, q, rates, stations)
@@ -177,7 +183,8 @@ def _ends_too_fast(
     found: list[tuple[float, str]] = []
     for end, key in enumerate(("start_speed", "end_speed")):
         alone = np.where(np.arange(2) == end, problem.end_rates, 0.0)
-        low, high = 0.0, 1.0
+        low = 0.0
+        high = 1.0
         for _ in range(_BISECTIONS if alone.any() else 0):
             middle = 0.5 * (low + high)
             # On a short path a speed may ask for one at the other end.
@@ -244,7 +251,8 @@ def _falling_short(
     if worst is None or worst[0] <= 0.0:
         return None
     share, limit, column, values, beyond = 1.0 - worst[0], *worst[1:]
-    label, place = limit.labels[column], int(np.argmax(beyond))
+    label = limit.labels[column]
+    place = int(np.argmax(beyond))
     found, allowed = in_figures(limit, column, float(values[place]))
     parts = _within(limit, motion.s)
     inside = np.flatnonzero(parts[:, int(np.argmax(parts[place]))])
@@ -311,9 +319,11 @@ def _find_speed_cap(
         lines = limit.lines(s[inside], q[inside], q_ds[inside], q_dds[inside])
         if lines is None:
             continue
-        slant, lower = lines.x, -np.inf
+        slant = lines.x
+        lower = -np.inf
         if lines.u is not None:
-            slant, lower = lines.x + lines.u * bend[inside, None], -1.0
+            slant = lines.x + lines.u * bend[inside, None]
+            lower = -1.0
         with np.errstate(divide="ignore", invalid="ignore"):
             level = (
                 np.where(slant > 0.0, 1.0 - lines.constant, lower - lines.constant)
@@ -349,7 +359,8 @@ def _explain_reach(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, f
     first, last = s[reached][[0, -1]]
     if not reached[(s >= first) & (s <= last)].all():
         return f"it cannot be held all the way from s = {first:.3g} to {last:.3g}", {}
-    before, behind = not reached[0], not reached[-1]
+    before = not reached[0]
+    behind = not reached[-1]
     ways = [f"before s = {s[0]:.2g}"] * before + [f"behind s = {s[-1]:.2g}"] * behind
     # One end alone: a number is tried by itself.
     cuts = (
