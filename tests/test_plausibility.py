@@ -23,8 +23,7 @@ from brachis.errors import (
 )
 from brachis.problem.plausibility import of_end_time, of_robot, of_task
 from brachis.robot import Robot
-from brachis.robot.limb import first_limb
-from brachis.robot.urdf import read_file
+from brachis.robot.urdf import first_limb, read_file
 from support.chains import Joint, chain_urdf
 
 ROOT = Path(__file__).parents[1]

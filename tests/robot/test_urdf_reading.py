@@ -11,7 +11,7 @@ import pytest
 from brachis import LimitSpec
 from brachis.errors import InputError, LimitError, UnknownNameError, UrdfError
 from brachis.robot import Robot
-from brachis.robot.limb import Limb, first_limb
+from brachis.robot.urdf import Limb, first_limb
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))

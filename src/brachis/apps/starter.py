@@ -28,10 +28,9 @@ from brachis.result import Result
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.dynamics import rigid_torque
 from brachis.robot.joints import UNITS
-from brachis.robot.limb import first_limb
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.task_map.protocol import AXES
-from brachis.robot.urdf import read_chain, read_file
+from brachis.robot.urdf import first_limb, read_chain, read_file
 from brachis.task import LimitSpec, load_task
 from brachis.task.yaml_reader import read_yaml
 

@@ -1,16 +1,14 @@
-"""Reading and checking a URDF with yourdfpy, and the chain from base to tool within it.
+"""The chain from base to tool of a URDF: which joints it has, where the others are held, and what is refused.
 
-What brachis refuses in a URDF: joints that no serial chain has, and bodies that cannot be.
+Of a robot with several limbs, or with fingers, also the chain that is taken unless the user names another.
 """
 
 from __future__ import annotations
 
 import copy
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from lxml import etree
@@ -19,42 +17,52 @@ from brachis.common import files
 from brachis.common.files import Kind, check_kind
 from brachis.errors import UnknownNameError, UrdfError
 from brachis.robot.limits import FARTHEST, UrdfLimit
-from brachis.robot.urdf_bodies import StatedChain, stated_chain
-from brachis.robot.urdf_elements import UrdfTree, check_numbers, read_tree
-
-if TYPE_CHECKING:
-    import yourdfpy
+from brachis.robot.urdf_bodies import Body, StatedChain, inertia_matrix, stated_chain
+from brachis.robot.urdf_elements import (
+    Element,
+    UrdfTree,
+    end_of,
+    number_of,
+    numbers_of,
+    read_tree,
+)
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
-_LEAST_AXIS = 1e-9
+_PINOCCHIO_LIMIT = {"effort": "0", "velocity": "0", "lower": "-1e9", "upper": "1e9"}
+"""Limits of the model: brachis checks those of the URDF and of the task by itself."""
+
+_NUMERIC = ("origin", "axis", "mass", "inertia", "dynamics")
 
 
-def check_joints(
-    chain: Sequence[Any], names: set[str], by_name: Mapping[str, Any], where: str
-) -> None:
+def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
     """Refuse joints that a serial chain of one-coordinate joints cannot have."""
-    for joint in chain:
-        if joint.type not in MOVING_TYPES:
+    for name in chain:
+        joint = tree.joints[name]
+        kind = joint.get("type")
+        if kind not in MOVING_TYPES:
             raise UrdfError(
-                f"joint {joint.name!r} cannot be planned for",
+                f"joint {name!r} cannot be planned for",
                 where=where,
-                found=f"type {joint.type!r}",
+                found=f"type {kind!r}",
                 allowed=", ".join(MOVING_TYPES),
                 hint="Lock it with robot.locked_joints, or set robot.base_frame below it",
             )
-        if joint.axis is not None and not np.linalg.norm(joint.axis) > _LEAST_AXIS:
+        axis = numbers_of(joint, "axis", "xyz", "1 0 0")
+        if not np.linalg.norm(axis) > 1e-9:
             raise UrdfError(
-                f"joint {joint.name!r} has no axis",
+                f"joint {name!r} has no axis",
                 where=where,
-                found=f"<axis xyz={' '.join(f'{component:g}' for component in joint.axis)!r}>",
+                found=f"<axis xyz={' '.join(f'{component:g}' for component in axis)!r}>",
                 allowed="a direction, any length but zero",
             )
-    for joint in by_name.values():
-        if joint.mimic is not None and (
-            joint.name in names or joint.mimic.joint in names
-        ):
+    for name in _movable(tree):
+        mimic = tree.joints[name].find("mimic")
+        if mimic is None:
+            continue
+        leader = mimic.get("joint")
+        if name in chain or leader in chain:
             raise UrdfError(
-                f"joint {joint.name!r} mimics {joint.mimic.joint!r}",
+                f"joint {name!r} mimics {leader!r}",
                 where=where,
                 found="a mimic joint that moves with the chain",
                 allowed="independent joints",
@@ -62,87 +70,61 @@ def check_joints(
             )
 
 
-def check_inertias(
-    urdf: yourdfpy.URDF, chain: Sequence[Any], parents: Mapping[str, Any], where: str
-) -> None:
+def _movable(tree: UrdfTree) -> list[str]:
+    """List the joints that are not fixed."""
+    return [name for name, joint in tree.joints.items() if joint.get("type") != "fixed"]
+
+
+def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
     """Refuse moving bodies without mass and inertias that no body can have.
 
-    A body is the links that move as one, that is, up to the next moving joint of the chain. Massless links (frames)
-    are fine so long as the body as a whole has mass.
+    Massless links (frames) are fine if the body as a whole has mass.
     """
-    moving = {joint.name for joint in chain}
-    bodies: dict[str, list[str]] = {name: [] for name in moving}
-    masses: dict[str, float] = dict.fromkeys(moving, 0.0)
-    for link in urdf.robot.links:
-        joint = parents.get(link.name)
-        while joint is not None and joint.name not in moving:
-            joint = parents.get(joint.parent)
-        if joint is None:
-            continue
-        bodies[joint.name].append(link.name)
-        if link.inertial is not None:
-            masses[joint.name] += link.inertial.mass or 0.0
-            _check_inertia(link, where)
-    for joint in chain:
-        if not masses[joint.name] > 0.0:
+    for body in bodies:
+        for name in body.links:
+            inertial = tree.links[name].find("inertial")
+            if inertial is not None:
+                _check_inertia(name, inertial, where)
+    for body in bodies:
+        if not body.mass > 0.0:
             raise UrdfError(
-                f"the body moved by joint {joint.name!r} has no mass",
+                f"the body moved by joint {body.joint!r} has no mass",
                 where=where,
-                found=f"links {', '.join(bodies[joint.name])} without <inertial>",
+                found=f"links {', '.join(body.links)} without <inertial>",
                 allowed="at least one link with <inertial> and mass > 0 kg",
             )
 
 
-def _check_inertia(link: Any, where: str) -> None:
+def _check_inertia(link: str, inertial: Element, where: str) -> None:
     """Refuse a negative mass and an inertia matrix that breaks the triangle inequality."""
-    mass, matrix = link.inertial.mass or 0.0, link.inertial.inertia
-    if not np.isfinite(mass) or mass < 0.0:
+    mass = numbers_of(inertial, "mass", "value", "0")[0]
+    if mass < 0.0:
         raise UrdfError(
-            f"link {link.name!r} has a non-physical mass",
+            f"link {link!r} has a non-physical mass",
             where=where,
             found=f"{mass:g} kg",
             allowed=">= 0 kg",
         )
-    if matrix is None and mass == 0.0:
-        return
-    if matrix is None:
+    if inertial.find("inertia") is None:
+        if mass == 0.0:
+            return
         raise UrdfError(
-            f"link {link.name!r} has a mass but no <inertia>",
+            f"link {link!r} has a mass but no <inertia>",
             where=where,
             found=f"{mass:g} kg",
             allowed="<inertia> with the moments about the centre of mass",
         )
-    moments = (
-        np.linalg.eigvalsh(np.asarray(matrix, dtype=float))
-        if np.all(np.isfinite(matrix))
-        else np.array([np.nan])
-    )
+    moments = np.linalg.eigvalsh(inertia_matrix(inertial))
     slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
-    physical = moments[0] >= -slack and (
-        len(moments) < 3 or moments[0] + moments[1] >= moments[2] - slack
-    )
-    if not physical:
+    if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
         raise UrdfError(
-            f"link {link.name!r} has a non-physical inertia",
+            f"link {link!r} has a non-physical inertia",
             where=where,
             found="principal moments "
             + ", ".join(f"{m:.4g}" for m in moments)
             + " kg m^2",
             allowed="moments >= 0, none above the sum of the other two",
         )
-
-
-_NEEDED = (
-    "inertial",
-    "parent",
-    "child",
-    "origin",
-    "axis",
-    "limit",
-    "dynamics",
-    "mimic",
-)
-"""Parts of links and joints that say how the robot moves and what it weighs."""
 
 
 @dataclass(frozen=True)
@@ -205,56 +187,42 @@ def read_chain(
     UnknownNameError
         A frame or joint does not exist.
     """
-    tree, urdf = parse_urdf(text, where)
-    parents = {joint.child: joint for joint in urdf.robot.joints}
-    links = list(tree.links)
-    tool = _tool(urdf, tool_frame, where)
+    tree = read_tree(text, where)
+    tool = _find_tool(tree, tool_frame, where)
     base = base_frame if base_frame is not None else tree.root
-    if base not in links:
-        raise UnknownNameError("frame", base, links, where=f"{where}: base_frame")
-    path_joints = joints_between(base, tool, parents, where)
-    by_name = {
-        joint.name: joint for joint in urdf.robot.joints if joint.type != "fixed"
-    }
-    for name in locked_joints:
-        if name not in by_name:
+    if base not in tree.links:
+        raise UnknownNameError("frame", base, tree.links, where=f"{where}: base_frame")
+    path = _joints_between(tree, base, tool, where)
+    movable = _movable(tree)
+    for name, position in locked_joints.items():
+        if name not in movable:
             raise UnknownNameError(
-                "moving joint", name, by_name, where=f"{where}: locked_joints"
+                "moving joint", name, movable, where=f"{where}: locked_joints"
             )
-        if not abs(locked_joints[name]) <= FARTHEST:
+        if not abs(position) <= FARTHEST:
             raise UrdfError(
-                "the position of a locked joint is no position",
+                "the position of a locked joint is too large",
                 where=f"robot.locked_joints.{name}",
-                found=locked_joints[name],
+                found=position,
                 allowed=f"finite, within {FARTHEST:g} rad or m of zero",
             )
-    chain = [
-        joint
-        for joint in path_joints
-        if joint.type != "fixed" and joint.name not in locked_joints
-    ]
-    check_joints(chain, {joint.name for joint in chain}, by_name, where)
+    chain = tuple(
+        name for name in path if name in movable and name not in locked_joints
+    )
+    _check_joints(tree, chain, where)
     if not chain:
         raise UrdfError(
             "no joint moves the tool", where=where, found=f"chain {base} -> {tool}"
         )
     locked = {
-        name: _lock_position(by_name[name], locked_joints)
-        for name in by_name
-        if name not in {j.name for j in chain}
+        name: float(locked_joints.get(name, _rest_position(tree.joints[name])))
+        for name in movable
+        if name not in chain
     }
-    check_inertias(urdf, chain, parents, where)
-    limits = tuple(_limit_of(joint) for joint in chain)
-    names = tuple(joint.name for joint in chain)
-    return UrdfChain(
-        names,
-        limits,
-        locked,
-        tool,
-        base,
-        _plain_xml(urdf),
-        stated_chain(tree, names, locked, tool),
-    )
+    stated = stated_chain(tree, chain, locked, tool)
+    check_inertias(tree, stated.bodies, where)
+    limits = tuple(_read_limit(tree.joints[name]) for name in chain)
+    return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), stated)
 
 
 def read_file(path: Path) -> str:
@@ -288,58 +256,15 @@ def read_file(path: Path) -> str:
         ) from error
 
 
-def parse_urdf(text: str, where: str) -> tuple[UrdfTree, yourdfpy.URDF]:
-    """Read the checked elements of a URDF, and have yourdfpy read what of them is needed.
-
-    Raises
-    ------
-    UrdfError
-        See `read_tree` and `check_numbers`.
-    """
-    import yourdfpy
-
-    tree = read_tree(text, where)
-    check_numbers(tree, where)
-    try:
-        urdf = yourdfpy.URDF.load(
-            io.BytesIO(_needed(tree)),
-            build_scene_graph=False,
-            build_collision_scene_graph=False,
-            load_meshes=False,
-        )
-    except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
-        raise UrdfError(
-            "the URDF cannot be read",
-            where=where,
-            found=f"{type(error).__name__}: {error}",
-        ) from error
-    return tree, urdf
-
-
-def _needed(tree: UrdfTree) -> bytes:
-    """Write links and joints without what does not move or weigh: shapes, drives, plugins."""
-    robot = etree.Element("robot", name="robot")
-    for owner in (*tree.links.values(), *tree.joints.values()):
-        kept = etree.SubElement(
-            robot,
-            owner.tag,
-            {key: owner.get(key) for key in ("name", "type") if owner.get(key)},
-        )
-        kept.extend(copy.deepcopy(part) for part in owner if part.tag in _NEEDED)
-    return bytes(etree.tostring(robot))
-
-
-def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
+def _find_tool(tree: UrdfTree, tool_frame: str | None, where: str) -> str:
     """Check the named tool frame, or take the only leaf link."""
-    links = [link.name for link in urdf.robot.links]
     if tool_frame is not None:
-        if tool_frame not in links:
+        if tool_frame not in tree.links:
             raise UnknownNameError(
-                "frame", tool_frame, links, where=f"{where}: tool_frame"
+                "frame", tool_frame, tree.links, where=f"{where}: tool_frame"
             )
         return tool_frame
-    inner = {joint.parent for joint in urdf.robot.joints}
-    leaves = [name for name in links if name not in inner]
+    leaves = _leaves(tree)
     if len(leaves) != 1:
         raise UrdfError(
             "the tool frame is not clear",
@@ -350,67 +275,171 @@ def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
     return leaves[0]
 
 
-def joints_between(
-    base: str, tool: str, parents: Mapping[str, Any], where: str
-) -> list[Any]:
+def _leaves(tree: UrdfTree) -> tuple[str, ...]:
+    """List the links without children."""
+    inner = {end_of(joint, "parent") for joint in tree.joints.values()}
+    return tuple(name for name in tree.links if name not in inner)
+
+
+def _joints_between(tree: UrdfTree, base: str, tool: str, where: str) -> list[str]:
     """List the joints from base to tool, in chain order."""
-    joints: list[Any] = []
+    joints: list[str] = []
     link = tool
     while link != base:
-        joint = parents.get(link)
-        if joint is None or joint in joints:
+        if link not in tree.above:
             raise UrdfError(
                 "the tool frame is not below the base frame",
                 where=where,
                 found=f"{base} -> {tool}",
             )
-        joints.append(joint)
-        link = joint.parent
+        joints.append(tree.above[link])
+        link = str(end_of(tree.joints[joints[-1]], "parent"))
     return joints[::-1]
 
 
-def _lock_position(joint: Any, locked_joints: Mapping[str, float]) -> float:
-    """Position at which a joint off the chain is held: the user's, else zero or the range's nearest end."""
-    if joint.name in locked_joints:
-        return float(locked_joints[joint.name])
-    if joint.limit is None or joint.type == "continuous":
+def _rest_position(joint: Element) -> float:
+    """Position at which a joint off the chain is held: zero, or the nearest end of its range."""
+    if joint.get("type") == "continuous":
         return 0.0
-    low = -np.inf if joint.limit.lower is None else joint.limit.lower
-    high = np.inf if joint.limit.upper is None else joint.limit.upper
+    lower = number_of(joint, "limit", "lower")
+    upper = number_of(joint, "limit", "upper")
+    low = -np.inf if lower is None else lower
+    high = np.inf if upper is None else upper
     return float(np.clip(0.0, low, high)) if low <= high else 0.0
 
 
-def _limit_of(joint: Any) -> UrdfLimit:
+def _read_limit(joint: Element) -> UrdfLimit:
     """Read the limits of one joint; the range of a revolute or prismatic joint may have to come from the task."""
-    limit = joint.limit
-    velocity, effort = (limit.velocity, limit.effort) if limit else (None, None)
-    if joint.type == "continuous":
+    lower = number_of(joint, "limit", "lower")
+    upper = number_of(joint, "limit", "upper")
+    velocity = number_of(joint, "limit", "velocity")
+    effort = number_of(joint, "limit", "effort")
+    if joint.get("type") == "continuous":
         return UrdfLimit(None, None, velocity, effort)
-    if limit is None or limit.lower is None or limit.upper is None:
+    if lower is None or upper is None:
         return UrdfLimit(None, None, velocity, effort, needs_range=True)
-    return UrdfLimit(limit.lower, limit.upper, velocity, effort)
+    return UrdfLimit(lower, upper, velocity, effort)
 
 
-def _plain_xml(urdf: yourdfpy.URDF) -> str:
+def _plain_xml(tree: UrdfTree) -> str:
     """Write the URDF with one-coordinate joints only; Pinocchio gives a continuous joint two coordinates."""
-    from yourdfpy import Limit
+    robot = etree.Element("robot", name="robot")
+    for name, link in tree.links.items():
+        plain = etree.SubElement(robot, "link", name=name)
+        plain.extend(_copy_parts(link, "inertial"))
+    taken = set(tree.links)
+    for name, joint in tree.joints.items():
+        kind = "fixed"
+        if joint.get("type") in MOVING_TYPES:
+            kind = "prismatic" if joint.get("type") == "prismatic" else "revolute"
+        unique = name
+        while kind == "fixed" and unique in taken:  # Pinocchio looks frames up by name
+            unique += "_joint"
+        taken.add(unique)
+        plain = etree.SubElement(robot, "joint", name=unique, type=kind)
+        plain.extend(
+            _copy_parts(joint, "parent", "child", "origin", "axis", "dynamics")
+        )
+        if kind != "fixed":
+            etree.SubElement(plain, "limit", _PINOCCHIO_LIMIT)
+    return str(etree.tostring(robot, encoding="unicode"))
 
-    taken = {link.name for link in urdf.robot.links}
-    for joint in urdf.robot.joints:
-        joint.mimic = None
-        if joint.type == "continuous":
-            joint.type = "revolute"
-            joint.limit = Limit(effort=0.0, velocity=0.0, lower=-1e9, upper=1e9)
-        elif joint.type not in (*MOVING_TYPES, "fixed"):
-            joint.type = "fixed"
-        elif joint.type != "fixed":
-            joint.limit = Limit(effort=0.0, velocity=0.0, lower=-1e9, upper=1e9)
-        while (
-            joint.type == "fixed" and joint.name in taken
-        ):  # Pinocchio looks frames up by name
-            joint.name += "_joint"
-        taken.add(joint.name)
-    for link in urdf.robot.links:
-        link.visuals, link.collisions = [], []
-    xml = urdf.write_xml_string()
-    return xml.decode() if isinstance(xml, bytes) else str(xml)
+
+@dataclass(frozen=True)
+class Limb:
+    """The chain that is taken from a robot unless the user names another.
+
+    Attributes
+    ----------
+    base : str or None
+        The link from which several limbs part; None for a single limb, which begins at the URDF's root.
+    tool : str
+        The last link before the limb itself parts, into fingers for example; of a single chain its end.
+    leaves : tuple of str
+        Links at the limb's ends.
+    """
+
+    base: str | None
+    tool: str
+    leaves: tuple[str, ...]
+
+
+def first_limb(text: str, where: str) -> Limb:
+    """Find the chain of most joints in a URDF: an arm without its fingers, and without the trunk that it shares.
+
+    Limbs share less than half of their joints. Of several the first one in the file is taken.
+
+    Raises
+    ------
+    UrdfError
+        The text is broken, or no joint moves anything.
+    """
+    tree = read_tree(text, where)
+
+    def count_moving(chain: Iterable[str]) -> int:
+        return sum(tree.joints[name].get("type") in MOVING_TYPES for name in chain)
+
+    chains = {
+        leaf: _joints_between(tree, tree.root, leaf, where) for leaf in _leaves(tree)
+    }
+    most = max(count_moving(chain) for chain in chains.values())
+    if not most:
+        raise UrdfError(
+            "no joint moves", where=where, found=f"chains to {', '.join(chains)}"
+        )
+    longest = [chain for chain in chains.values() if count_moving(chain) == most]
+
+    def is_branch(chain: Sequence[str]) -> bool:
+        """Tell whether a chain parts from the limb in its upper half, and moves there; frames are not fingers."""
+        shared = count_moving(_common_beginning([longest[0], chain]))
+        return 2 * shared >= most and (count_moving(chain) > shared or shared == most)
+
+    limb = {leaf: chain for leaf, chain in chains.items() if is_branch(chain)}
+    trunk = _common_beginning(longest)
+    base = None
+    if trunk and 2 * count_moving(trunk) < most:
+        base = end_of(tree.joints[trunk[-1]], "child")
+    last_joint = _common_beginning(limb.values())[-1]
+    return Limb(base, str(end_of(tree.joints[last_joint], "child")), tuple(limb))
+
+
+def _common_beginning(chains: Collection[Sequence[str]]) -> list[str]:
+    """List the joints with which all chains from the same root begin."""
+    shared = []
+    for joints in zip(*chains, strict=False):
+        if len(set(joints)) > 1:
+            break
+        shared.append(joints[0])
+    return shared
+
+
+def _copy_parts(owner: Element, *tags: str) -> list[Element]:
+    """Copy parts of a checked link or joint, with plain numbers and canonical angles."""
+    parts = [copy.deepcopy(part) for part in owner if part.tag in tags]
+    for part in parts:
+        for element in part.iter(*_NUMERIC):
+            for key, text in element.attrib.items():
+                values = np.array(text.split(), dtype=float)
+                if key == "rpy":
+                    values = _canonical_angles(*values)
+                element.set(key, " ".join(map(str, values)))
+    return parts
+
+
+def _canonical_angles(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Return roll, pitch and yaw of the same rotation, (3,), with a pitch within 90 degrees."""
+    sin_roll, sin_pitch, sin_yaw = np.sin([roll, pitch, yaw])
+    cos_roll, cos_pitch, cos_yaw = np.cos([roll, pitch, yaw])
+    # Adding zero turns -0 into 0, so that half a turn is pi and not -pi.
+    x_axis = cos_pitch * np.array([cos_yaw, sin_yaw]) + 0.0
+    level = np.sqrt(x_axis[0] * x_axis[0] + x_axis[1] * x_axis[1])
+    new_pitch = np.arctan2(sin_pitch, level)
+    if level > 4.0 * np.finfo(float).eps:
+        new_roll = np.arctan2(cos_pitch * sin_roll + 0.0, cos_pitch * cos_roll)
+        return np.array([new_roll, new_pitch, np.arctan2(x_axis[1], x_axis[0])])
+    # At a pitch of 90 degrees roll and yaw turn about the same axis.
+    new_roll = np.arctan2(
+        sin_roll * cos_yaw - sin_pitch * (cos_roll * sin_yaw),
+        sin_pitch * (sin_roll * sin_yaw) + cos_roll * cos_yaw,
+    )
+    return np.array([new_roll, new_pitch, 0.0])

@@ -190,7 +190,9 @@ def _body(
         (weight,) = numbers_of(inertial, "mass", "value", "0")
         mass += weight
         moment += weight * lever
-        second += rotation @ _inertia(inertial) @ rotation.T + weight * _spread(lever)
+        second += rotation @ inertia_matrix(inertial) @ rotation.T + weight * _spread(
+            lever
+        )
     com = moment / mass if mass > 0.0 else np.zeros(3)
     return Body(
         joint=name,
@@ -211,7 +213,7 @@ def _axis(joint: Element) -> np.ndarray:
     return np.asarray(axis / np.linalg.norm(axis))
 
 
-def _inertia(inertial: Element) -> np.ndarray:
+def inertia_matrix(inertial: Element) -> np.ndarray:
     """Matrix of moments and products, kg m^2."""
     xx, xy, xz, yy, yz, zz = (
         numbers_of(inertial, "inertia", key, "0")[0]

@@ -47,7 +47,7 @@ class UrdfTree:
 
 
 def read_tree(text: str, where: str) -> UrdfTree:
-    """Read the elements of a URDF.
+    """Read the elements of a URDF, and check all numbers that brachis uses.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ def read_tree(text: str, where: str) -> UrdfTree:
     ------
     UrdfError
         The text is not XML or not a URDF; xacro macros are left in it; a link or joint has no name or that of another
-        one; a joint has no known type, or hangs from or holds a link that is not there; the links are not one tree.
+        one; a joint has no known type, or hangs from or holds a link that is not there; the links are not one tree; a
+        number is missing or wrong, or an element is there twice. The message names file, line, and link or joint.
     """
     robot = _robot_element(text, where)
     links, joints = _by_name(robot, "link", where), _by_name(robot, "joint", where)
@@ -68,7 +69,10 @@ def read_tree(text: str, where: str) -> UrdfTree:
     for name, joint in joints.items():
         _check_type(name, joint.get("type"), where)
     above = _joints_above(links, joints, where)
-    return UrdfTree(robot, links, joints, above, _root(links, joints, above, where))
+    root = _root(links, joints, above, where)
+    tree = UrdfTree(robot, links, joints, above, root)
+    _check_numbers(tree, where)
+    return tree
 
 
 def place_of(element: Element, where: str) -> str:
@@ -306,20 +310,8 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
 """All that is read from links and joints, and what a number there means."""
 
 
-def check_numbers(tree: UrdfTree, where: str) -> None:
-    """Refuse what is no finite number, at links and joints off the chain as well.
-
-    Parameters
-    ----------
-    tree : UrdfTree
-    where : str
-        Name of the file, for messages.
-
-    Raises
-    ------
-    UrdfError
-        Names file, line, link or joint, and what to write instead; or an element is there twice.
-    """
+def _check_numbers(tree: UrdfTree, where: str) -> None:
+    """Refuse what is not a finite number, at links and joints off the chain as well."""
     for kind, owners in (("link", tree.links), ("joint", tree.joints)):
         paths = dict.fromkeys(entry.path.split("/")[0] for entry in ENTRIES[kind])
         for owner in owners.values():
@@ -336,6 +328,12 @@ def numbers_of(
     element = owner.find(path)
     text = absent if element is None else element.get(attribute, absent)
     return tuple(float(word) for word in text.split())
+
+
+def number_of(owner: Element, path: str, attribute: str) -> float | None:
+    """Return the number of a checked attribute of a link or joint; None if it is absent."""
+    numbers = numbers_of(owner, path, attribute, "")
+    return numbers[0] if numbers else None
 
 
 def _check_single(elements: list[Element], where: str) -> None:

@@ -26,9 +26,8 @@ from brachis.problem.plausibility import of_robot
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import in_use, robot_from_settings
 from brachis.robot.joints import UNITS, shown_unit
-from brachis.robot.limb import first_limb
 from brachis.robot.limits import MAGNITUDES
-from brachis.robot.urdf import read_file
+from brachis.robot.urdf import first_limb, read_file
 from brachis.task import FitReport, LimitSpec, Task
 
 NONE = "none"

@@ -20,7 +20,8 @@ from brachis.apps.compose.elements import Element
 from brachis.common import files
 from brachis.common.files import atomic_write, status_of, writing_errors
 from brachis.errors import InputError
-from brachis.robot.urdf import check_inertias, parse_urdf, read_file
+from brachis.robot.urdf import check_inertias, read_file
+from brachis.robot.urdf_bodies import stated_chain
 from brachis.robot.urdf_elements import read_tree
 
 
@@ -111,11 +112,9 @@ def check_composed(text: str, joint: str, where: str) -> None:
     ------
     UrdfError
     """
-    _, urdf = parse_urdf(text, where)
-    parents = {each.child: each for each in urdf.robot.joints}
-    check_inertias(
-        urdf, [each for each in urdf.robot.joints if each.name == joint], parents, where
-    )
+    tree = read_tree(text, where)
+    carried = stated_chain(tree, (joint,), {}, tree.root)
+    check_inertias(tree, carried.bodies, where)
 
 
 @dataclass(frozen=True, kw_only=True)
