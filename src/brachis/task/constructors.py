@@ -313,9 +313,8 @@ def poses_of(
 ) -> list[tuple[list[float], dict[str, Any]]]:
     """Positions, m, and orientations as a task file writes them."""
     from brachis.task.points.points import points_from
-    from brachis.task.points.units import Units
 
-    points = points_from(transforms, orientations, None, Units(), source, least=1)
+    points = points_from(transforms, orientations, None, FileUnits(), source, least=1)
     turns = [{"quaternion_wxyz": turn} for turn in points.turning.tolist()]
     return list(zip(points.position.tolist(), turns, strict=True))
 
@@ -407,12 +406,9 @@ def fit_path(
     True
     """
     from brachis.task.points.points import points_from
-    from brachis.task.points.units import Units
 
     stated = _checked(FileUnits, units or {}, "units")
-    given = points_from(
-        points, orientations, speed, Units(**stated.model_dump()), _SOURCE
-    )
+    given = points_from(points, orientations, speed, stated, _SOURCE)
     allowed = (
         None if tolerance is None else _checked(FitTolerance, tolerance, "tolerance")
     )

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import TaskError
+from brachis.task.point_data import FitReport, FoundCorner
 from brachis.task.points.checks import (
     of_size,
     refuse_repetitions,
@@ -281,68 +282,6 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
 _MOST = 400
 
 
-@dataclass(frozen=True)
-class CornerRemark:
-    """A corner that was found.
-
-    Attributes
-    ----------
-    row : int
-        Line of the file, or index, of the nearest point.
-    angle : float
-        Change of direction, rad.
-    distance : float
-        Along the path from its first point, m.
-    blend : float
-        What its blend takes from either side, m.
-    """
-
-    row: int
-    angle: float
-    distance: float
-    blend: float
-
-
-@dataclass(frozen=True)
-class Report:
-    """Where a path comes from, and how near it is to the points; as it stands for a path through all of them.
-
-    Attributes
-    ----------
-    source : str
-    points : int
-    length : float
-        m.
-    position_error, position_rms, position_tolerance : float
-        Largest and root mean square distance of the points from the curve, and what was allowed, m.
-    orientation_error, orientation_tolerance : float
-        Largest angle, and what was allowed, rad.
-    intervals : int
-        Knot intervals of the spline, or of all of them.
-    corners : tuple of CornerRemark
-    told : tuple of str
-        What was found out about the data.
-    doubt : str or None
-        What of the data is hardly meant.
-    profile : tuple of (float, float, float)
-        Along the path, m: the largest distance, m, and angle, rad, of the points there.
-    """
-
-    source: str
-    points: int
-    length: float
-    position_error: float = 0.0
-    position_rms: float = 0.0
-    position_tolerance: float = 0.0
-    orientation_error: float = 0.0
-    orientation_tolerance: float = 0.0
-    intervals: int = 0
-    corners: tuple[CornerRemark, ...] = ()
-    told: tuple[str, ...] = ()
-    doubt: str | None = None
-    profile: tuple[tuple[float, float, float], ...] = ()
-
-
 def profile_of(
     along: Array, distances: Array, angles: Array
 ) -> tuple[tuple[float, float, float], ...]:
@@ -383,7 +322,7 @@ class FittedCurve:
 
 def fit_curves(
     points: Points, tolerance: Tolerance, told: tuple[str, ...] = ()
-) -> tuple[tuple[FittedCurve, ...], Report]:
+) -> tuple[tuple[FittedCurve, ...], FitReport]:
     """Return smooth curves within a tolerance of points, and what was found.
 
     Parameters
@@ -431,12 +370,15 @@ def fit_curves(
     )
     told = (*told, *repeated, *filled, *((str(scatter),) if scatter.deviation else ()))
     remarks = tuple(
-        CornerRemark(
-            int(points.rows[corner.index]), corner.angle, float(distance), blend
+        FoundCorner(
+            row=int(points.rows[corner.index]),
+            angle=corner.angle,
+            distance=float(distance),
+            blend=blend,
         )
         for corner, distance, blend in found
     )
-    return curves, replace(report, corners=remarks, told=told)
+    return curves, report.model_copy(update={"corners": remarks, "told": told})
 
 
 def _report(
@@ -446,7 +388,7 @@ def _report(
     points: int,
     source: str,
     doubt: str | None,
-) -> Report:
+) -> FitReport:
     """Report on all stretches, but for their corners and what was told."""
     starts = np.cumsum([0.0, *(stretch.length for stretch in stretches)])
     along = np.concatenate(
@@ -457,7 +399,7 @@ def _report(
     )
     distances = np.concatenate([stretch.distances for stretch in stretches])
     angles = np.concatenate([stretch.angles for stretch in stretches])
-    return Report(
+    return FitReport(
         source=source,
         points=points,
         length=float(starts[-1]),
@@ -472,7 +414,7 @@ def _report(
     )
 
 
-def interpolated(points: Points, told: tuple[str, ...] = ()) -> Report:
+def interpolated(points: Points, told: tuple[str, ...] = ()) -> FitReport:
     """Return what is said of a curve through all points, after a check that its curvature is not that of their scatter.
 
     Parameters
@@ -498,10 +440,15 @@ def interpolated(points: Points, told: tuple[str, ...] = ()) -> Report:
         raise TaskError(
             problem, found=found, allowed=allowed, where=points.source, hint=hint
         )
-    return Report(
-        points.source,
-        len(points),
-        length,
+    return FitReport(
+        source=points.source,
+        points=len(points),
+        length=length,
+        position_error=0.0,
+        position_rms=0.0,
+        position_tolerance=0.0,
+        orientation_error=0.0,
+        orientation_tolerance=0.0,
         intervals=len(points) - 1,
         told=told,
         doubt=of_size(points),

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
-from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS, Units
+from brachis.task.point_data import FileUnits
+from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -110,7 +111,7 @@ def points_from(
     points: Any,
     orientations: Any,
     speed: Any,
-    units: Units,
+    units: FileUnits,
     source: str,
     *,
     least: int = 2,
@@ -125,7 +126,7 @@ def points_from(
         SciPy's rotations; rotation matrices; yaw.
     speed : array_like, (n,), or None
         NaN where none is prescribed.
-    units : Units
+    units : FileUnits
         Of the numbers; m, rad and m/s where not stated.
     source : str
         What messages call the points.
@@ -203,7 +204,7 @@ def _matrices(points: Any) -> Any:
     return points
 
 
-def _turning(orientations: Any, units: Units, source: str) -> Array:
+def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     """Return quaternions, (n, 4), or yaw, (n, 1)."""
     from scipy.spatial.transform import Rotation
 

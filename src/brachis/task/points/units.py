@@ -37,21 +37,6 @@ _QUANTITY = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class Units:
-    """Units of the numbers in a file.
-
-    Attributes
-    ----------
-    length, angle, speed : str or None
-        Out of `LENGTHS`, `ANGLES`, `SPEEDS`; None where nobody has stated it.
-    """
-
-    length: str | None = None
-    angle: str | None = None
-    speed: str | None = None
-
-
 def quantity(text: str, units: dict[str, float]) -> float | None:
     """Read ``0.05 mm`` as a number in SI units; None where it is none."""
     match = _QUANTITY.match(text)
