@@ -30,7 +30,8 @@ def named(function: Callable[_P, _R], where: str | None = None) -> Callable[_P, 
     InputError
         One that is needed is missing, or there are too many without a name.
     """
-    signature, name = inspect.signature(function), where or function.__name__
+    signature = inspect.signature(function)
+    name = where or function.__name__
     parameters = {
         each: own for each, own in signature.parameters.items() if each != "self"
     }

@@ -193,7 +193,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         `OSError` among them.
     """
     with writing_errors(path):
-        target, status = Path(path), status_of(path)
+        target = Path(path)
+        status = status_of(path)
         in_place = status is not None and not stat.S_ISREG(status.st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
@@ -424,15 +425,12 @@ def read_text(
         ) as text:  # any line ends
             return text.read()
     except FileNotFoundError:
-        problem, hint = "there is no such file", f"Paths are relative to {folder}"
+        problem = "there is no such file"
+        hint = f"Paths are relative to {folder}"
     except UnicodeDecodeError as error:
-        problem, hint = (
-            f"not a text file in UTF-8: {error.reason} at byte {error.start}",
-            "",
-        )
+        problem = f"not a text file in UTF-8: {error.reason} at byte {error.start}"
+        hint = ""
     except OSError as error:
-        problem, hint = (
-            f"the file cannot be read: {error.strerror}",
-            hint if error.errno == errno.EFBIG else "",
-        )
+        problem = f"the file cannot be read: {error.strerror}"
+        hint = hint if error.errno == errno.EFBIG else ""
     raise TaskError(problem, found=found, where=where, hint=hint or None)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from brachis.errors import MissingAttributeError
 
-COLUMNS, LINES = 100, 22
+COLUMNS = 100
+LINES = 22
 _ROOM = 104
 """Characters of one value."""
 _ITEMS = 8
@@ -33,7 +34,8 @@ class Summary:
 
     def __repr__(self) -> str:
         """Show it on one line, or on one line for each entry."""
-        entries, name = self._entries(), type(self).__name__
+        entries = self._entries()
+        name = type(self).__name__
         line = f"{name}({', '.join(f'{key}={value}' for key, value in entries)})"
         if len(line) <= COLUMNS:
             return line

@@ -85,7 +85,8 @@ def Line(  # noqa: N802
     """
     if hasattr(to, "homogeneous"):
         ((place, turn),) = poses_of([to], "Line.to")
-        to, orientation = place, orientation or {"to": turn}
+        to = place
+        orientation = orientation or {"to": turn}
     return _segment(
         LineSegment,
         "line",
@@ -407,10 +408,10 @@ def fit_path(
     """
     from brachis.task.points.points import points_from
 
-    stated = _checked(FileUnits, units or {}, "units")
+    stated = _validate(FileUnits, units or {}, "units")
     given = points_from(points, orientations, speed, stated, _SOURCE)
     allowed = (
-        None if tolerance is None else _checked(FitTolerance, tolerance, "tolerance")
+        None if tolerance is None else _validate(FitTolerance, tolerance, "tolerance")
     )
     return tuple(
         segments_along(
@@ -419,7 +420,7 @@ def fit_path(
     )
 
 
-def _checked(model: type[_M], value: object, key: str) -> _M:
+def _validate(model: type[_M], value: object, key: str) -> _M:
     try:
         return model.model_validate(plain(value))
     except ValidationError as error:

@@ -79,7 +79,7 @@ def segments_along(
         Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
     """
     # Imported here: tasks without points need neither NumPy nor SciPy.
-    from brachis.task.points.curves import fit_curves, interpolated
+    from brachis.task.points.curves import check_interpolation, fit_curves
     from brachis.task.points.least_squares import Tolerance
 
     if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
@@ -99,7 +99,7 @@ def segments_along(
                 where=wanted.where,
                 hint=hint,
             )
-        return [_spline_through(points, interpolated(points, told), wanted)]
+        return [_spline_through(points, check_interpolation(points, told), wanted)]
     position, orientation, corner = (
         getattr(wanted.tolerance, name) for name in FitTolerance.model_fields
     )
@@ -194,7 +194,6 @@ def _check_corners(report: FitReport, wanted: Wanted) -> None:
         )
 
 
-_FEWEST_ROWS = 2
 _LARGEST_FILE = 64_000_000
 """Bytes: 100,000 poses with feed rates at full precision take 17 million."""
 
@@ -290,7 +289,8 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
     from brachis.task.points.points import Points
     from brachis.task.points.tables import read_table
 
-    settings, plain = segment.csv, PointFile(file=segment.csv.file)
+    settings = segment.csv
+    plain = PointFile(file=segment.csv.file)
     for key in ("orientation", "units", "tolerance", "corner"):
         if getattr(settings, key) != getattr(plain, key):
             problem = "a path of joints passes all rows, which are in rad and m"
@@ -323,7 +323,7 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
 
 
 def _check_count(rows: int, path: Path) -> None:
-    if rows < _FEWEST_ROWS:
+    if rows < 2:
         problem = "a path needs its start and at least one waypoint"
         raise TaskError(
             problem,

@@ -71,7 +71,7 @@ def _short(text: str) -> str:
 def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
     describe = _DESCRIPTIONS.get(detail["type"], _unforeseen)
     complaint = describe(detail, model)
-    key = _dotted(detail["loc"]) + complaint.key
+    key = _write_location(detail["loc"]) + complaint.key
     where = f"{source}: {key}" if key else source
     return TaskError(
         complaint.problem,
@@ -86,7 +86,7 @@ def _is_tag(part: str | int) -> bool:
     return isinstance(part, str) and part.startswith("<") and part.endswith(">")
 
 
-def _dotted(location: tuple[str | int, ...]) -> str:
+def _write_location(location: tuple[str | int, ...]) -> str:
     """Return a location as ``path[0].line.to``, without the tags of unions."""
     text = ""
     for part in location:
@@ -185,7 +185,8 @@ def _missing(detail: ErrorDetails, model: type[Model]) -> _Complaint:
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     name = str(detail["loc"][-1])
     keys = _keys_at(detail["loc"][:-1], model)
-    elsewhere, near = key_paths(name, model), nearest(name, keys)
+    elsewhere = key_paths(name, model)
+    near = nearest(name, keys)
     hint = (
         f"It is a key of its own: {' or '.join(elsewhere)}"
         if elsewhere
@@ -194,7 +195,7 @@ def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     return _Complaint("unknown key", name, ", ".join(keys), hint)
 
 
-def _refused(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+def _describe_refusal(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
     facts = detail["ctx"]
     found = detail["input"] if facts["found"] is None else facts["found"]
     shown = None if facts["absent"] else show(found)
@@ -208,7 +209,8 @@ def _wrong_form(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
 
 
 def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
-    facts, found = detail["ctx"], detail["input"]
+    facts = detail["ctx"]
+    found = detail["input"]
     known = facts["known"].split()
     near = None
     if isinstance(found, Mapping) and not any(key in found for key in known):
@@ -265,7 +267,7 @@ def _wrong_type(form: str) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
 
 
 _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]]] = {
-    REFUSED: _refused,
+    REFUSED: _describe_refusal,
     WRONG_FORM: _wrong_form,
     WRONG_KEYS: _wrong_keys,
     "missing": _missing,

@@ -25,8 +25,8 @@ from brachis.task.points.checks import (
 from brachis.task.points.corners import (
     Corner,
     blend_size,
+    fill_gaps,
     find_corners,
-    with_gaps_filled,
 )
 from brachis.task.points.fit import deviations, fit_points
 from brachis.task.points.least_squares import Fit, Tolerance
@@ -36,12 +36,9 @@ from brachis.task.points.scatter import Scatter, scatter_of
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_OF_SCATTER = 6.0
-_ROUNDING = 1e-6
-_DRAWN, _TINY = 1e-3, 1e-8
+_TINY = 1e-8
 """By how much a distance may be overestimated, as a part of the tolerance and in m or rad."""
 _SHARPEST = np.deg2rad(150.0)
-_LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +92,8 @@ def fit_between(
     for sharp in corners:
         if sharp.angle > _SHARPEST:
             problem = f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees"
-            found, hint = (
-                points.described(sharp.index),
-                "A path that stops there is for two tasks",
-            )
+            found = points.described(sharp.index)
+            hint = "A path that stops there is for two tasks"
             raise points.wrong(
                 sharp.index,
                 problem,
@@ -106,7 +101,8 @@ def fit_between(
                 allowed="corners up to 150 degrees",
                 hint=hint,
             )
-    starts, ends = [None, *corners], [*corners, None]
+    starts = [None, *corners]
+    ends = [*corners, None]
     stretches = []
     for start, end in zip(starts, ends, strict=True):
         given = np.arange(
@@ -123,13 +119,15 @@ def fit_between(
                 position[row] = corner.place
         whole = replace(whole, position=position)
         chosen = slice(len(before), len(before) + len(given))
-        fit = _fitted(whole, tolerance, scatter, doubt)
-        distances, angles = _checked(whole, fit, tolerance)
+        fit = _fit_one(whole, tolerance, scatter, doubt)
+        distances, angles = _measure_deviations(whole, fit, tolerance)
         stretches.append(Stretch(whole, chosen, fit, distances[chosen], angles[chosen]))
     return stretches
 
 
-def _checked(points: Points, fit: Fit, tolerance: Tolerance) -> tuple[Array, Array]:
+def _measure_deviations(
+    points: Points, fit: Fit, tolerance: Tolerance
+) -> tuple[Array, Array]:
     """Return distances and angles of points from their fit, by another formula than the fit's.
 
     Raises
@@ -143,7 +141,7 @@ def _checked(points: Points, fit: Fit, tolerance: Tolerance) -> tuple[Array, Arr
         (angles, tolerance.orientation, np.pi / 180.0, "deg"),
     ):
         i = int(np.argmax(found))
-        if found[i] > allowed * (1.0 + _DRAWN) + _TINY:
+        if found[i] > allowed * (1.0 + 1e-3) + _TINY:
             problem = "the fitted curve does not pass the points within the tolerance"
             hint = "Raise the tolerance, or cut the path into several"
             away = f"{points.described(i)}, {found[i] / per:.4g} {unit} off"
@@ -172,7 +170,7 @@ def blend_between(
         float(second.distances[second.sigma < widest].max(initial=0.0)),
     )
     left = tolerance.corner - taken
-    if left < _LEAST_SHARE * tolerance.corner:
+    if left < 0.05 * tolerance.corner:
         problem = f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance"
         found = f"points {1e3 * taken:.3g} mm from the fit at {corner_at}"
         hint = "Give a larger tolerance.corner"
@@ -186,7 +184,7 @@ def blend_between(
     return blend_size(corner.angle, left, shortest)
 
 
-def _fitted(
+def _fit_one(
     points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str | None
 ) -> Fit:
     """Fit one curve.
@@ -198,10 +196,8 @@ def _fitted(
     try:
         fit = fit_points(points, tolerance, scatter)
     except ValueError as error:
-        problem, allowed = (
-            "no smooth curve follows these points",
-            "points that move on from each to the next",
-        )
+        problem = "no smooth curve follows these points"
+        allowed = "points that move on from each to the next"
         hint = doubt or "Does the path turn back, or stand still, near there?"
         raise points.wrong(
             0,
@@ -212,12 +208,10 @@ def _fitted(
         ) from error
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
-    if ratios[i] <= 1.0 + _ROUNDING:
+    if ratios[i] <= 1.0 + 1e-6:
         return fit
-    of_turning, hint = (
-        bool(fit.position_errors[i] <= tolerance.position),
-        "Is the row as it should be?",
-    )
+    of_turning = bool(fit.position_errors[i] <= tolerance.position)
+    hint = "Is the row as it should be?"
     if of_turning:
         angles = np.rad2deg([fit.turning_errors[i], tolerance.orientation])
         found, allowed = (f"{angle:.3g} deg" for angle in angles)
@@ -227,7 +221,7 @@ def _fitted(
             f"{1e3 * value:.3g} mm"
             for value in (fit.position_errors[i], tolerance.position)
         )
-        wanted = _OF_SCATTER * scatter.deviation
+        wanted = 6.0 * scatter.deviation
         more = (
             f"; give a tolerance of {1e3 * wanted:.2g} mm or more"
             if wanted > tolerance.position
@@ -279,15 +273,12 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     return tuple(runs)
 
 
-_MOST = 400
-
-
 def profile_of(
     along: Array, distances: Array, angles: Array
 ) -> tuple[tuple[float, float, float], ...]:
     """Return the largest errors of successive groups of points, at most a few hundred groups."""
     starts = np.unique(
-        np.linspace(0, len(along), min(len(along), _MOST), endpoint=False).astype(int)
+        np.linspace(0, len(along), min(len(along), 400), endpoint=False).astype(int)
     )
     largest = (
         np.maximum.reduceat(values, starts).tolist()
@@ -298,7 +289,6 @@ def profile_of(
 
 _ROUGH = 0.5
 """Of the curvature that scatter makes times the length of the path."""
-_ROOMY = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +331,7 @@ def fit_curves(
     points, repeated = without_repetitions(points)
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, tolerance.position)
-    points, filled = with_gaps_filled(points)
+    points, filled = fill_gaps(points)
     corners = find_corners(points, scatter, tolerance.corner)
     doubt = of_size(points)
     stretches = fit_between(points, corners, tolerance, scatter, doubt)
@@ -414,7 +404,7 @@ def _report(
     )
 
 
-def interpolated(points: Points, told: tuple[str, ...] = ()) -> FitReport:
+def check_interpolation(points: Points, told: tuple[str, ...] = ()) -> FitReport:
     """Return what is said of a curve through all points, after a check that its curvature is not that of their scatter.
 
     Parameters
@@ -434,7 +424,7 @@ def interpolated(points: Points, told: tuple[str, ...] = ()) -> FitReport:
     length = float(np.linalg.norm(np.diff(points.position, axis=0), axis=1).sum())
     if scatter.curvature * length > _ROUGH:
         problem = "the points are too rough for a curve through all of them: its curvature would be noise"
-        hint = f"Give a tolerance, for example tolerance: {{position: {_ROOMY * 1e3 * scatter.deviation:.1g} mm}}"
+        hint = f"Give a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}"
         found = f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves"
         allowed = f"less than {_ROUGH / length:.2g} 1/m"
         raise TaskError(

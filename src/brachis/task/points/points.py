@@ -101,8 +101,6 @@ def angles_between(one: Array, other: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0)))
 
 
-_ROTATION = 1e-4
-_MOST_ROWS = 3
 _HOMOGENEOUS = (4, 4)
 _MATRIX = (3, 3)
 
@@ -141,11 +139,7 @@ def points_from(
     values = _array(_matrices(points), source, source)
     if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:
         values, orientations = values[:, :3, 3], values[:, :3, :3]
-    if (
-        values.ndim != 2
-        or not 1 <= values.shape[1] <= _MOST_ROWS
-        or len(values) < least
-    ):
+    if values.ndim != 2 or not 1 <= values.shape[1] <= 3 or len(values) < least:
         allowed = (
             f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
         )
@@ -217,7 +211,7 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     if values.shape[1:] == _MATRIX:
         off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
         _refuse_first(
-            (off > _ROTATION) | (np.linalg.det(values) < 0.0),
+            (off > 1e-4) | (np.linalg.det(values) < 0.0),
             "no rotation matrix",
             values,
             source,

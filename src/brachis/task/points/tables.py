@@ -296,7 +296,8 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
         problem = (
             f"csv.orientation is {stated}, which the columns of the file do not have"
         )
-        found, allowed = ", ".join(names), f"columns {' | '.join(usual)} for {stated}"
+        found = ", ".join(names)
+        allowed = f"columns {' | '.join(usual)} for {stated}"
         hint = (
             f"Or csv.orientation: {choices(possible)}"
             if possible
@@ -401,7 +402,8 @@ def _unit(
     where: str,
 ) -> str:
     """Return the unit of a column: the heading's, else the task's, else the default."""
-    asked, found = getattr(units, kind), f"{unit} for {name}"
+    asked = getattr(units, kind)
+    found = f"{unit} for {name}"
     if unit is not None:
         if unit not in factors:
             raise TaskError(
