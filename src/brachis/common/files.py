@@ -80,7 +80,7 @@ def read_file(
     Raises
     ------
     OSError
-        The file is missing, cannot be read, is no regular file, or is longer; ``strerror`` says which.
+        The file is missing, cannot be read, is not a regular file, or is longer; ``strerror`` says which.
     """
     try:
         descriptor = os.open(
@@ -362,7 +362,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
 def check_kind(
     path: str | os.PathLike[str], expected: Kind | str, error: type[InputError]
 ) -> None:
-    """Refuse a file that is of another kind than is expected; what is none of them is for its reader to refuse.
+    """Refuse a file that is of another kind than is expected; unknown kinds are for the reader to refuse.
 
     Parameters
     ----------
@@ -406,7 +406,7 @@ def read_text(
     where : str
         Place that messages name: the file itself, or the key that asks for it.
     folder : Path
-        What relative paths are relative to, for the message that there is no such file.
+        What relative paths are relative to, for the message about a missing file.
     found : str, optional
         The file, for messages whose place is a key.
     largest : int, optional
@@ -417,7 +417,7 @@ def read_text(
     Raises
     ------
     TaskError
-        The file is missing, is no text file, too long, or cannot be read.
+        The file is missing, is not a text file, too long, or cannot be read.
     """
     try:
         with io.TextIOWrapper(

@@ -394,7 +394,7 @@ def fit_path(
     Raises
     ------
     TaskError
-        Points are wrong, or there is no smooth curve within the tolerance; the message names the row, from 0 on.
+        Points are wrong, or no smooth curve lies within the tolerance; the message names the row, from 0 on.
 
     Examples
     --------

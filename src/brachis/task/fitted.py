@@ -76,7 +76,7 @@ def segments_along(
     Raises
     ------
     TaskError
-        Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
+        Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     # Imported here: tasks without points need neither NumPy nor SciPy.
     from brachis.task.points.curves import check_interpolation, fit_curves

@@ -120,7 +120,7 @@ def task_with(
     Raises
     ------
     UnknownNameError
-        There is no such keyword.
+        The keyword does not exist.
     TaskError
         See `load_task`.
 
@@ -157,7 +157,7 @@ def task_with(
 def check_keywords(
     keywords: Iterable[str], where: str = "plan", own: Sequence[str] = ()
 ) -> None:
-    """Refuse names that are no keywords, and say where keys of these names belong, or which is meant.
+    """Refuse unknown keywords, and say where keys of these names belong, or which is meant.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Joint limits as the task file describes them.
 
 For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
-the key is null, and there is no limit; the key has a value. The models write the absent key as the word `FROM_URDF`,
+the key is null, and nothing limits the joint; the key has a value. The models write the absent key as `FROM_URDF`,
 which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
 joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``, ``jerk`` or
 ``torque_rate``: absent means none.

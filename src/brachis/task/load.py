@@ -101,7 +101,7 @@ def read_assignment(text: str) -> tuple[str, object]:
     Raises
     ------
     TaskError
-        There is no ``=``, or the value is no YAML.
+        The ``=`` is missing, or the value is not YAML.
 
     Examples
     --------

@@ -112,8 +112,8 @@ def _fields_of(model: type) -> Mapping[str, object]:
     return get_type_hints(model)
 
 
-def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
-    """Return the keys that are allowed at a location: the fields of the models that the way there leads to."""
+def _models_at(location: tuple[str | int, ...], model: type[Model]) -> list[type]:
+    """Return the models that may stand at a location."""
     models: list[type] = [model]
     for part in location:
         if _is_tag(part):
@@ -126,7 +126,12 @@ def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
             models = [
                 found for annotation in fields for found in _models_in(annotation)
             ]
-    return [name for one in models for name in _fields_of(one)]
+    return models
+
+
+def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
+    """Return the keys that are allowed at a location."""
+    return [name for one in _models_at(location, model) for name in _fields_of(one)]
 
 
 def key_paths(name: str, model: type[Model]) -> list[str]:
@@ -151,17 +156,13 @@ def key_paths(name: str, model: type[Model]) -> list[str]:
 
 def _description_at(location: tuple[str | int, ...], model: type[Model]) -> str | None:
     """Return what is said of the key at a location."""
-    *before, last = [
-        part for part in location if isinstance(part, str) and not _is_tag(part)
-    ] or [""]
-    models: list[type] = [model]
-    for part in before:
-        fields = [_fields_of(one).get(part) for one in models]
-        models = [found for annotation in fields for found in _models_in(annotation)]
-    known = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
-    found = [
-        field.description for field in known if field is not None and field.description
-    ]
+    names = [part for part in location if isinstance(part, str) and not _is_tag(part)]
+    if not names:
+        return None
+    last = names[-1]
+    models = _models_at(location[: location.index(last)], model)
+    fields = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
+    found = [field.description for field in fields if field and field.description]
     return f"{last}: {found[0].removesuffix('.')}" if len(found) == 1 else None
 
 

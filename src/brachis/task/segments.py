@@ -73,7 +73,7 @@ class BSplineCurve(Model):
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = Field(
         default=(),
         description="Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in "
-        "between; where there is none, none is prescribed.",
+        "between; elsewhere no speed is prescribed.",
     )
     fit: FitReport | None = Field(
         default=None, description="What the curve was fitted to; written by brachis."

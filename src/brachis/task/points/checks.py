@@ -30,12 +30,12 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
     turned = angles_between(points.turning[again], points.turning[again - 1])
     if np.any(turned > SAME):
         i = int(again[np.argmax(turned > SAME)])
-        problem = f"the position stands still from {points.named(i - 1)} on while the tool turns"
+        problem = f"the position stands still from {points.name_row(i - 1)} on while the tool turns"
         hint = "A path that stops and turns on the spot is for segments of its own: csv, turn, csv"
         raise points.wrong(
             i,
             problem,
-            found=points.described(i),
+            found=points.describe(i),
             allowed="a motion of the position",
             hint=hint,
         )
@@ -74,11 +74,11 @@ def refuse_repetitions(points: Points) -> None:
         steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
     if np.any(steps < SAME):
         i = 1 + int(np.argmax(steps < SAME))
-        problem = f"the row repeats {points.named(i - 1)}"
+        problem = f"the row repeats {points.name_row(i - 1)}"
         allowed = f"rows that differ from their predecessors in {'orientation' if still else 'position'}"
         hint = "With a tolerance repeated rows are left out"
         raise points.wrong(
-            i, problem, found=points.described(i), allowed=allowed, hint=hint
+            i, problem, found=points.describe(i), allowed=allowed, hint=hint
         )
 
 
@@ -114,7 +114,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
     if off[i] > allowed[i]:
         problem = "the point is a spike, far off its neighbours"
         away = f"{1e3 * off[i]:.4g} mm off the line between its neighbours; points are {1e3 * usual[i]:.3g} mm apart"
-        found = f"{points.described(i + 1)}, {away}"
+        found = f"{points.describe(i + 1)}, {away}"
         hint = "Correct or remove the row"
         raise points.wrong(
             i + 1,
@@ -150,12 +150,10 @@ def _refuse_factors(points: Points) -> None:
         small, large = (one, other) if ratios[i] > 1.0 else (other, one)
         if np.linalg.norm(large / 1e3 - small) < 0.1 * np.linalg.norm(small):
             word = "larger" if ratios[i] > 1.0 else "smaller"
-            problem = (
-                f"the coordinates are a thousand times {word} than in {points.named(i)}"
-            )
+            problem = f"the coordinates are a thousand times {word} than in {points.name_row(i)}"
             hint = "mm and m, or a lost decimal point? Write all rows in one unit"
-            found = points.described(i + 1)
-            allowed = f"near {points.described(i)}"
+            found = points.describe(i + 1)
+            allowed = f"near {points.describe(i)}"
             raise points.wrong(i + 1, problem, found=found, allowed=allowed, hint=hint)
 
 

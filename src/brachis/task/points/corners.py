@@ -21,7 +21,7 @@ from brachis.task.points.scatter import Scatter
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
 _CERTAIN = np.deg2rad(50.0)
-"""A polygon that turns by this much from one side to the next is no smooth curve."""
+"""A polygon that turns by this much from one side to the next is not a smooth curve."""
 _SHARP = 1.5
 """Over twice the distance a smooth curve turns by twice the angle, a corner by the same one."""
 _DIRECTION = 0.02

@@ -36,8 +36,6 @@ from brachis.task.points.scatter import Scatter, scatter_of
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_TINY = 1e-8
-"""By how much a distance may be overestimated, as a part of the tolerance and in m or rad."""
 _SHARPEST = np.deg2rad(150.0)
 
 
@@ -82,17 +80,17 @@ def fit_between(
 ) -> list[Stretch]:
     """Cut points at their corners and fit a curve to each stretch.
 
-    What of the points is hardly meant, `doubt`, is the hint where that cannot be done.
+    `doubt` says what looks implausible in the points; it is the hint of the error.
 
     Raises
     ------
     TaskError
-        The path turns back, or there is no smooth curve within the tolerance.
+        The path turns back, or no smooth curve lies within the tolerance.
     """
     for sharp in corners:
         if sharp.angle > _SHARPEST:
             problem = f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees"
-            found = points.described(sharp.index)
+            found = points.describe(sharp.index)
             hint = "A path that stops there is for two tasks"
             raise points.wrong(
                 sharp.index,
@@ -141,10 +139,11 @@ def _measure_deviations(
         (angles, tolerance.orientation, np.pi / 180.0, "deg"),
     ):
         i = int(np.argmax(found))
-        if found[i] > allowed * (1.0 + 1e-3) + _TINY:
+        # `deviations` may overestimate by a thousandth of the tolerance and by 1e-8.
+        if found[i] > allowed * (1.0 + 1e-3) + 1e-8:
             problem = "the fitted curve does not pass the points within the tolerance"
             hint = "Raise the tolerance, or cut the path into several"
-            away = f"{points.described(i)}, {found[i] / per:.4g} {unit} off"
+            away = f"{points.describe(i)}, {found[i] / per:.4g} {unit} off"
             raise points.wrong(
                 i, problem, found=away, allowed=f"{allowed / per:.4g} {unit}", hint=hint
             )
@@ -161,7 +160,7 @@ def blend_between(
     TaskError
         The points leave no room.
     """
-    corner_at = first.points.described(len(first.points) - 1)
+    corner_at = first.points.describe(len(first.points) - 1)
     wrong = first.points.wrong
     shortest = min(first.length, second.length)
     widest = blend_size(corner.angle, tolerance.corner, shortest)
@@ -202,7 +201,7 @@ def _fit_one(
         raise points.wrong(
             0,
             problem,
-            found=f"{error}, from {points.described(0)}",
+            found=f"{error}, from {points.describe(0)}",
             allowed=allowed,
             hint=hint,
         ) from error
@@ -232,7 +231,7 @@ def _fit_one(
     raise points.wrong(
         i,
         problem,
-        found=f"{found} at {points.described(i)}",
+        found=f"{found} at {points.describe(i)}",
         allowed=allowed,
         hint=doubt or hint,
     )
@@ -325,7 +324,7 @@ def fit_curves(
     Raises
     ------
     TaskError
-        Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
+        Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     count = len(points)
     points, repeated = without_repetitions(points)

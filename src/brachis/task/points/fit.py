@@ -213,10 +213,6 @@ def _interpolate(points: Points, sigma: Array) -> Fit:
     return measure(points, spline, np.unique(spline.t), sigma)
 
 
-_AROUND = 0.01
-"""Parts of the curve's length: of a stretch of points, and of how far beyond its ends its corners are looked for."""
-
-
 def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     """Return the distances, m, and the angles, rad, between points and a curve, (n,) each.
 
@@ -264,7 +260,7 @@ def _nearest(position: Array, place: Array) -> Array:
     nearest = np.zeros(len(position), dtype=int)
     reached = 0.0
     for stretch, length in _stretches(position, along[-1]):
-        beyond = _AROUND * along[-1]
+        beyond = 0.01 * along[-1]  # of the stretch's ends
         low, high = np.searchsorted(
             along, [reached - beyond, reached + length + beyond]
         )
@@ -278,7 +274,7 @@ def _nearest(position: Array, place: Array) -> Array:
 def _stretches(position: Array, total: float) -> Iterator[tuple[slice, float]]:
     """Cut n points into stretches, with the length of each from the last point before it to its own last one, m.
 
-    The points' polygon is no shorter than the path between them, but for the tolerance.
+    The points' polygon is at least as long as the path between them, but for the tolerance.
     """
     lengths = np.append(
         0.0, np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))

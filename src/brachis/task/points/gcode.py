@@ -70,7 +70,7 @@ def read_gcode(
     Raises
     ------
     TaskError
-        The program has words that are not understood, or an arc is none; the message names the line.
+        The program has words that are not understood, or an invalid arc; the message names the line.
     """
     names = POSITION if isinstance(rows, str) else rows
     if not set(names) <= set(POSITION):
@@ -277,7 +277,7 @@ def _arc(
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
         found = f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end"
         raise TaskError(
-            "the arc is none",
+            "invalid arc: its start and end are at different radii",
             found=found,
             allowed="one radius; I, J, K from the start",
             where=where,
@@ -313,7 +313,7 @@ def _centre(
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
         found = f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart"
         raise TaskError(
-            "the arc is none",
+            "invalid arc: no circle of this radius passes both ends",
             found=found,
             allowed="ends at most 2 R apart, and not the same",
             where=where,

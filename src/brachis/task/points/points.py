@@ -68,14 +68,14 @@ class Points:
         }
         return replace(self, **parts, speed=speed)
 
-    def named(self, i: int) -> str:
+    def name_row(self, i: int) -> str:
         """Name the row of a point."""
         return f"{self.row} {self.rows[i]}"
 
-    def described(self, i: int) -> str:
+    def describe(self, i: int) -> str:
         """Name the row and the position of a point."""
         place = ", ".join(f"{value:.6g}" for value in self.position[i])
-        return f"{self.named(i)}, [{place}] m"
+        return f"{self.name_row(i)}, [{place}] m"
 
     def wrong(
         self, i: int, problem: str, *, found: str, allowed: str, hint: str | None = None
@@ -85,7 +85,7 @@ class Points:
             problem,
             found=found,
             allowed=allowed,
-            where=f"{self.source}: {self.named(i)}",
+            where=f"{self.source}: {self.name_row(i)}",
             hint=hint,
         )
 
@@ -134,11 +134,12 @@ def points_from(
     Raises
     ------
     TaskError
-        Arrays of other shapes, or with numbers that are not finite, or that are no rotations; the row is named.
+        Arrays of wrong shapes, with numbers that are not finite, or matrices that are not rotations; with the row.
     """
     values = _array(_matrices(points), source, source)
     if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:
-        values, orientations = values[:, :3, 3], values[:, :3, :3]
+        orientations = values[:, :3, :3]
+        values = values[:, :3, 3]
     if values.ndim != 2 or not 1 <= values.shape[1] <= 3 or len(values) < least:
         allowed = (
             f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
@@ -165,7 +166,7 @@ def points_from(
                 allowed="(n,)",
                 where=where,
             )
-        problem = "a speed must be positive and finite, or NaN where there is none"
+        problem = "a speed must be positive and finite, or NaN where none is prescribed"
         _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
     for name, one in (("orientations", turning), ("speed", speeds)):
         if one is not None and len(np.atleast_1d(one)) != len(values):

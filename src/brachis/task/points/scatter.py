@@ -12,11 +12,8 @@ from brachis.task.points.points import QUATERNION, Array, Points
 _WHITE = -0.25
 """Correlation of neighbouring residuals below which they are noise: -0.8 for white noise, 1 for a smooth curve."""
 _NEIGHBOURS = (-2, -1, 1, 2)
-_ON_A_LINE = 0.6745
-_IN_SPACE = 1.5382
+_MEDIANS = {1: 0.6745, 2: 1.1774, 3: 1.5382}
 """Median distance from zero of normally distributed points, by their dimension, in standard deviations."""
-_MEDIANS = {2: _ON_A_LINE, 3: 1.1774}
-"""The same from a path, by the dimension of space."""
 _NOTHING = 1e-300
 _SECOND_DIFFERENCE = 6.0**0.5
 """Standard deviation of the second difference of white noise of standard deviation 1."""
@@ -80,18 +77,18 @@ def scatter_of(points: Points) -> Scatter:
     turning = points.turning
     chords = np.linalg.norm(np.diff(position, axis=0), axis=1)
     spacing = float(np.median(chords)) if len(chords) else 0.0
-    if len(points) < 20 or position.shape[1] not in _MEDIANS or not spacing:
+    if len(points) < 20 or position.shape[1] not in (2, 3) or not spacing:
         return Scatter(0.0, 0.0, spacing, None)
     along = position[4:] - position[:-4]
     along /= np.maximum(np.linalg.norm(along, axis=1), _NOTHING)[:, None]
     away = _residuals(position, chords)
     across = away - np.sum(away * along, axis=1)[:, None] * along
-    deviation = _deviation(across, _MEDIANS[position.shape[1]])
+    deviation = _deviation(across, _MEDIANS[position.shape[1] - 1])
     of_turning = 0.0
     if turning.shape[1]:
         # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
         whole, median = (
-            (2.0, _IN_SPACE) if turning.shape[1] == QUATERNION else (1.0, _ON_A_LINE)
+            (2.0, _MEDIANS[3]) if turning.shape[1] == QUATERNION else (1.0, _MEDIANS[1])
         )
         of_turning = whole * _deviation(_residuals(turning, chords), median)
     return Scatter(deviation, of_turning, spacing, decimals_of(position))

@@ -77,7 +77,7 @@ def read_table(
     Raises
     ------
     TaskError
-        A line has the wrong number of values, or one that is no finite number; the message names line and column.
+        A line has the wrong number of values, or one that is not a finite number; the message names line and column.
     """
     told = ["a byte order mark"] if text.startswith("\ufeff") else []
     lines = [

@@ -38,7 +38,7 @@ _QUANTITY = re.compile(
 
 
 def quantity(text: str, units: dict[str, float]) -> float | None:
-    """Read ``0.05 mm`` as a number in SI units; None where it is none."""
+    """Read ``0.05 mm`` as a number in SI units; None for any other text."""
     match = _QUANTITY.match(text)
     if match is None or match[2] not in units:
         return None
