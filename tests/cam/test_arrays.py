@@ -7,8 +7,8 @@ import pytest
 
 import brachis
 from brachis.errors import TaskError
+from brachis.task.point_data import FileUnits
 from brachis.task.points.points import points_from
-from brachis.task.points.units import Units
 
 POINTS = np.linspace([0.0, 0.0, 0.0], [0.1, 0.2, 0.3], 20)
 WRONG = [
@@ -23,19 +23,19 @@ WRONG = [
 @pytest.mark.parametrize(("speed", "message"), WRONG)
 def test_wrong_speeds_are_named(speed, message):
     with pytest.raises(TaskError, match=message):
-        points_from(POINTS, None, speed, Units(), "points")
+        points_from(POINTS, None, speed, FileUnits(), "points")
 
 
 def test_no_speed_may_be_prescribed_in_places():
     speed = np.where(np.arange(20) < 5, np.nan, 0.1)
     np.testing.assert_array_equal(
-        points_from(POINTS, None, speed, Units(), "points").speed, speed
+        points_from(POINTS, None, speed, FileUnits(), "points").speed, speed
     )
 
 
 def test_empty_arrays_are_refused():
     with pytest.raises(TaskError, match="an array without numbers"):
-        points_from(np.empty((0, 3)), None, None, Units(), "points")
+        points_from(np.empty((0, 3)), None, None, FileUnits(), "points")
 
 
 def test_feed_rates_without_a_tolerance_are_refused_not_lost():

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
 from brachis.task.points.checks import of_size, refuse_spikes, without_repetitions
-from brachis.task.points.curves import fit_curves, interpolated
+from brachis.task.points.curves import check_interpolation, fit_curves
 from brachis.task.points.least_squares import Tolerance
 from brachis.task.points.scatter import decimals_of, scatter_of
 from support.seams import bent, points, wave
@@ -109,7 +109,7 @@ def test_rounding_is_told_from_scatter():
     assert decimals_of(rounded) == 6
     assert decimals_of(wave(100)) is None
     with pytest.raises(TaskError) as caught:
-        interpolated(points(rounded))
+        check_interpolation(points(rounded))
     message = str(caught.value)
     for text in (
         "too rough",
@@ -118,13 +118,13 @@ def test_rounding_is_told_from_scatter():
         "tolerance: {position:",
     ):
         assert text in message
-    interpolated(points(np.round(wave(2_000), 12)))
-    interpolated(points(wave(2_000)))
+    check_interpolation(points(np.round(wave(2_000), 12)))
+    check_interpolation(points(wave(2_000)))
     with pytest.raises(
         TaskError,
         match=r"scatter by 0.02\d* mm \(standard deviation\) at 0.5\d* mm spacing",
     ):
-        interpolated(points(wave(2_000, 0.02 * MM)))
+        check_interpolation(points(wave(2_000, 0.02 * MM)))
 
 
 def test_orientations_that_scatter_are_told_from_smooth_ones():

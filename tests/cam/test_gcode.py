@@ -96,11 +96,11 @@ MISTAKES = [
     ("X1 Y1 Z1", r"line 1: a move before G0"),
     (
         "G0 X1 Y1 Z1\nG2 X5 Y1 I1 J1 F10",
-        r"line 2: the arc is none; found radius 1.41421 mm at its start",
+        r"line 2: invalid arc: its start and end are at different radii; found radius 1.41421 mm at its start",
     ),
     (
         "G0 X1 Y1 Z1\nG2 X5 Y1 R1 F10",
-        r"line 2: the arc is none; found R 1 mm for ends 4 mm apart",
+        r"line 2: invalid arc: no circle of this radius passes both ends; found R 1 mm for ends 4 mm apart",
     ),
     ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: not understood; found 'X#1'"),
     ("G0 X1 Y1 Z1\nG1 X2 F0", r"line 2: a feed rate must be positive; found F0"),

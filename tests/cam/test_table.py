@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from brachis.errors import TaskError
+from brachis.task.point_data import FileUnits
 from brachis.task.points.tables import (
     allowed_columns,
     points_of,
     read_table,
     understood,
 )
-from brachis.task.points.units import Units
 
 
 def read(text, rows="pose", units=None, orientation=None):
@@ -25,7 +25,9 @@ def read(text, rows="pose", units=None, orientation=None):
         allowed,
         lambda header, where: understood(header, where, rows, orientation),
     )
-    return points_of(table, rows, units or Units(), "a.csv", orientation), table.told
+    return points_of(
+        table, rows, units or FileUnits(), "a.csv", orientation
+    ), table.told
 
 
 @pytest.mark.parametrize(
@@ -67,7 +69,9 @@ def test_units_in_the_header(header):
 def test_units_of_the_task():
     text = "x,y,z,rx,ry,rz,f\n1,2,3,0,0,90,600\n4,5,6,0,0,45,1200\n"
     (points, told), _ = read(
-        text, units=Units("mm", "deg", "mm/min"), orientation="rotation_vector"
+        text,
+        units=FileUnits(length="mm", angle="deg", speed="mm/min"),
+        orientation="rotation_vector",
     )
     np.testing.assert_allclose(points.position[1], [4e-3, 5e-3, 6e-3])
     np.testing.assert_allclose(
@@ -88,37 +92,37 @@ def test_quaternions_get_like_signs():
 MISTAKES = [
     (
         "x_mm,y_mm,z_mm\n1,2,3\n4,5,6",
-        Units(length="m"),
+        FileUnits(length="m"),
         r"line 1: the header contradicts .* found mm for x; allowed: m",
     ),
     (
         "x_ft,y,z\n1,2,3\n4,5,6",
-        Units(),
+        FileUnits(),
         r"line 1: unknown unit of length; found ft for x; allowed: m, cm, mm",
     ),
     (
         "x,y,z,feed\n1,2,3,4\n4,5,6,7",
-        Units(),
+        FileUnits(),
         r"the unit of feed is not stated; allowed: m/s, mm/s.*feed_mm/min",
     ),
     (
         "x,y,z,feed_mm/s\n1,2,3,4\n4,5,6,0",
-        Units(),
+        FileUnits(),
         r"line 3: a feed rate must be positive; found 0 m/s",
     ),
     (
         "x,y,z\n1,5,2,5,3,5\n4,5,6",
-        Units(),
+        FileUnits(),
         r"line 2: wrong number of values; found 6; .*Decimal commas need",
     ),
     (
         "x;y;z\n1.000,5;2;3\n4;5;6",
-        Units(),
+        FileUnits(),
         r"line 2: decimal points and commas in one line; found '1.000,5;2;3'",
     ),
     (
         "x;y;z\n1,5;2;3\n4;NaN;6",
-        Units(),
+        FileUnits(),
         r"line 3: the value of column y is not a finite number; found 'NaN'",
     ),
 ]

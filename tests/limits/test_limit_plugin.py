@@ -245,7 +245,7 @@ def test_what_is_no_limit_is_refused(wrong):
 
 
 def test_limits_are_a_list():
-    with pytest.raises(InputError, match="limits: is no list"):
+    with pytest.raises(InputError, match="limits: is not a list"):
         brachis.plan(LINE, own_limits=Given())
 
 

@@ -26,17 +26,18 @@ def named(function: Callable[_P, _R], where: str | None = None) -> Callable[_P, 
     Raises
     ------
     UnknownNameError
-        There is no such keyword.
+        The keyword does not exist.
     InputError
         One that is needed is missing, or there are too many without a name.
     """
-    signature, name = inspect.signature(function), where or function.__name__
+    signature = inspect.signature(function)
+    name = where or function.__name__
     parameters = {
         each: own for each, own in signature.parameters.items() if each != "self"
     }
 
     @wraps(function)
-    def checked(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+    def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         for keyword in kwargs:
             if keyword not in parameters:
                 raise UnknownNameError("keyword", keyword, parameters, where=name)
@@ -49,7 +50,7 @@ def named(function: Callable[_P, _R], where: str | None = None) -> Callable[_P, 
             raise InputError(str(error), where=name, allowed=allowed) from None
         return function(*args, **kwargs)
 
-    return checked
+    return call
 
 
 def _in_words(parameter: inspect.Parameter) -> str:
@@ -87,7 +88,7 @@ def check_callable(value: object, where: str) -> None:
 
 
 def check_list(value: object, where: str, of: str) -> None:
-    """Refuse what is no list or tuple, `of` certain things.
+    """Refuse what is not a list or tuple, `of` certain things.
 
     Raises
     ------
@@ -95,7 +96,7 @@ def check_list(value: object, where: str, of: str) -> None:
     """
     if not isinstance(value, Sequence) or isinstance(value, str):
         raise InputError(
-            "is no list",
+            "is not a list",
             where=where,
             found=repr(value),
             allowed=f"a list of {of}: {where}=[...]",

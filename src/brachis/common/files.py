@@ -80,7 +80,7 @@ def read_file(
     Raises
     ------
     OSError
-        The file is missing, cannot be read, is no regular file, or is longer; ``strerror`` says which.
+        The file is missing, cannot be read, is not a regular file, or is longer; ``strerror`` says which.
     """
     try:
         descriptor = os.open(
@@ -193,7 +193,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         `OSError` among them.
     """
     with writing_errors(path):
-        target, status = Path(path), status_of(path)
+        target = Path(path)
+        status = status_of(path)
         in_place = status is not None and not stat.S_ISREG(status.st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
@@ -361,7 +362,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
 def check_kind(
     path: str | os.PathLike[str], expected: Kind | str, error: type[InputError]
 ) -> None:
-    """Refuse a file that is of another kind than is expected; what is none of them is for its reader to refuse.
+    """Refuse a file that is of another kind than is expected; unknown kinds are for the reader to refuse.
 
     Parameters
     ----------
@@ -405,7 +406,7 @@ def read_text(
     where : str
         Place that messages name: the file itself, or the key that asks for it.
     folder : Path
-        What relative paths are relative to, for the message that there is no such file.
+        What relative paths are relative to, for the message about a missing file.
     found : str, optional
         The file, for messages whose place is a key.
     largest : int, optional
@@ -416,7 +417,7 @@ def read_text(
     Raises
     ------
     TaskError
-        The file is missing, is no text file, too long, or cannot be read.
+        The file is missing, is not a text file, too long, or cannot be read.
     """
     try:
         with io.TextIOWrapper(
@@ -424,15 +425,12 @@ def read_text(
         ) as text:  # any line ends
             return text.read()
     except FileNotFoundError:
-        problem, hint = "there is no such file", f"Paths are relative to {folder}"
+        problem = "there is no such file"
+        hint = f"Paths are relative to {folder}"
     except UnicodeDecodeError as error:
-        problem, hint = (
-            f"not a text file in UTF-8: {error.reason} at byte {error.start}",
-            "",
-        )
+        problem = f"not a text file in UTF-8: {error.reason} at byte {error.start}"
+        hint = ""
     except OSError as error:
-        problem, hint = (
-            f"the file cannot be read: {error.strerror}",
-            hint if error.errno == errno.EFBIG else "",
-        )
+        problem = f"the file cannot be read: {error.strerror}"
+        hint = hint if error.errno == errno.EFBIG else ""
     raise TaskError(problem, found=found, where=where, hint=hint or None)

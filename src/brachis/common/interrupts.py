@@ -66,7 +66,7 @@ def listen() -> None:
 
 
 def presses() -> Presses | None:
-    """Return the handler that remembers presses; None where there is none, within another program for example."""
+    """Return the handler that remembers presses; None within another program, for example."""
     handler = signal.getsignal(signal.SIGINT)
     return handler if isinstance(handler, Presses) else None
 

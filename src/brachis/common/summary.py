@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from brachis.errors import MissingAttributeError
 
-COLUMNS, LINES = 100, 22
+COLUMNS = 100
+LINES = 22
 _ROOM = 104
 """Characters of one value."""
 _ITEMS = 8
@@ -33,7 +34,8 @@ class Summary:
 
     def __repr__(self) -> str:
         """Show it on one line, or on one line for each entry."""
-        entries, name = self._entries(), type(self).__name__
+        entries = self._entries()
+        name = type(self).__name__
         line = f"{name}({', '.join(f'{key}={value}' for key, value in entries)})"
         if len(line) <= COLUMNS:
             return line
@@ -64,16 +66,16 @@ def shown(value: Any, room: int = _ROOM) -> str:
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple) and shape:
         return (
-            _listed(value.tolist(), room)
+            _list_items(value.tolist(), room)
             if len(shape) == 1 and shape[0] <= _ITEMS
             else f"array {shape}"
         )
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, str):
-        return _shortened(value, room)
+        return _shorten(value, room)
     if type(value) in {list, tuple}:  # not those with names
-        return _listed(value, room)
+        return _list_items(value, room)
     if isinstance(value, Mapping):
         items = ", ".join(
             f"{key}: {shown(each, room)}" for key, each in list(value.items())[:_ITEMS]
@@ -87,14 +89,14 @@ def shown(value: Any, room: int = _ROOM) -> str:
     return text if len(text) <= room and "\n" not in text else type(value).__name__
 
 
-def _shortened(text: str, room: int) -> str:
+def _shorten(text: str, room: int) -> str:
     if len(text) <= room and "\n" not in text:
         return text
     count = f"... ({len(text)} characters)"
     return text.partition("\n")[0][: room - len(count)] + count
 
 
-def _listed(values: list[Any] | tuple[Any, ...], room: int) -> str:
+def _list_items(values: list[Any] | tuple[Any, ...], room: int) -> str:
     text = f"[{', '.join(shown(each, room) for each in values[:_ITEMS])}]"
     return (
         text if len(text) <= room and len(values) <= _ITEMS else f"{len(values)} items"

@@ -85,7 +85,8 @@ def Line(  # noqa: N802
     """
     if hasattr(to, "homogeneous"):
         ((place, turn),) = poses_of([to], "Line.to")
-        to, orientation = place, orientation or {"to": turn}
+        to = place
+        orientation = orientation or {"to": turn}
     return _segment(
         LineSegment,
         "line",
@@ -313,9 +314,8 @@ def poses_of(
 ) -> list[tuple[list[float], dict[str, Any]]]:
     """Positions, m, and orientations as a task file writes them."""
     from brachis.task.points.points import points_from
-    from brachis.task.points.units import Units
 
-    points = points_from(transforms, orientations, None, Units(), source, least=1)
+    points = points_from(transforms, orientations, None, FileUnits(), source, least=1)
     turns = [{"quaternion_wxyz": turn} for turn in points.turning.tolist()]
     return list(zip(points.position.tolist(), turns, strict=True))
 
@@ -394,7 +394,7 @@ def fit_path(
     Raises
     ------
     TaskError
-        Points are wrong, or there is no smooth curve within the tolerance; the message names the row, from 0 on.
+        Points are wrong, or no smooth curve lies within the tolerance; the message names the row, from 0 on.
 
     Examples
     --------
@@ -407,14 +407,11 @@ def fit_path(
     True
     """
     from brachis.task.points.points import points_from
-    from brachis.task.points.units import Units
 
-    stated = _checked(FileUnits, units or {}, "units")
-    given = points_from(
-        points, orientations, speed, Units(**stated.model_dump()), _SOURCE
-    )
+    stated = _validate(FileUnits, units or {}, "units")
+    given = points_from(points, orientations, speed, stated, _SOURCE)
     allowed = (
-        None if tolerance is None else _checked(FitTolerance, tolerance, "tolerance")
+        None if tolerance is None else _validate(FitTolerance, tolerance, "tolerance")
     )
     return tuple(
         segments_along(
@@ -423,7 +420,7 @@ def fit_path(
     )
 
 
-def _checked(model: type[_M], value: object, key: str) -> _M:
+def _validate(model: type[_M], value: object, key: str) -> _M:
     try:
         return model.model_validate(plain(value))
     except ValidationError as error:

@@ -5,7 +5,7 @@ Segments from files of points: interpolated by a spline, or fitted by smooth cur
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from math import degrees
 from pathlib import Path
@@ -26,7 +26,7 @@ from brachis.task.segments import (
 )
 
 if TYPE_CHECKING:
-    from brachis.task.points.curves import FittedCurve, Report
+    from brachis.task.points.curves import FittedCurve
     from brachis.task.points.points import Points
 
 _QUATERNION = 4
@@ -76,10 +76,10 @@ def segments_along(
     Raises
     ------
     TaskError
-        Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
+        Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     # Imported here: tasks without points need neither NumPy nor SciPy.
-    from brachis.task.points.curves import fit_curves, interpolated
+    from brachis.task.points.curves import check_interpolation, fit_curves
     from brachis.task.points.least_squares import Tolerance
 
     if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
@@ -99,9 +99,7 @@ def segments_along(
                 where=wanted.where,
                 hint=hint,
             )
-        return [
-            _spline_through(points, _named(interpolated(points, told), wanted), wanted)
-        ]
+        return [_spline_through(points, check_interpolation(points, told), wanted)]
     position, orientation, corner = (
         getattr(wanted.tolerance, name) for name in FitTolerance.model_fields
     )
@@ -110,14 +108,11 @@ def segments_along(
     )
     if len(curves) > 1:
         _check_corners(report, wanted)
-    named = _named(report, wanted)
+    report = report.model_copy(update={"source": wanted.source})
     return [
-        _segment(i, curve, len(curves), named, wanted) for i, curve in enumerate(curves)
+        _segment(i, curve, len(curves), report, wanted)
+        for i, curve in enumerate(curves)
     ]
-
-
-def _named(report: Report, wanted: Wanted) -> FitReport:
-    return FitReport(**{**asdict(report), "source": wanted.source})
 
 
 def _spline_through(points: Points, report: FitReport, wanted: Wanted) -> SplineSegment:
@@ -136,7 +131,7 @@ def _spline_through(points: Points, report: FitReport, wanted: Wanted) -> Spline
         relative=wanted.relative,
         starts_at=places[0],
         starts_oriented=turned[0] if turned else None,
-        fit=report,
+        fit=report.model_copy(update={"source": wanted.source}),
     )
     return SplineSegment(
         blend=wanted.blend, orientation=wanted.orientation, spline=spline
@@ -160,7 +155,7 @@ def _segment(
     return BSplineSegment(blend=blend, orientation=wanted.orientation, bspline=shape)
 
 
-def _check_corners(report: Report, wanted: Wanted) -> None:
+def _check_corners(report: FitReport, wanted: Wanted) -> None:
     """Refuse corners where they are not to be rounded, and turns that would have to go on over them.
 
     Raises
@@ -199,7 +194,6 @@ def _check_corners(report: Report, wanted: Wanted) -> None:
         )
 
 
-_FEWEST_ROWS = 2
 _LARGEST_FILE = 64_000_000
 """Bytes: 100,000 poses with feed rates at full precision take 17 million."""
 
@@ -262,7 +256,6 @@ def _points_of(
         read_table,
         understood,
     )
-    from brachis.task.points.units import Units
 
     path = folder / settings.file
     text = read_text(
@@ -282,9 +275,8 @@ def _points_of(
         rows = task.task_space
         check = partial(understood, rows=rows, stated=settings.orientation)
         table = read_table(text, str(path), allowed_columns(rows), check)
-        units = Units(**settings.units.model_dump())
         points, of_units = points_of(
-            table, rows, units, str(path), settings.orientation
+            table, rows, settings.units, str(path), settings.orientation
         )
         told = (*table.told, *of_units)
     _check_count(len(points), path)
@@ -297,7 +289,8 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
     from brachis.task.points.points import Points
     from brachis.task.points.tables import read_table
 
-    settings, plain = segment.csv, PointFile(file=segment.csv.file)
+    settings = segment.csv
+    plain = PointFile(file=segment.csv.file)
     for key in ("orientation", "units", "tolerance", "corner"):
         if getattr(settings, key) != getattr(plain, key):
             problem = "a path of joints passes all rows, which are in rad and m"
@@ -330,7 +323,7 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
 
 
 def _check_count(rows: int, path: Path) -> None:
-    if rows < _FEWEST_ROWS:
+    if rows < 2:
         problem = "a path needs its start and at least one waypoint"
         raise TaskError(
             problem,

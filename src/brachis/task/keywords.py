@@ -120,7 +120,7 @@ def task_with(
     Raises
     ------
     UnknownNameError
-        There is no such keyword.
+        The keyword does not exist.
     TaskError
         See `load_task`.
 
@@ -150,14 +150,14 @@ def task_with(
             if key in _SECTION_OF
             else {key: _in_full(key, value)}
         )
-        content = _merged(content, whole)
+        content = _merge(content, whole)
     return load_task(content)
 
 
 def check_keywords(
     keywords: Iterable[str], where: str = "plan", own: Sequence[str] = ()
 ) -> None:
-    """Refuse names that are no keywords, and say where keys of these names belong, or which is meant.
+    """Refuse unknown keywords, and say where keys of these names belong, or which is meant.
 
     Parameters
     ----------
@@ -219,13 +219,13 @@ def _in_full(key: str, value: object) -> object:
     )
 
 
-def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Merge mappings key by key; everything else of `changes` takes the place of what there is.
 
     A start of the path is replaced as a whole, since its orientation may be in another convention.
     """
     both = {
-        key: _merged(content[key], value)
+        key: _merge(content[key], value)
         for key, value in changes.items()
         if isinstance(value, Mapping)
         and isinstance(content.get(key), Mapping)

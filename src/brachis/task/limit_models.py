@@ -1,7 +1,7 @@
 """Joint limits as the task file describes them.
 
 For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
-the key is null, and there is no limit; the key has a value. The models write the absent key as the word `FROM_URDF`,
+the key is null, and nothing limits the joint; the key has a value. The models write the absent key as `FROM_URDF`,
 which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
 joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``, ``jerk`` or
 ``torque_rate``: absent means none.
@@ -297,9 +297,7 @@ class LimitSpec:
             object.__setattr__(self, each.name, plain(value, tuple))
 
 
-_LEAST_TOLERANCE = 1e-3
 _SPEED = {"ge": 1e-6, "le": 1e12}
-_MOST_AT_A_PLACE = 2
 
 Speed = Annotated[Positive, Field(**_SPEED)]
 _PathCoordinates = Annotated[
@@ -340,7 +338,7 @@ class SpeedTable(Model):
                     allowed=f">= {self.s[row - 1]:g}",
                 )
         for place, same in itertools.groupby(self.s):
-            if len(list(same)) > _MOST_AT_A_PLACE:
+            if len(list(same)) > 2:
                 problem = "a place has more than two speeds"
                 raise refuse(
                     problem,
@@ -382,7 +380,7 @@ class ProcessSpeed(Model):
         "A part may begin or end with the path where boundary.start_speed or end_speed is its speed, or the motion is "
         "periodic."
     )
-    tolerance: Annotated[Share, Field(ge=_LEAST_TOLERANCE, le=0.5)] = Field(
+    tolerance: Annotated[Share, Field(ge=1e-3, le=0.5)] = Field(
         default=0.01,
         description="Largest deviation either way, as a share of the speed: 1 %, or 0.01.",
     )
@@ -440,10 +438,8 @@ class ToolLimits(Model):
     @model_validator(mode="after")
     def _speeds_agree(self) -> ToolLimits:
         for number, part in enumerate(self.process_speed):
-            cap, slowest = (
-                _least_between(self.speed, part.s),
-                part.speed * (1.0 - part.tolerance),
-            )
+            cap = _least_between(self.speed, part.s)
+            slowest = part.speed * (1.0 - part.tolerance)
             if cap is not None and cap < slowest:
                 problem = "the tool's largest speed is below the process speed"
                 allowed = f"at most {cap:g} m/s there, or a higher tool_limits.speed"

@@ -101,7 +101,7 @@ def read_assignment(text: str) -> tuple[str, object]:
     Raises
     ------
     TaskError
-        There is no ``=``, or the value is no YAML.
+        The ``=`` is missing, or the value is not YAML.
 
     Examples
     --------
@@ -302,7 +302,8 @@ def _with_start(task: Task, source: str) -> Task:
     """
     if task.start != "free" or task.path_start is not None:
         return task
-    place, first = task.start_place, task.path[0]
+    place = task.start_place
+    first = task.path[0]
     changes: dict[str, object] = {"path_start": place}
     if task.task_space == "joints" and place is not None:
         names = getattr(getattr(first, first.kind), "joints", None)

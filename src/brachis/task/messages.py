@@ -71,7 +71,7 @@ def _short(text: str) -> str:
 def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
     describe = _DESCRIPTIONS.get(detail["type"], _unforeseen)
     complaint = describe(detail, model)
-    key = _dotted(detail["loc"]) + complaint.key
+    key = _write_location(detail["loc"]) + complaint.key
     where = f"{source}: {key}" if key else source
     return TaskError(
         complaint.problem,
@@ -86,7 +86,7 @@ def _is_tag(part: str | int) -> bool:
     return isinstance(part, str) and part.startswith("<") and part.endswith(">")
 
 
-def _dotted(location: tuple[str | int, ...]) -> str:
+def _write_location(location: tuple[str | int, ...]) -> str:
     """Return a location as ``path[0].line.to``, without the tags of unions."""
     text = ""
     for part in location:
@@ -112,8 +112,8 @@ def _fields_of(model: type) -> Mapping[str, object]:
     return get_type_hints(model)
 
 
-def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
-    """Return the keys that are allowed at a location: the fields of the models that the way there leads to."""
+def _models_at(location: tuple[str | int, ...], model: type[Model]) -> list[type]:
+    """Return the models that may stand at a location."""
     models: list[type] = [model]
     for part in location:
         if _is_tag(part):
@@ -126,7 +126,12 @@ def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
             models = [
                 found for annotation in fields for found in _models_in(annotation)
             ]
-    return [name for one in models for name in _fields_of(one)]
+    return models
+
+
+def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
+    """Return the keys that are allowed at a location."""
+    return [name for one in _models_at(location, model) for name in _fields_of(one)]
 
 
 def key_paths(name: str, model: type[Model]) -> list[str]:
@@ -151,17 +156,13 @@ def key_paths(name: str, model: type[Model]) -> list[str]:
 
 def _description_at(location: tuple[str | int, ...], model: type[Model]) -> str | None:
     """Return what is said of the key at a location."""
-    *before, last = [
-        part for part in location if isinstance(part, str) and not _is_tag(part)
-    ] or [""]
-    models: list[type] = [model]
-    for part in before:
-        fields = [_fields_of(one).get(part) for one in models]
-        models = [found for annotation in fields for found in _models_in(annotation)]
-    known = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
-    found = [
-        field.description for field in known if field is not None and field.description
-    ]
+    names = [part for part in location if isinstance(part, str) and not _is_tag(part)]
+    if not names:
+        return None
+    last = names[-1]
+    models = _models_at(location[: location.index(last)], model)
+    fields = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
+    found = [field.description for field in fields if field and field.description]
     return f"{last}: {found[0].removesuffix('.')}" if len(found) == 1 else None
 
 
@@ -185,7 +186,8 @@ def _missing(detail: ErrorDetails, model: type[Model]) -> _Complaint:
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     name = str(detail["loc"][-1])
     keys = _keys_at(detail["loc"][:-1], model)
-    elsewhere, near = key_paths(name, model), nearest(name, keys)
+    elsewhere = key_paths(name, model)
+    near = nearest(name, keys)
     hint = (
         f"It is a key of its own: {' or '.join(elsewhere)}"
         if elsewhere
@@ -194,7 +196,7 @@ def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     return _Complaint("unknown key", name, ", ".join(keys), hint)
 
 
-def _refused(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+def _describe_refusal(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
     facts = detail["ctx"]
     found = detail["input"] if facts["found"] is None else facts["found"]
     shown = None if facts["absent"] else show(found)
@@ -208,7 +210,8 @@ def _wrong_form(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
 
 
 def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
-    facts, found = detail["ctx"], detail["input"]
+    facts = detail["ctx"]
+    found = detail["input"]
     known = facts["known"].split()
     near = None
     if isinstance(found, Mapping) and not any(key in found for key in known):
@@ -265,7 +268,7 @@ def _wrong_type(form: str) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
 
 
 _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]]] = {
-    REFUSED: _refused,
+    REFUSED: _describe_refusal,
     WRONG_FORM: _wrong_form,
     WRONG_KEYS: _wrong_keys,
     "missing": _missing,

@@ -25,16 +25,11 @@ from pydantic import (
 from brachis.task.fields import Model, Number, by_form, by_key, refuse
 from brachis.task.points.units import CONVENTIONS, choices
 
-_UNIT = 0.01
-
 Vector3 = tuple[Number, Number, Number]
 
 
-_LEAST_LENGTH = 1e-9
-
-
 def _check_direction(vector: Vector3) -> Vector3:
-    if math.hypot(*vector) < _LEAST_LENGTH:
+    if math.hypot(*vector) < 1e-9:
         problem = "a direction cannot have zero length"
         raise refuse(
             problem,
@@ -56,7 +51,7 @@ Profile = Annotated[
 
 def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | None:
     length = 1.0 if quaternion is None else math.hypot(*quaternion)
-    if abs(length - 1.0) > _UNIT:
+    if abs(length - 1.0) > 0.01:
         problem = f"the quaternion's length is {length:.6g}"
         raise refuse(problem, found=quaternion, allowed="a quaternion of length 1")
     return quaternion

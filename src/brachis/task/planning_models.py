@@ -90,7 +90,7 @@ class SplineSettings(Model):
         return self
 
     @model_validator(mode="after")
-    def _free_knots_are_counted(self) -> SplineSettings:
+    def _free_knots_need_a_number(self) -> SplineSettings:
         if self.knots == "free" and self.intervals == "auto":
             problem = "knots: free needs a number of intervals; auto is the default"
             raise refuse(

@@ -194,7 +194,7 @@ class FitReport(Model):
         default=(), description="What was found out about the data."
     )
     doubt: str | None = Field(
-        default=None, description="What of the data is hardly meant."
+        default=None, description="What looks implausible in the data."
     )
     profile: tuple[tuple[Number, Number, Number], ...] = Field(
         default=(),

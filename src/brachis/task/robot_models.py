@@ -99,7 +99,7 @@ _WORDS: Final = {
 """Roll, pitch and yaw of the usual mountings, degrees."""
 
 
-def _spelled_out(mounting: object) -> object:
+def _expand_word(mounting: object) -> object:
     """Read a word as a placement."""
     if not isinstance(mounting, str):
         return mounting
@@ -112,7 +112,7 @@ def _spelled_out(mounting: object) -> object:
 Mounting = Annotated[
     Placement,
     BeforeValidator(
-        _spelled_out,
+        _expand_word,
         json_schema_input_type=Literal["floor", "wall", "ceiling"] | Placement,
     ),
 ]

@@ -1,19 +1,61 @@
-"""The JSON Schema of the task file, for editors."""
+"""The JSON Schema of the task file, for editors, and the units of its keys, for plots."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from brachis.task.models import Task
 
-_UNITS = r"kg m\^2|kg|N m s/rad|N m|N|m/s\^2|m/s|m|rad/s\^[23]|rad/s|rad|s|W|degrees"
-_STATED = re.compile(
-    rf"(?:^|[,(] ?)((?:{_UNITS})(?: \((?:force, )?[^) ]*\))?)(?=[.,;: )]|$)"
-)
-"""A unit as descriptions of keys state it: ``Length, m.``; that of prismatic joints follows in brackets."""
+_UNITS = {
+    "tool_offset.xyz": "m",
+    "mounting.xyz": "m",
+    "robot.gravity": "m/s^2",
+    "robot.locked_joints": "rad (m)",
+    "payload.mass": "kg",
+    "payload.com": "m",
+    "payload.inertia": "kg m^2",
+    "limits.torque": "N m (force, N)",
+    "limits.velocity": "rad/s (m/s)",
+    "limits.acceleration": "rad/s^2 (m/s^2)",
+    "limits.position": "rad (m)",
+    "limits.power": "W",
+    "limits.total_power": "W",
+    "limits.rms_torque": "N m (force, N)",
+    "limits.jerk": "rad/s^3 (m/s^3)",
+    "limits.torque_rate": "N m/s (force, N/s)",
+    "friction.armature": "kg m^2 (kg)",
+    "friction.rotor_inertia": "kg m^2",
+    "friction.viscous": "N m s/rad (N s/m)",
+    "friction.coulomb": "N m (N)",
+    "friction.coulomb_velocity": "rad/s (m/s)",
+    "start.joints": "rad (m)",
+    "end.joints": "rad (m)",
+    "path_start.position": "m",
+    "path_start.rotation_vector": "rad",
+    "to.rotation_vector": "rad",
+    "line.to": "m",
+    "line.by": "m",
+    "line.length": "m",
+    "arc.center": "m",
+    "arc.via": "m",
+    "arc.to": "m",
+    "circle.center": "m",
+    "helix.center": "m",
+    "helix.pitch": "m",
+    "spline.through": "m",
+    "bspline.control_points": "m",
+    "boundary.start_speed": "m/s",
+    "boundary.end_speed": "m/s",
+    "tool_limits.speed": "m/s",
+    "speed.s": "",
+    "tool_limits.acceleration": "m/s^2",
+    "tool_limits.angular_speed": "rad/s",
+    "process_speed.speed": "m/s",
+    "search.time_limit": "s",
+    "solver.time_limit": "s",
+}
+"""Units by the last two names of a key; in brackets that of prismatic joints."""
 
 
 def json_schema() -> dict[str, Any]:
@@ -36,7 +78,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def unit_of(key: str) -> str:
-    """Return the unit of a dotted key of a task, as its description states it; empty where it states none.
+    """Return the unit of a dotted key of a task, or of a joint's or row's entry in it; empty where it has none.
 
     Examples
     --------
@@ -46,41 +88,6 @@ def unit_of(key: str) -> str:
     """
     if key.endswith("_deg"):
         return "deg"
-    schema = _task_schema()
-    found = [schema]
-    stated = ""
-    for part in key.split("."):
-        found = [below for each in found for below in _below(each, part, schema)]
-        units = [
-            match[1]
-            for each in found
-            if (match := _STATED.search(each.get("description", "")))
-        ]
-        stated = (
-            units[0]
-            if units
-            else ""
-            if any("description" in each for each in found)
-            else stated
-        )
-    return stated
-
-
-@cache
-def _task_schema() -> dict[str, Any]:
-    return json_schema()
-
-
-def _below(
-    schema: dict[str, Any], part: str, whole: dict[str, Any]
-) -> Iterator[dict[str, Any]]:
-    """Yield what the schema says of a key, or of an entry of a list; every alternative of it."""
-    if "$ref" in schema:
-        yield from _below(whole["$defs"][schema["$ref"].rsplit("/", 1)[1]], part, whole)
-    for each in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
-        yield from _below(each, part, whole)
-    if part in schema.get("properties", {}):
-        yield schema["properties"][part]
-    for inner in (schema.get("items"), schema.get("additionalProperties")):
-        if isinstance(inner, dict):
-            yield inner
+    names = [part for part in key.split(".") if not part.isdecimal()]
+    units = (_UNITS.get(".".join(pair)) for pair in reversed([*pairwise(names)]))
+    return next((unit for unit in units if unit is not None), "")

@@ -73,7 +73,7 @@ class BSplineCurve(Model):
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = Field(
         default=(),
         description="Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in "
-        "between; where there is none, none is prescribed.",
+        "between; elsewhere no speed is prescribed.",
     )
     fit: FitReport | None = Field(
         default=None, description="What the curve was fitted to; written by brachis."
@@ -81,7 +81,8 @@ class BSplineCurve(Model):
 
     @model_validator(mode="after")
     def _knots_fit(self) -> BSplineCurve:
-        knots, outer = self.knots, self.degree + 1
+        knots = self.knots
+        outer = self.degree + 1
         if len({len(point) for point in self.control_points}) > 1:
             raise refuse(
                 "control points differ in their number of coordinates",
@@ -398,12 +399,11 @@ class SplineSegment(MovingSegment):
         spline = self.spline
         if spline.relative:
             return None
-        place, oriented = spline.starts_at, spline.starts_oriented
+        place = spline.starts_at
+        oriented = spline.starts_oriented
         if place is None:
-            place, oriented = (
-                spline.through[0],
-                spline.orientations[0] if spline.orientations else None,
-            )
+            place = spline.through[0]
+            oriented = spline.orientations[0] if spline.orientations else None
         if oriented is None or not of_poses or len(place) != _POSITIONS:
             return place
         return ToolPose.model_validate({"position": place, **oriented.model_dump()})

@@ -129,6 +129,7 @@ def read_yaml(text: str, source: str) -> object:
         )
         message = error.problem or "not valid YAML"
     except _BROKEN as error:
-        where, message = source, (str(error) or type(error).__name__).splitlines()[0]
+        where = source
+        message = (str(error) or type(error).__name__).splitlines()[0]
     problem = f"not valid YAML: {message}"
     raise TaskError(problem, where=where)

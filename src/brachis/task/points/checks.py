@@ -11,15 +11,10 @@ from brachis.task.points.scatter import Scatter
 SAME = 1e-9
 """What a path takes for standing still, m or rad."""
 _NAMED = 5
-_FEWEST = 10
-_OF_SPACING = 4.0
-_OF_SCATTER = 15.0
 _AROUND = 4
-_OF_USUAL = 20.0
 _FACTOR = (900.0, 1100.0)
 _LARGEST = 100.0
 """Paths of robots are shorter, m."""
-_SMALLEST = 1e-4
 
 
 def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
@@ -35,12 +30,12 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
     turned = angles_between(points.turning[again], points.turning[again - 1])
     if np.any(turned > SAME):
         i = int(again[np.argmax(turned > SAME)])
-        problem = f"the position stands still from {points.named(i - 1)} on while the tool turns"
+        problem = f"the position stands still from {points.name_row(i - 1)} on while the tool turns"
         hint = "A path that stops and turns on the spot is for segments of its own: csv, turn, csv"
         raise points.wrong(
             i,
             problem,
-            found=points.described(i),
+            found=points.describe(i),
             allowed="a motion of the position",
             hint=hint,
         )
@@ -58,7 +53,7 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
     left_out = (
         f"left out {write_count(len(again), 'row')} at the place of the row before"
     )
-    return kept, (f"{left_out}: {points.row}s {_listed(points, again)}",)
+    return kept, (f"{left_out}: {points.row}s {_list_rows(points, again)}",)
 
 
 def refuse_repetitions(points: Points) -> None:
@@ -79,11 +74,11 @@ def refuse_repetitions(points: Points) -> None:
         steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
     if np.any(steps < SAME):
         i = 1 + int(np.argmax(steps < SAME))
-        problem = f"the row repeats {points.named(i - 1)}"
+        problem = f"the row repeats {points.name_row(i - 1)}"
         allowed = f"rows that differ from their predecessors in {'orientation' if still else 'position'}"
         hint = "With a tolerance repeated rows are left out"
         raise points.wrong(
-            i, problem, found=points.described(i), allowed=allowed, hint=hint
+            i, problem, found=points.describe(i), allowed=allowed, hint=hint
         )
 
 
@@ -95,10 +90,12 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
     TaskError
     """
     _refuse_factors(points)
-    if len(points) < _FEWEST:
+    if len(points) < 10:
         return
     position = points.position
-    before, here, after = position[:-2], position[1:-1], position[2:]
+    before = position[:-2]
+    here = position[1:-1]
+    after = position[2:]
     side = after - before
     share = np.clip(
         np.sum((here - before) * side, axis=1)
@@ -112,14 +109,12 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
         np.pad(chords, _AROUND, mode="reflect"), 2 * _AROUND + 2
     )
     usual = np.median(windows, axis=1)[: len(off)]
-    allowed = np.maximum(
-        _OF_SPACING * usual, max(_OF_SCATTER * scatter.deviation, 2.0 * tolerance)
-    )
+    allowed = np.maximum(4.0 * usual, max(15.0 * scatter.deviation, 2.0 * tolerance))
     i = int(np.argmax(off / allowed))
     if off[i] > allowed[i]:
         problem = "the point is a spike, far off its neighbours"
         away = f"{1e3 * off[i]:.4g} mm off the line between its neighbours; points are {1e3 * usual[i]:.3g} mm apart"
-        found = f"{points.described(i + 1)}, {away}"
+        found = f"{points.describe(i + 1)}, {away}"
         hint = "Correct or remove the row"
         raise points.wrong(
             i + 1,
@@ -135,7 +130,7 @@ def of_size(points: Points) -> str | None:
     extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
     if extent > _LARGEST:
         return f"the path is {extent:.4g} m long and wide: mm for m? Set units: {{length: mm}}"
-    if extent < _SMALLEST:
+    if extent < 1e-4:
         return f"the path is {1e3 * extent:.4g} mm long and wide: m for mm? Set units: {{length: m}}"
     return None
 
@@ -146,22 +141,22 @@ def _refuse_factors(points: Points) -> None:
     ratios = sizes[1:] / np.maximum(sizes[:-1], SAME)
     growth = np.maximum(ratios, 1.0 / np.maximum(ratios, SAME))
     steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
-    far = steps > _OF_USUAL * np.median(steps)
+    far = steps > 20.0 * np.median(steps)
     for i in np.flatnonzero(
         far & (growth > _FACTOR[0]) & (growth < _FACTOR[1])
     ).tolist():
-        one, other = points.position[i], points.position[i + 1]
+        one = points.position[i]
+        other = points.position[i + 1]
         small, large = (one, other) if ratios[i] > 1.0 else (other, one)
         if np.linalg.norm(large / 1e3 - small) < 0.1 * np.linalg.norm(small):
             word = "larger" if ratios[i] > 1.0 else "smaller"
-            problem = (
-                f"the coordinates are a thousand times {word} than in {points.named(i)}"
-            )
+            problem = f"the coordinates are a thousand times {word} than in {points.name_row(i)}"
             hint = "mm and m, or a lost decimal point? Write all rows in one unit"
-            found, allowed = points.described(i + 1), f"near {points.described(i)}"
+            found = points.describe(i + 1)
+            allowed = f"near {points.describe(i)}"
             raise points.wrong(i + 1, problem, found=found, allowed=allowed, hint=hint)
 
 
-def _listed(points: Points, indices: np.ndarray) -> str:
+def _list_rows(points: Points, indices: np.ndarray) -> str:
     more = ", ..." if len(indices) > _NAMED else ""
     return ", ".join(str(points.rows[i]) for i in indices[:_NAMED]) + more

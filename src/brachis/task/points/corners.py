@@ -21,17 +21,12 @@ from brachis.task.points.scatter import Scatter
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
 _CERTAIN = np.deg2rad(50.0)
-"""A polygon that turns by this much from one side to the next is no smooth curve."""
+"""A polygon that turns by this much from one side to the next is not a smooth curve."""
 _SHARP = 1.5
 """Over twice the distance a smooth curve turns by twice the angle, a corner by the same one."""
 _DIRECTION = 0.02
 """rad: what scatter may do to a direction."""
-_DOUBTS = 8.0
 _NOTHING = 1e-24
-_NOISY_POINTS = 4
-_OF_TOLERANCE = 2.0
-_GUARD = 0.3
-_OF_SPACING = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +73,15 @@ def find_corners(
     for_direction = (12.0 * spacing * (scatter.deviation / _DIRECTION) ** 2) ** (
         1.0 / 3.0
     )
-    width, least = (
-        max(for_direction, _OF_TOLERANCE * tolerance),
-        _NOISY_POINTS if noisy else 1,
-    )
+    width = max(for_direction, 2.0 * tolerance)
+    least = 4 if noisy else 1
     angle, doubt = _turning(points.position, u, width, least)
     wide, _ = _turning(points.position, u, 2.0 * width, 2 * least)
     sharp = (wide > 0.0) & (wide < _SHARP * angle) | (angle > _CERTAIN)
-    sharp &= angle > np.maximum(LEAST_ANGLE, _DOUBTS * scatter.deviation * doubt)
+    sharp &= angle > np.maximum(LEAST_ANGLE, 8.0 * scatter.deviation * doubt)
     peaks = _peaks(angle, sharp, u, width, least)
     return tuple(
-        _located(points, u, i, float(angle[i]), width, least, tolerance / 4.0)
+        _locate(points, u, i, float(angle[i]), width, least, tolerance / 4.0)
         for i in peaks
     )
 
@@ -136,7 +129,8 @@ def _directions(
     sums = np.concatenate([np.zeros((1, moment.shape[1])), np.cumsum(moment, axis=0)])
     part = sums[last + 1] - sums[first]
     dimension = position.shape[1]
-    count, mean = part[:, :1], part[:, 1:2] / part[:, :1]
+    count = part[:, :1]
+    mean = part[:, 1:2] / part[:, :1]
     spread = np.maximum(part[:, 2:3] - count * mean**2, _NOTHING)
     slope = (part[:, 3 + dimension :] - mean * part[:, 3 : 3 + dimension]) / spread
     sizes = np.maximum(np.linalg.norm(slope, axis=1), _NOTHING)
@@ -157,14 +151,15 @@ def _peaks(
     return found
 
 
-def _located(
+def _locate(
     points: Points, u: Array, i: int, angle: float, width: float, least: int, off: float
 ) -> Corner:
     """Return the corner near a point: the point, or where the straight lines before and after come nearest together.
 
     It is the point where nothing scatters and the points before it, and those after it, lead there, but for `off`, m.
     """
-    position, sides = points.position, []
+    position = points.position
+    sides = []
     here = Corner(i, i, i + 1, angle, position[i])
     from_before, from_after = (
         _continues(position, u, i, sign, off) for sign in (-1, 1)
@@ -173,7 +168,7 @@ def _located(
         return here
     for sign in (-1.0, 1.0):
         away = sign * (u - u[i])
-        side = np.flatnonzero((away > _GUARD * width) & (away < 2.0 * width))
+        side = np.flatnonzero((away > 0.3 * width) & (away < 2.0 * width))
         if len(side) <= least:
             side = np.clip(
                 i + int(sign) * np.arange(1, 1 + max(least, 2)), 0, len(u) - 1
@@ -211,34 +206,32 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
         foreseen += position[k] * np.prod((u[i] - u[others]) / (u[k] - u[others]))
     return bool(
         np.linalg.norm(foreseen - position[i])
-        <= max(off, _OF_SPACING * abs(u[side[0]] - u[i]))
+        <= max(off, 0.03 * abs(u[side[0]] - u[i]))
     )
 
 
-_FEWEST = 20
 _LONG = 5.0
-_MOST = 200
 
 
-def with_gaps_filled(points: Points) -> tuple[Points, tuple[str, ...]]:
+def fill_gaps(points: Points) -> tuple[Points, tuple[str, ...]]:
     """Put points on the straight ways that are five times longer than usual, and say how many ways there are."""
     chords = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
     usual = float(np.median(chords))
     long = chords > _LONG * usual
-    if len(points) < _FEWEST or not np.any(long):
+    if len(points) < 20 or not np.any(long):
         return points, ()
     counts = np.where(
-        long, np.minimum(np.ceil(chords / (2.0 * usual)), _MOST), 1.0
+        long, np.minimum(np.ceil(chords / (2.0 * usual)), 200), 1.0
     ).astype(int)
     before = np.repeat(np.arange(len(chords)), counts)
     firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     shares = ((np.arange(len(before)) - firsts[before] + 1) / counts[before])[:, None]
 
-    def filled(values: np.ndarray) -> np.ndarray:
+    def fill(values: np.ndarray) -> np.ndarray:
         between = values[before] + shares * (values[before + 1] - values[before])
         return np.concatenate([values[:1], between])
 
-    turning = filled(points.turning)
+    turning = fill(points.turning)
     speed = (
         None
         if points.speed is None
@@ -250,7 +243,7 @@ def with_gaps_filled(points: Points) -> tuple[Points, tuple[str, ...]]:
     told = f"taken as straight: {ways} longer than {_LONG:g} times the usual spacing"
     return replace(
         points,
-        position=filled(points.position),
+        position=fill(points.position),
         turning=turning,
         speed=speed,
         rows=rows,
@@ -259,7 +252,6 @@ def with_gaps_filled(points: Points) -> tuple[Points, tuple[str, ...]]:
 
 _MIDDLE = 11.0 / 64.0
 """Weight of the first derivatives, of opposite signs, in the middle of the septic polynomial between two points."""
-_OF_NEIGHBOUR = 0.45
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:
@@ -278,4 +270,4 @@ def blend_size(angle: float, distance: float, shortest: float) -> float:
         Length of the shorter neighbour, m.
     """
     of_size = 2.0 * sin(angle / 2.0) * (0.5 - _MIDDLE * (1.0 + cos(angle / 2.0)))
-    return min(distance / of_size, _OF_NEIGHBOUR * shortest)
+    return min(distance / of_size, 0.45 * shortest)

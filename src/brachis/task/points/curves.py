@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import TaskError
+from brachis.task.point_data import FitReport, FoundCorner
 from brachis.task.points.checks import (
     of_size,
     refuse_repetitions,
@@ -24,8 +25,8 @@ from brachis.task.points.checks import (
 from brachis.task.points.corners import (
     Corner,
     blend_size,
+    fill_gaps,
     find_corners,
-    with_gaps_filled,
 )
 from brachis.task.points.fit import deviations, fit_points
 from brachis.task.points.least_squares import Fit, Tolerance
@@ -35,12 +36,7 @@ from brachis.task.points.scatter import Scatter, scatter_of
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_OF_SCATTER = 6.0
-_ROUNDING = 1e-6
-_DRAWN, _TINY = 1e-3, 1e-8
-"""By how much a distance may be overestimated, as a part of the tolerance and in m or rad."""
 _SHARPEST = np.deg2rad(150.0)
-_LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,20 +80,18 @@ def fit_between(
 ) -> list[Stretch]:
     """Cut points at their corners and fit a curve to each stretch.
 
-    What of the points is hardly meant, `doubt`, is the hint where that cannot be done.
+    `doubt` says what looks implausible in the points; it is the hint of the error.
 
     Raises
     ------
     TaskError
-        The path turns back, or there is no smooth curve within the tolerance.
+        The path turns back, or no smooth curve lies within the tolerance.
     """
     for sharp in corners:
         if sharp.angle > _SHARPEST:
             problem = f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees"
-            found, hint = (
-                points.described(sharp.index),
-                "A path that stops there is for two tasks",
-            )
+            found = points.describe(sharp.index)
+            hint = "A path that stops there is for two tasks"
             raise points.wrong(
                 sharp.index,
                 problem,
@@ -105,7 +99,8 @@ def fit_between(
                 allowed="corners up to 150 degrees",
                 hint=hint,
             )
-    starts, ends = [None, *corners], [*corners, None]
+    starts = [None, *corners]
+    ends = [*corners, None]
     stretches = []
     for start, end in zip(starts, ends, strict=True):
         given = np.arange(
@@ -122,13 +117,15 @@ def fit_between(
                 position[row] = corner.place
         whole = replace(whole, position=position)
         chosen = slice(len(before), len(before) + len(given))
-        fit = _fitted(whole, tolerance, scatter, doubt)
-        distances, angles = _checked(whole, fit, tolerance)
+        fit = _fit_one(whole, tolerance, scatter, doubt)
+        distances, angles = _measure_deviations(whole, fit, tolerance)
         stretches.append(Stretch(whole, chosen, fit, distances[chosen], angles[chosen]))
     return stretches
 
 
-def _checked(points: Points, fit: Fit, tolerance: Tolerance) -> tuple[Array, Array]:
+def _measure_deviations(
+    points: Points, fit: Fit, tolerance: Tolerance
+) -> tuple[Array, Array]:
     """Return distances and angles of points from their fit, by another formula than the fit's.
 
     Raises
@@ -142,10 +139,11 @@ def _checked(points: Points, fit: Fit, tolerance: Tolerance) -> tuple[Array, Arr
         (angles, tolerance.orientation, np.pi / 180.0, "deg"),
     ):
         i = int(np.argmax(found))
-        if found[i] > allowed * (1.0 + _DRAWN) + _TINY:
+        # `deviations` may overestimate by a thousandth of the tolerance and by 1e-8.
+        if found[i] > allowed * (1.0 + 1e-3) + 1e-8:
             problem = "the fitted curve does not pass the points within the tolerance"
             hint = "Raise the tolerance, or cut the path into several"
-            away = f"{points.described(i)}, {found[i] / per:.4g} {unit} off"
+            away = f"{points.describe(i)}, {found[i] / per:.4g} {unit} off"
             raise points.wrong(
                 i, problem, found=away, allowed=f"{allowed / per:.4g} {unit}", hint=hint
             )
@@ -162,7 +160,7 @@ def blend_between(
     TaskError
         The points leave no room.
     """
-    corner_at = first.points.described(len(first.points) - 1)
+    corner_at = first.points.describe(len(first.points) - 1)
     wrong = first.points.wrong
     shortest = min(first.length, second.length)
     widest = blend_size(corner.angle, tolerance.corner, shortest)
@@ -171,7 +169,7 @@ def blend_between(
         float(second.distances[second.sigma < widest].max(initial=0.0)),
     )
     left = tolerance.corner - taken
-    if left < _LEAST_SHARE * tolerance.corner:
+    if left < 0.05 * tolerance.corner:
         problem = f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance"
         found = f"points {1e3 * taken:.3g} mm from the fit at {corner_at}"
         hint = "Give a larger tolerance.corner"
@@ -185,7 +183,7 @@ def blend_between(
     return blend_size(corner.angle, left, shortest)
 
 
-def _fitted(
+def _fit_one(
     points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str | None
 ) -> Fit:
     """Fit one curve.
@@ -197,26 +195,22 @@ def _fitted(
     try:
         fit = fit_points(points, tolerance, scatter)
     except ValueError as error:
-        problem, allowed = (
-            "no smooth curve follows these points",
-            "points that move on from each to the next",
-        )
+        problem = "no smooth curve follows these points"
+        allowed = "points that move on from each to the next"
         hint = doubt or "Does the path turn back, or stand still, near there?"
         raise points.wrong(
             0,
             problem,
-            found=f"{error}, from {points.described(0)}",
+            found=f"{error}, from {points.describe(0)}",
             allowed=allowed,
             hint=hint,
         ) from error
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
-    if ratios[i] <= 1.0 + _ROUNDING:
+    if ratios[i] <= 1.0 + 1e-6:
         return fit
-    of_turning, hint = (
-        bool(fit.position_errors[i] <= tolerance.position),
-        "Is the row as it should be?",
-    )
+    of_turning = bool(fit.position_errors[i] <= tolerance.position)
+    hint = "Is the row as it should be?"
     if of_turning:
         angles = np.rad2deg([fit.turning_errors[i], tolerance.orientation])
         found, allowed = (f"{angle:.3g} deg" for angle in angles)
@@ -226,7 +220,7 @@ def _fitted(
             f"{1e3 * value:.3g} mm"
             for value in (fit.position_errors[i], tolerance.position)
         )
-        wanted = _OF_SCATTER * scatter.deviation
+        wanted = 6.0 * scatter.deviation
         more = (
             f"; give a tolerance of {1e3 * wanted:.2g} mm or more"
             if wanted > tolerance.position
@@ -237,7 +231,7 @@ def _fitted(
     raise points.wrong(
         i,
         problem,
-        found=f"{found} at {points.described(i)}",
+        found=f"{found} at {points.describe(i)}",
         allowed=allowed,
         hint=doubt or hint,
     )
@@ -278,77 +272,12 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     return tuple(runs)
 
 
-_MOST = 400
-
-
-@dataclass(frozen=True)
-class CornerRemark:
-    """A corner that was found.
-
-    Attributes
-    ----------
-    row : int
-        Line of the file, or index, of the nearest point.
-    angle : float
-        Change of direction, rad.
-    distance : float
-        Along the path from its first point, m.
-    blend : float
-        What its blend takes from either side, m.
-    """
-
-    row: int
-    angle: float
-    distance: float
-    blend: float
-
-
-@dataclass(frozen=True)
-class Report:
-    """Where a path comes from, and how near it is to the points; as it stands for a path through all of them.
-
-    Attributes
-    ----------
-    source : str
-    points : int
-    length : float
-        m.
-    position_error, position_rms, position_tolerance : float
-        Largest and root mean square distance of the points from the curve, and what was allowed, m.
-    orientation_error, orientation_tolerance : float
-        Largest angle, and what was allowed, rad.
-    intervals : int
-        Knot intervals of the spline, or of all of them.
-    corners : tuple of CornerRemark
-    told : tuple of str
-        What was found out about the data.
-    doubt : str or None
-        What of the data is hardly meant.
-    profile : tuple of (float, float, float)
-        Along the path, m: the largest distance, m, and angle, rad, of the points there.
-    """
-
-    source: str
-    points: int
-    length: float
-    position_error: float = 0.0
-    position_rms: float = 0.0
-    position_tolerance: float = 0.0
-    orientation_error: float = 0.0
-    orientation_tolerance: float = 0.0
-    intervals: int = 0
-    corners: tuple[CornerRemark, ...] = ()
-    told: tuple[str, ...] = ()
-    doubt: str | None = None
-    profile: tuple[tuple[float, float, float], ...] = ()
-
-
 def profile_of(
     along: Array, distances: Array, angles: Array
 ) -> tuple[tuple[float, float, float], ...]:
     """Return the largest errors of successive groups of points, at most a few hundred groups."""
     starts = np.unique(
-        np.linspace(0, len(along), min(len(along), _MOST), endpoint=False).astype(int)
+        np.linspace(0, len(along), min(len(along), 400), endpoint=False).astype(int)
     )
     largest = (
         np.maximum.reduceat(values, starts).tolist()
@@ -359,7 +288,6 @@ def profile_of(
 
 _ROUGH = 0.5
 """Of the curvature that scatter makes times the length of the path."""
-_ROOMY = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -383,7 +311,7 @@ class FittedCurve:
 
 def fit_curves(
     points: Points, tolerance: Tolerance, told: tuple[str, ...] = ()
-) -> tuple[tuple[FittedCurve, ...], Report]:
+) -> tuple[tuple[FittedCurve, ...], FitReport]:
     """Return smooth curves within a tolerance of points, and what was found.
 
     Parameters
@@ -396,13 +324,13 @@ def fit_curves(
     Raises
     ------
     TaskError
-        Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
+        Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     count = len(points)
     points, repeated = without_repetitions(points)
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, tolerance.position)
-    points, filled = with_gaps_filled(points)
+    points, filled = fill_gaps(points)
     corners = find_corners(points, scatter, tolerance.corner)
     doubt = of_size(points)
     stretches = fit_between(points, corners, tolerance, scatter, doubt)
@@ -431,12 +359,15 @@ def fit_curves(
     )
     told = (*told, *repeated, *filled, *((str(scatter),) if scatter.deviation else ()))
     remarks = tuple(
-        CornerRemark(
-            int(points.rows[corner.index]), corner.angle, float(distance), blend
+        FoundCorner(
+            row=int(points.rows[corner.index]),
+            angle=corner.angle,
+            distance=float(distance),
+            blend=blend,
         )
         for corner, distance, blend in found
     )
-    return curves, replace(report, corners=remarks, told=told)
+    return curves, report.model_copy(update={"corners": remarks, "told": told})
 
 
 def _report(
@@ -446,7 +377,7 @@ def _report(
     points: int,
     source: str,
     doubt: str | None,
-) -> Report:
+) -> FitReport:
     """Report on all stretches, but for their corners and what was told."""
     starts = np.cumsum([0.0, *(stretch.length for stretch in stretches)])
     along = np.concatenate(
@@ -457,7 +388,7 @@ def _report(
     )
     distances = np.concatenate([stretch.distances for stretch in stretches])
     angles = np.concatenate([stretch.angles for stretch in stretches])
-    return Report(
+    return FitReport(
         source=source,
         points=points,
         length=float(starts[-1]),
@@ -472,7 +403,7 @@ def _report(
     )
 
 
-def interpolated(points: Points, told: tuple[str, ...] = ()) -> Report:
+def check_interpolation(points: Points, told: tuple[str, ...] = ()) -> FitReport:
     """Return what is said of a curve through all points, after a check that its curvature is not that of their scatter.
 
     Parameters
@@ -492,16 +423,21 @@ def interpolated(points: Points, told: tuple[str, ...] = ()) -> Report:
     length = float(np.linalg.norm(np.diff(points.position, axis=0), axis=1).sum())
     if scatter.curvature * length > _ROUGH:
         problem = "the points are too rough for a curve through all of them: its curvature would be noise"
-        hint = f"Give a tolerance, for example tolerance: {{position: {_ROOMY * 1e3 * scatter.deviation:.1g} mm}}"
+        hint = f"Give a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}"
         found = f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves"
         allowed = f"less than {_ROUGH / length:.2g} 1/m"
         raise TaskError(
             problem, found=found, allowed=allowed, where=points.source, hint=hint
         )
-    return Report(
-        points.source,
-        len(points),
-        length,
+    return FitReport(
+        source=points.source,
+        points=len(points),
+        length=length,
+        position_error=0.0,
+        position_rms=0.0,
+        position_tolerance=0.0,
+        orientation_error=0.0,
+        orientation_tolerance=0.0,
         intervals=len(points) - 1,
         told=told,
         doubt=of_size(points),

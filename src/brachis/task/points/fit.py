@@ -23,10 +23,10 @@ from brachis.task.points.least_squares import (
     DEGREE,
     Fit,
     Tolerance,
-    clamped,
+    clamp_knots,
     fit_over,
     lengths_along,
-    measured,
+    measure,
     over_arc_length,
 )
 from brachis.task.points.points import Array, Points, angles_between
@@ -37,13 +37,10 @@ if TYPE_CHECKING:
     from brachis.task.points.scatter import Scatter
 
 _FEW = DEGREE + 1
-_MOST_ROUNDS = 40
-_PRUNING_ROUNDS = 12
 _SAMPLE = 8_000
 """Points that are looked at while knots are added."""
 _NOISY_POINTS = 10
 """Least number of points in an interval where points scatter: with fewer a curve would follow the scatter."""
-_REMOVABLE = 0.95
 _INTERPOLATED = 2_000
 """Most points that are interpolated where no fewer knots will do."""
 
@@ -64,8 +61,9 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
         return _polynomial(points, sigma)
     every = -(-len(points) // _SAMPLE)
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
-    noisy, dimension = scatter.noisy(tolerance), points.position.shape[1]
-    rough = _with_knots_added(
+    noisy = scatter.noisy(tolerance)
+    dimension = points.position.shape[1]
+    rough = _add_knots(
         points.only(chosen),
         sigma[chosen],
         _first_breaks(points, sigma),
@@ -73,16 +71,16 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
         noisy=noisy,
     )
     if rough is None:
-        return _interpolated(points, sigma)
+        return _interpolate(points, sigma)
     places, breaks = over_arc_length(rough, dimension)
     sigma = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
-    fit = _with_knots_added(points, sigma, breaks, tolerance, noisy=noisy)
+    fit = _add_knots(points, sigma, breaks, tolerance, noisy=noisy)
     if fit is not None and fit.ratios(tolerance).max() <= 1.0:
-        return _with_fewest_knots(
-            points, _with_knots_removed(points, fit, tolerance), tolerance
+        return _use_fewest_knots(
+            points, _remove_knots(points, fit, tolerance), tolerance
         )
     return (
-        _interpolated(points, sigma)
+        _interpolate(points, sigma)
         if fit is None or (not noisy and len(points) <= _INTERPOLATED)
         else fit
     )
@@ -95,12 +93,13 @@ def _first_breaks(points: Points, sigma: Array) -> Array:
     return np.linspace(0.0, float(sigma[-1]), count + 1)
 
 
-def _with_knots_added(
+def _add_knots(
     points: Points, sigma: Array, breaks: Array, tolerance: Tolerance, *, noisy: bool
 ) -> Fit | None:
     """Halve the intervals in which the tolerance is exceeded, until none is or none can be; None where no fit is."""
-    least, fit = _NOISY_POINTS if noisy else 1, None
-    for _ in range(_MOST_ROUNDS):
+    least = _NOISY_POINTS if noisy else 1
+    fit = None
+    for _ in range(40):
         try:
             fit = fit_over(points, sigma, breaks)
         except (ValueError, np.linalg.LinAlgError):
@@ -110,17 +109,15 @@ def _with_knots_added(
         halved = np.flatnonzero(bad & (counts >= 2 * least))
         if not halved.size:
             return fit
-        sigma, breaks = (
-            fit.sigma,
-            np.sort(np.append(breaks, (breaks[halved] + breaks[halved + 1]) / 2.0)),
-        )
+        sigma = fit.sigma
+        breaks = np.sort(np.append(breaks, (breaks[halved] + breaks[halved + 1]) / 2.0))
     return fit
 
 
-def _with_knots_removed(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
+def _remove_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
     """Take knots away, many at a time, as long as all points stay within the tolerance."""
     needed = np.empty(0)
-    for _ in range(_PRUNING_ROUNDS):
+    for _ in range(12):
         removed = _removable(fit, tolerance, needed)
         if not removed.size:
             break
@@ -148,7 +145,7 @@ def _near_bad(breaks: Array, bad: np.ndarray, removed: Array) -> np.ndarray:
     return near
 
 
-def _with_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
+def _use_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
     """Spread fewer knots as densely in proportion, over the arc length, as long as all points are within the tolerance.
 
     Their number is halved between one that will do and one that will not.
@@ -171,7 +168,8 @@ def _with_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
             ),
         )
         if trial.ratios(tolerance).max() <= 1.0:
-            most, fit = count, trial
+            most = count
+            fit = trial
         else:
             fewest = count
     return fit
@@ -184,7 +182,7 @@ def _removable(fit: Fit, tolerance: Tolerance, needed: Array) -> Array:
     taken = np.zeros(len(beside) + 2, dtype=bool)
     for i in np.argsort(beside):
         if (
-            beside[i] < _REMOVABLE
+            beside[i] < 0.95
             and not np.any(needed == fit.breaks[i + 1])
             and not (taken[i] or taken[i + 2])
         ):
@@ -197,28 +195,22 @@ def _polynomial(points: Points, sigma: Array) -> Fit:
     from scipy.interpolate import make_interp_spline
 
     through = make_interp_spline(sigma, points.columns, k=len(points) - 1)
-    at, breaks = np.linspace(0.0, sigma[-1], _FEW), sigma[[0, -1]]
-    return measured(
+    at = np.linspace(0.0, sigma[-1], _FEW)
+    breaks = sigma[[0, -1]]
+    return measure(
         points,
-        make_interp_spline(at, through(at), k=DEGREE, t=clamped(breaks)),
+        make_interp_spline(at, through(at), k=DEGREE, t=clamp_knots(breaks)),
         breaks,
         sigma,
     )
 
 
-def _interpolated(points: Points, sigma: Array) -> Fit:
+def _interpolate(points: Points, sigma: Array) -> Fit:
     """Return the spline through all points."""
     from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(sigma, points.columns, k=DEGREE)
-    return measured(points, spline, np.unique(spline.t), sigma)
-
-
-_SIDES = 20_000
-_LEAST_SIDES = 64
-_STRETCH, _AROUND = 0.005, 0.01
-"""Parts of the curve's length: of a stretch of points, and of how far beyond its ends its corners are looked for."""
-_SHARE_OF_POINTS = 1_000
+    return measure(points, spline, np.unique(spline.t), sigma)
 
 
 def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
@@ -232,7 +224,7 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
         Position and turning, as `Points.columns`.
     """
     breaks = np.unique(spline.t)
-    count = max(_LEAST_SIDES, _SIDES // (len(breaks) - 1))
+    count = max(64, 20_000 // (len(breaks) - 1))
     sides = np.arange(count) / count
     sigma = np.append(
         (breaks[:-1, None] + np.diff(breaks)[:, None] * sides).ravel(), breaks[-1]
@@ -240,7 +232,8 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     dimension = points.position.shape[1]
     place = spline(sigma)[:, :dimension]
     nearest = _nearest(points.position, place)
-    distances, at = np.full(len(points), np.inf), np.zeros(len(points))
+    distances = np.full(len(points), np.inf)
+    at = np.zeros(len(points))
     for offset in (-1, 0):
         first = np.clip(nearest + offset, 0, len(place) - 2)
         side = place[first + 1] - place[first]
@@ -264,13 +257,15 @@ def _nearest(position: Array, place: Array) -> Array:
     from scipy.spatial import cKDTree
 
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
-    nearest, reached = np.zeros(len(position), dtype=int), 0.0
+    nearest = np.zeros(len(position), dtype=int)
+    reached = 0.0
     for stretch, length in _stretches(position, along[-1]):
-        beyond = _AROUND * along[-1]
+        beyond = 0.01 * along[-1]  # of the stretch's ends
         low, high = np.searchsorted(
             along, [reached - beyond, reached + length + beyond]
         )
-        low, high = max(0, low - 1), high + 1
+        low = max(0, low - 1)
+        high = high + 1
         nearest[stretch] = low + cKDTree(place[low:high]).query(position[stretch])[1]
         reached = along[nearest[stretch][-1]]
     return nearest
@@ -279,17 +274,17 @@ def _nearest(position: Array, place: Array) -> Array:
 def _stretches(position: Array, total: float) -> Iterator[tuple[slice, float]]:
     """Cut n points into stretches, with the length of each from the last point before it to its own last one, m.
 
-    The points' polygon is no shorter than the path between them, but for the tolerance.
+    The points' polygon is at least as long as the path between them, but for the tolerance.
     """
     lengths = np.append(
         0.0, np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))
     )
-    most = max(1, len(position) // _SHARE_OF_POINTS)
+    most = max(1, len(position) // 1_000)
     first = 0
     while first < len(position):
         before = lengths[max(first - 1, 0)]
         last = min(
-            int(np.searchsorted(lengths, before + _STRETCH * total, side="right")),
+            int(np.searchsorted(lengths, before + 0.005 * total, side="right")),
             first + most,
         )
         last = max(last, first + 1)

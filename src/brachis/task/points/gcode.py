@@ -29,9 +29,7 @@ _IGNORED: Final = {"40", "49", "61", "64", "80", "91.1", "94"}
 _OFFSETS: Final = {"54", "55", "56", "57", "58", "59"}
 _ENDS: Final = {"2", "30"}
 _CALLS: Final = {"97", "98", "99"}
-_SAGITTA = 1e-6
 _PIECES = 4
-_PIECE = 1e-3
 _ROUND = 2e-3
 """How much the radii of an arc at its start and end may differ, as a fraction of it."""
 
@@ -72,7 +70,7 @@ def read_gcode(
     Raises
     ------
     TaskError
-        The program has words that are not understood, or an arc is none; the message names the line.
+        The program has words that are not understood, or an invalid arc; the message names the line.
     """
     names = POSITION if isinstance(rows, str) else rows
     if not set(names) <= set(POSITION):
@@ -188,7 +186,8 @@ def _mode(machine: _Machine, code: str, where: str) -> None:
     elif code in _PLANES:
         machine.plane = _PLANES[code]
     elif code in _UNITS:
-        machine.unit, machine.unit_stated = _UNITS[code], True
+        machine.unit = _UNITS[code]
+        machine.unit_stated = True
     elif code in {"90", "91"}:
         machine.absolute = code == "90"
     elif code in _OFFSETS:
@@ -212,7 +211,8 @@ def _mode(machine: _Machine, code: str, where: str) -> None:
 
 def _move(machine: _Machine, values: dict[str, float], where: str, number: int) -> None:
     """Go on to the place that a line names."""
-    start, end = machine.at, list(machine.at)
+    start = machine.at
+    end = list(machine.at)
     for i, axis in enumerate("XYZ"):
         if axis in values:
             base = 0.0 if machine.absolute else start[i] or 0.0
@@ -243,9 +243,10 @@ def _move(machine: _Machine, values: dict[str, float], where: str, number: int) 
 def _line(
     start: list[float | None], end: list[float | None]
 ) -> list[list[float | None]]:
-    one, other = np.array(start, dtype=float), np.array(end, dtype=float)
+    one = np.array(start, dtype=float)
+    other = np.array(end, dtype=float)
     length = float(np.linalg.norm(other - one))
-    count = max(_PIECES, ceil(length / max(_PIECE, length / 200.0))) if length else 0
+    count = max(_PIECES, ceil(length / max(1e-3, length / 200.0))) if length else 0
     return [list(one + (other - one) * (k / count)) for k in range(1, count + 1)]
 
 
@@ -256,7 +257,8 @@ def _arc(
     values: dict[str, float],
     where: str,
 ) -> list[list[float | None]]:
-    one, other = np.array(start, dtype=float), np.array(end, dtype=float)
+    one = np.array(start, dtype=float)
+    other = np.array(end, dtype=float)
     a, b, c = machine.plane
     clockwise = machine.motion == "2"
     if "R" in values:
@@ -270,11 +272,12 @@ def _arc(
     else:
         offsets = [values.get("IJK"[axis], 0.0) * machine.unit for axis in (a, b)]
         centre = one[[a, b]] + offsets
-    radius, at_end = hypot(*(one[[a, b]] - centre)), hypot(*(other[[a, b]] - centre))
+    radius = hypot(*(one[[a, b]] - centre))
+    at_end = hypot(*(other[[a, b]] - centre))
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
         found = f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end"
         raise TaskError(
-            "the arc is none",
+            "invalid arc: its start and end are at different radii",
             found=found,
             allowed="one radius; I, J, K from the start",
             where=where,
@@ -285,12 +288,11 @@ def _arc(
         swept -= 2.0 * pi
     if abs(abs(swept) - 2.0 * pi) < 1e-9 or abs(swept) < 1e-9:
         swept = -2.0 * pi if clockwise else 2.0 * pi
-    count = max(
-        _PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - _SAGITTA / radius, 0.5))))
-    )
+    count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - 1e-6 / radius, 0.5)))))
     places = []
     for k in range(1, count + 1):
-        share, place = k / count, other.copy()
+        share = k / count
+        place = other.copy()
         place[a] = centre[0] + (radius + (at_end - radius) * share) * cos(
             first + swept * share
         )
@@ -311,7 +313,7 @@ def _centre(
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
         found = f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart"
         raise TaskError(
-            "the arc is none",
+            "invalid arc: no circle of this radius passes both ends",
             found=found,
             allowed="ends at most 2 R apart, and not the same",
             where=where,

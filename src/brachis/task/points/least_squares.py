@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 DEGREE = 5
 """Of all fitted curves: C4 at their knots."""
-_END_WEIGHT = 1e3
-_STEPS = 2
 _FARTHEST = 0.02
 """How far a point may be from where it was taken to be, as a part of the length."""
 
@@ -106,10 +104,12 @@ def fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
     from scipy.interpolate import BSpline, make_lsq_spline
 
     order = np.argsort(sigma, kind="stable")
-    columns, weights = points.columns, np.ones(len(points))
-    weights[[0, -1]] = _END_WEIGHT
-    origin, length = columns[0], float(breaks[-1])
-    knots = clamped(breaks / length)
+    columns = points.columns
+    weights = np.ones(len(points))
+    weights[[0, -1]] = 1e3
+    origin = columns[0]
+    length = float(breaks[-1])
+    knots = clamp_knots(breaks / length)
     inside = np.clip(sigma[order] / length, 0.0, 1.0)
     spline = make_lsq_spline(
         inside, columns[order] - origin, knots, k=DEGREE, w=weights[order]
@@ -118,27 +118,29 @@ def fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
         raise ValueError("the knots are too dense for the points")
     control_points = spline.c + origin
     control_points[[0, -1]] = columns[[0, -1]]
-    return measured(
+    return measure(
         points, BSpline(knots * length, control_points, DEGREE), breaks, sigma
     )
 
 
-def clamped(breaks: Array) -> Array:
+def clamp_knots(breaks: Array) -> Array:
     """Return the knots of a spline of the degree of all fits, with the ends repeated."""
     return np.concatenate(
         [np.repeat(breaks[0], DEGREE), breaks, np.repeat(breaks[-1], DEGREE)]
     )
 
 
-def measured(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fit:
+def measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fit:
     """Return the fit with the places on the curve that are nearest to the points, by Newton steps from `sigma`."""
     dimension = points.position.shape[1]
     position = type(spline)(spline.t, spline.c[:, :dimension], spline.k)
-    slope, sigma = position.derivative(), sigma.copy()
+    slope = position.derivative()
+    sigma = sigma.copy()
     # Of a path that winds, a first rough curve is near points of other windings, too: these are not for the taking.
     far = _FARTHEST * (breaks[-1] - breaks[0])
-    low, high = np.maximum(sigma - far, breaks[0]), np.minimum(sigma + far, breaks[-1])
-    for _ in range(_STEPS):
+    low = np.maximum(sigma - far, breaks[0])
+    high = np.minimum(sigma + far, breaks[-1])
+    for _ in range(2):
         tangent = slope(sigma)
         along = np.sum((points.position - position(sigma)) * tangent, axis=1)
         sigma += along / np.maximum(np.sum(tangent**2, axis=1), 1e-12)
@@ -174,7 +176,6 @@ def over_arc_length(fit: Fit, dimension: int) -> tuple[Array, Array]:
     return np.interp(fit.sigma, fine, lengths), np.interp(fit.breaks, fine, lengths)
 
 
-_WIDE = 20.0
 _AT_LEAST = 1e-9
 
 
@@ -208,11 +209,12 @@ def lengths_along(position: Array, deviation: float) -> Array:
 
 def _block(position: Array, deviation: float) -> int:
     """Return how many points are averaged: twice as many until the blocks are far apart beside the scatter."""
-    count, block = len(position), 1
+    count = len(position)
+    block = 1
     while deviation > 0.0 and 8 * block < count:
         ends = position[::block]
         step = float(np.median(np.linalg.norm(np.diff(ends, axis=0), axis=1)))
-        if step > _WIDE * deviation / block**0.5:
+        if step > 20.0 * deviation / block**0.5:
             break
         block *= 2
     return block

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
-from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS, Units
+from brachis.task.point_data import FileUnits
+from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -67,14 +68,14 @@ class Points:
         }
         return replace(self, **parts, speed=speed)
 
-    def named(self, i: int) -> str:
+    def name_row(self, i: int) -> str:
         """Name the row of a point."""
         return f"{self.row} {self.rows[i]}"
 
-    def described(self, i: int) -> str:
+    def describe(self, i: int) -> str:
         """Name the row and the position of a point."""
         place = ", ".join(f"{value:.6g}" for value in self.position[i])
-        return f"{self.named(i)}, [{place}] m"
+        return f"{self.name_row(i)}, [{place}] m"
 
     def wrong(
         self, i: int, problem: str, *, found: str, allowed: str, hint: str | None = None
@@ -84,7 +85,7 @@ class Points:
             problem,
             found=found,
             allowed=allowed,
-            where=f"{self.source}: {self.named(i)}",
+            where=f"{self.source}: {self.name_row(i)}",
             hint=hint,
         )
 
@@ -100,8 +101,6 @@ def angles_between(one: Array, other: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0)))
 
 
-_ROTATION = 1e-4
-_MOST_ROWS = 3
 _HOMOGENEOUS = (4, 4)
 _MATRIX = (3, 3)
 
@@ -110,7 +109,7 @@ def points_from(
     points: Any,
     orientations: Any,
     speed: Any,
-    units: Units,
+    units: FileUnits,
     source: str,
     *,
     least: int = 2,
@@ -125,7 +124,7 @@ def points_from(
         SciPy's rotations; rotation matrices; yaw.
     speed : array_like, (n,), or None
         NaN where none is prescribed.
-    units : Units
+    units : FileUnits
         Of the numbers; m, rad and m/s where not stated.
     source : str
         What messages call the points.
@@ -135,16 +134,13 @@ def points_from(
     Raises
     ------
     TaskError
-        Arrays of other shapes, or with numbers that are not finite, or that are no rotations; the row is named.
+        Arrays of wrong shapes, with numbers that are not finite, or matrices that are not rotations; with the row.
     """
     values = _array(_matrices(points), source, source)
     if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:
-        values, orientations = values[:, :3, 3], values[:, :3, :3]
-    if (
-        values.ndim != 2
-        or not 1 <= values.shape[1] <= _MOST_ROWS
-        or len(values) < least
-    ):
+        orientations = values[:, :3, :3]
+        values = values[:, :3, 3]
+    if values.ndim != 2 or not 1 <= values.shape[1] <= 3 or len(values) < least:
         allowed = (
             f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
         )
@@ -170,7 +166,7 @@ def points_from(
                 allowed="(n,)",
                 where=where,
             )
-        problem = "a speed must be positive and finite, or NaN where there is none"
+        problem = "a speed must be positive and finite, or NaN where none is prescribed"
         _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
     for name, one in (("orientations", turning), ("speed", speeds)):
         if one is not None and len(np.atleast_1d(one)) != len(values):
@@ -203,7 +199,7 @@ def _matrices(points: Any) -> Any:
     return points
 
 
-def _turning(orientations: Any, units: Units, source: str) -> Array:
+def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     """Return quaternions, (n, 4), or yaw, (n, 1)."""
     from scipy.spatial.transform import Rotation
 
@@ -216,7 +212,7 @@ def _turning(orientations: Any, units: Units, source: str) -> Array:
     if values.shape[1:] == _MATRIX:
         off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
         _refuse_first(
-            (off > _ROTATION) | (np.linalg.det(values) < 0.0),
+            (off > 1e-4) | (np.linalg.det(values) < 0.0),
             "no rotation matrix",
             values,
             source,

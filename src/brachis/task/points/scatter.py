@@ -9,19 +9,12 @@ import numpy as np
 from brachis.task.points.least_squares import Tolerance
 from brachis.task.points.points import QUATERNION, Array, Points
 
-_FEWEST = 20
 _WHITE = -0.25
 """Correlation of neighbouring residuals below which they are noise: -0.8 for white noise, 1 for a smooth curve."""
 _NEIGHBOURS = (-2, -1, 1, 2)
-_ON_A_LINE, _IN_A_PLANE, _IN_SPACE = 0.6745, 1.1774, 1.5382
+_MEDIANS = {1: 0.6745, 2: 1.1774, 3: 1.5382}
 """Median distance from zero of normally distributed points, by their dimension, in standard deviations."""
-_MEDIANS = {2: _ON_A_LINE, 3: _IN_A_PLANE}
-"""The same from a path, by the dimension of space."""
-_COUNTS = 0.1
 _NOTHING = 1e-300
-_CLOSEST = 1e-12
-_CLIP = 5.0
-_MOST_DECIMALS = 12
 _SECOND_DIFFERENCE = 6.0**0.5
 """Standard deviation of the second difference of white noise of standard deviation 1."""
 
@@ -49,7 +42,7 @@ class Scatter:
 
     def noisy(self, tolerance: Tolerance) -> bool:
         """Tell whether a curve through all points would follow scatter that counts beside a tolerance."""
-        return self.deviation > 0.0 or self.turning > _COUNTS * tolerance.orientation
+        return self.deviation > 0.0 or self.turning > 0.1 * tolerance.orientation
 
     @property
     def curvature(self) -> float:
@@ -80,21 +73,22 @@ def scatter_of(points: Points) -> Scatter:
     difference of positions counts what is across the path. Noise makes successive differences alternate, curvature
     does not.
     """
-    position, turning = points.position, points.turning
+    position = points.position
+    turning = points.turning
     chords = np.linalg.norm(np.diff(position, axis=0), axis=1)
     spacing = float(np.median(chords)) if len(chords) else 0.0
-    if len(points) < _FEWEST or position.shape[1] not in _MEDIANS or not spacing:
+    if len(points) < 20 or position.shape[1] not in (2, 3) or not spacing:
         return Scatter(0.0, 0.0, spacing, None)
     along = position[4:] - position[:-4]
     along /= np.maximum(np.linalg.norm(along, axis=1), _NOTHING)[:, None]
     away = _residuals(position, chords)
     across = away - np.sum(away * along, axis=1)[:, None] * along
-    deviation = _deviation(across, _MEDIANS[position.shape[1]])
+    deviation = _deviation(across, _MEDIANS[position.shape[1] - 1])
     of_turning = 0.0
     if turning.shape[1]:
         # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
         whole, median = (
-            (2.0, _IN_SPACE) if turning.shape[1] == QUATERNION else (1.0, _ON_A_LINE)
+            (2.0, _MEDIANS[3]) if turning.shape[1] == QUATERNION else (1.0, _MEDIANS[1])
         )
         of_turning = whole * _deviation(_residuals(turning, chords), median)
     return Scatter(deviation, of_turning, spacing, decimals_of(position))
@@ -107,8 +101,7 @@ def _deviation(residuals: Array, median_of_one: float) -> float:
     if median == 0.0:
         return 0.0
     clipped = (
-        residuals
-        * np.minimum(1.0, _CLIP * median / np.maximum(sizes, _NOTHING))[:, None]
+        residuals * np.minimum(1.0, 5.0 * median / np.maximum(sizes, _NOTHING))[:, None]
     )
     correlation = float(np.sum(clipped[1:] * clipped[:-1]) / np.sum(clipped**2))
     return median / median_of_one if correlation < _WHITE else 0.0
@@ -116,7 +109,7 @@ def _deviation(residuals: Array, median_of_one: float) -> float:
 
 def decimals_of(position: Array) -> int | None:
     """Return the number of decimals to which all values, m, are rounded; None where there are more than twelve."""
-    for decimals in range(_MOST_DECIMALS + 1):
+    for decimals in range(12 + 1):
         scaled = position * 10.0**decimals
         if np.all(
             np.abs(scaled - np.rint(scaled)) < 1e-9 * np.maximum(np.abs(scaled), 1e3)
@@ -128,7 +121,7 @@ def decimals_of(position: Array) -> int | None:
 def _residuals(values: Array, chords: Array) -> Array:
     """Return the differences of values, (n, c), from local cubics, (n - 4, c), scaled to the scatter of one value."""
     count = len(values)
-    u = np.concatenate([[0.0], np.cumsum(np.maximum(chords, _CLOSEST * chords.max()))])
+    u = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-12 * chords.max()))])
     inner = np.arange(2, count - 2)
     offsets = np.stack([u[inner + k] - u[inner] for k in _NEIGHBOURS])
     weights = np.ones_like(offsets)

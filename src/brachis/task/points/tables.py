@@ -16,13 +16,13 @@ import numpy as np
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
+from brachis.task.point_data import FileUnits
 from brachis.task.points.points import Array, Indices, Points
 from brachis.task.points.units import (
     ANGLES,
     CONVENTIONS,
     LENGTHS,
     SPEEDS,
-    Units,
     choices,
     rotation_by,
 )
@@ -77,7 +77,7 @@ def read_table(
     Raises
     ------
     TaskError
-        A line has the wrong number of values, or one that is no finite number; the message names line and column.
+        A line has the wrong number of values, or one that is not a finite number; the message names line and column.
     """
     told = ["a byte order mark"] if text.startswith("\ufeff") else []
     lines = [
@@ -210,7 +210,7 @@ _HEADING = re.compile(
     r"^([a-z]+?|q[1-4])(?:\s*[_ ]\s*([a-z/_]+)|\s*[\[(]\s*([a-z/]+)\s*[\])])?$"
 )
 _UNIT_LENGTH = 0.01
-_DEFAULTS = Units(length="m", angle="rad")
+_DEFAULTS = FileUnits(length="m", angle="rad")
 
 
 def allowed_columns(rows: tuple[str, ...] | str) -> str:
@@ -296,7 +296,8 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
         problem = (
             f"csv.orientation is {stated}, which the columns of the file do not have"
         )
-        found, allowed = ", ".join(names), f"columns {' | '.join(usual)} for {stated}"
+        found = ", ".join(names)
+        allowed = f"columns {' | '.join(usual)} for {stated}"
         hint = (
             f"Or csv.orientation: {choices(possible)}"
             if possible
@@ -309,7 +310,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
 def points_of(
     table: Table,
     rows: tuple[str, ...] | str,
-    units: Units,
+    units: FileUnits,
     source: str,
     stated: str | None = None,
 ) -> tuple[Points, tuple[str, ...]]:
@@ -320,7 +321,7 @@ def points_of(
     table : Table
     rows : tuple of str or str
         Rows of the task space, or the word for one of poses.
-    units : Units
+    units : FileUnits
         As the task states them.
     source : str
         The file, for messages.
@@ -395,13 +396,14 @@ def _unit(
     unit: str | None,
     kind: str,
     factors: dict[str, float],
-    units: Units,
+    units: FileUnits,
     default: str | None,
     in_header: dict[str, dict[str, None]],
     where: str,
 ) -> str:
     """Return the unit of a column: the heading's, else the task's, else the default."""
-    asked, found = getattr(units, kind), f"{unit} for {name}"
+    asked = getattr(units, kind)
+    found = f"{unit} for {name}"
     if unit is not None:
         if unit not in factors:
             raise TaskError(

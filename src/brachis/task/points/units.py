@@ -37,23 +37,8 @@ _QUANTITY = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class Units:
-    """Units of the numbers in a file.
-
-    Attributes
-    ----------
-    length, angle, speed : str or None
-        Out of `LENGTHS`, `ANGLES`, `SPEEDS`; None where nobody has stated it.
-    """
-
-    length: str | None = None
-    angle: str | None = None
-    speed: str | None = None
-
-
 def quantity(text: str, units: dict[str, float]) -> float | None:
-    """Read ``0.05 mm`` as a number in SI units; None where it is none."""
+    """Read ``0.05 mm`` as a number in SI units; None for any other text."""
     match = _QUANTITY.match(text)
     if match is None or match[2] not in units:
         return None
