@@ -205,14 +205,11 @@ class Limit(ABC):
         Of each of the c values.
     lower, upper : (c,) ndarray
         Bounds of the values; -inf and inf where open. Values should be of the size of 1.
-    time_scaling : bool
-        Whether a longer end time relieves it: velocity, acceleration, torque.
-    static : bool
-        Whether it says something about an arm that stands still: position, torque against gravity.
-    whole_turns : bool
-        Whether it asks in which turn (multiple of 2 pi) an angle is.
-    least_speed : bool
-        Whether it asks for a least speed somewhere: starts follow the phase plane then.
+    longer_time : {"relieves", "violates", "neither"}
+        What a longer end time does: it relieves a velocity, acceleration or torque, and violates a least speed.
+    at_rest : {"nothing", "posture", "turns"}
+        What it restricts of an arm at rest: the posture up to turns by 2 pi (torque against gravity), or which turn
+        an angle is in as well (position).
     breaks : (b,) ndarray
         Path coordinates at which it changes so abruptly that the motion is to be looked at just there.
     order : int
@@ -234,10 +231,8 @@ class Limit(ABC):
     labels: tuple[Label, ...]
     lower: np.ndarray
     upper: np.ndarray
-    time_scaling: bool = False
-    static: bool = False
-    whole_turns: bool = False
-    least_speed: bool = False
+    longer_time: Literal["relieves", "violates", "neither"] = "neither"
+    at_rest: Literal["nothing", "posture", "turns"] = "nothing"
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     refusal: str = "is exceeded at rest"

@@ -26,7 +26,7 @@ class BranchMargin(Limit):
 
     kind = "branch_margin"
     role = Role.SAFEGUARD
-    static = True
+    at_rest = "posture"
 
     def __init__(
         self, joint_map: JointMap, at_start: np.ndarray, margin: float

@@ -68,7 +68,7 @@ class TorqueLimit(JointRatioLimit):
     """
 
     kind = "torque"
-    static = True
+    at_rest = "posture"
     refusal = "cannot hold the arm against gravity"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
@@ -269,7 +269,7 @@ class TorqueSpeedLimit(Limit):
     """
 
     kind = "torque_speed"
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(self, robot: Robot, curves: dict[int, RoundedCurve]) -> None:
         self._robot, self._curves = robot, tuple(curves.values())

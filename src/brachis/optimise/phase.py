@@ -360,7 +360,7 @@ class Phase:
 
         Raises UnreachableError as `state` does.
         """
-        scaling = [limit for limit in self.limits if limit.time_scaling]
+        scaling = [limit for limit in self.limits if limit.longer_time == "relieves"]
         ratios = [limit.ratio(self._held(limit, x)) for limit in scaling]
         return np.concatenate(
             [np.broadcast_to(own, (len(self.t_norm), own.shape[1])) for own in ratios],

@@ -169,9 +169,7 @@ class Lattice(ABC):
         self._origin = problem.end if self._backwards else problem.start
         self._targets = problem.path.sample(self.s).target
         # In which turn the angles of a free origin are is open until the joint path is known.
-        self._static = [
-            limit for limit in problem.limits if limit.static and not limit.whole_turns
-        ]
+        self._static = [limit for limit in problem.limits if limit.at_rest == "posture"]
         limits = problem.robot.limits
         self._lower, self._upper = (
             limits.position_lower - _SLACK,

@@ -39,7 +39,8 @@ class CoupledRange:
 class BoundRange(Limit):
     """A `CoupledRange` on a robot: one value, the sum itself, in rad."""
 
-    kind, static, whole_turns = "coupled_range", True, True
+    kind = "coupled_range"
+    at_rest = "turns"
 
     def __init__(self, given: CoupledRange, robot: Robot) -> None:
         self.labels = (
