@@ -23,8 +23,22 @@ import numpy as np
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
 
-Where = Literal["points", "whole"]
-"""Where the rows of a limit are: its values at every moment, or their mean over the whole motion."""
+
+class Guarantee(Enum):
+    """Where a limit holds; each value is the sentence that a user reads."""
+
+    AT_ALL_INSTANTS = (
+        "It holds at all instants, which the verification checks on a dense grid."
+    )
+    AT_COLLOCATION_POINTS = (
+        "It holds at the collocation points of the optimiser, and is not verified."
+    )
+    AS_MEAN = "It holds as a mean over the whole motion."
+
+    @property
+    def is_mean(self) -> bool:
+        """Whether the means of the values over the motion are held, and not the values at every moment."""
+        return self is Guarantee.AS_MEAN
 
 
 class Approach(Protocol):
@@ -198,8 +212,8 @@ class Limit(ABC):
     ----------
     kind : str
         Name of the kind, unique.
-    where : {"points", "whole"}
-        Whether the values are held at every moment, or their means over the whole motion are.
+    guarantee : Guarantee
+        Where it holds.
     role : Role
     labels : tuple of Label
         Of each of the c values.
@@ -226,7 +240,7 @@ class Limit(ABC):
     """
 
     kind: str
-    where: Where = "points"
+    guarantee: Guarantee = Guarantee.AT_ALL_INSTANTS
     role: Role = Role.ROBOT
     labels: tuple[Label, ...]
     lower: np.ndarray
@@ -337,7 +351,7 @@ class Limit(ABC):
         What is held over the whole motion is equally near at all times.
         """
         values = self.values(motion)
-        if self.where == "whole":
+        if self.guarantee.is_mean:
             values = np.broadcast_to(
                 np.trapezoid(values, t, axis=0) / (t[-1] - t[0]), values.shape
             )

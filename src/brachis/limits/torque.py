@@ -46,6 +46,7 @@ from brachis.common.arrays import rates
 from brachis.limits.joint import JointRatioLimit, in_words
 from brachis.limits.protocol import (
     Bound,
+    Guarantee,
     JointMotion,
     Label,
     Limit,
@@ -364,7 +365,7 @@ class RmsTorqueLimit(JointRatioLimit):
     """
 
     kind = "rms_torque"
-    where = "whole"
+    guarantee = Guarantee.AS_MEAN
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
         super().__init__(

@@ -295,7 +295,7 @@ class Phase:
         values = limit.values(self.state(x))
         return (
             self.grid.mean_weights(x[self._lengths])[None] @ values
-            if limit.where == "whole"
+            if limit.guarantee.is_mean
             else values
         )
 
@@ -317,7 +317,7 @@ class Phase:
         means = [
             limit.violation(self._held(limit, x)).max()
             for limit in self.limits
-            if limit.where == "whole"
+            if limit.guarantee.is_mean
         ]
         return float(max(means, default=-np.inf))
 
@@ -349,7 +349,7 @@ class Phase:
         own = [
             limit
             for limit in self.limits
-            if limit.role is not Role.SAFEGUARD and limit.where == "points"
+            if limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean
         ]
         return np.concatenate(
             [limit.violation(limit.values(state)) for limit in own], axis=1
@@ -396,7 +396,7 @@ class Phase:
         """Entries of the rows of limits that are differentiated together."""
         state = self.state(x)
         slopes = list(self._chained([limit.partials(state) for limit in batch], x))
-        if batch[0].where == "points":
+        if not batch[0].guarantee.is_mean:
             return slopes
         entries = self._summed(slopes, self.grid.mean_weights(x[self._lengths]))
         values = np.concatenate([limit.values(state) for limit in batch], axis=1)

@@ -43,11 +43,8 @@ class BoundRange(Limit):
     at_rest = "turns"
 
     def __init__(self, given: CoupledRange, robot: Robot) -> None:
-        self.labels = (
-            Label(
-                " + ".join(given.joints), "range", "rad", "custom_limits.coupled_range"
-            ),
-        )
+        subject = " + ".join(given.joints)
+        self.labels = (Label(subject, "range", "rad", "custom_limits.coupled_range"),)
         self.lower, self.upper = np.array([given.lower]), np.array([given.upper])
         self._sum = np.array(
             [[float(name in given.joints) for name in robot.joint_names]]
