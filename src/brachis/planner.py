@@ -319,7 +319,7 @@ def _first(
     problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory
 ) -> Start | str:
     """Make a start of a known motion, for the solver that is tried first; or say why there is none."""
-    curved = any(limit.where == "whole" for limit in problem.limits)
+    curved = any(limit.guarantee.is_mean for limit in problem.limits)
     solver = solver_named(problem.task.solver.name, curved=curved)[0]
     start = given_start(problem, decompositions, known)
     return start if isinstance(start, str) else start.with_solver(solver.name)

@@ -159,7 +159,7 @@ class Rate(Limit):
     """Rate of the last joint, rad/s; its parts are spoiled one by one below."""
 
     kind = "last_rate"
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(self, robot):
         self.labels = (Label("j3", "rate", "rad/s"),)

@@ -210,7 +210,9 @@ def test_rates_of_the_verification_are_differences_of_its_torques(free):
 class _Twist(Limit):
     """A limit of the user's own that asks for the jerk: the sum of two joints' jerks."""
 
-    kind, order, time_scaling = "twist", 3, True
+    kind = "twist"
+    order = 3
+    longer_time = "relieves"
     labels = (Label("arm", "twist", "rad/s^3"),)
     lower, upper = -np.ones(1), np.ones(1)
 

@@ -17,7 +17,7 @@ def blocks(phase) -> dict[str, slice]:
     """Rows of every kind of limit, in the documented order."""
     result, first = {}, 0
     for limit in phase.limits:
-        size = len(limit.lower) * (1 if limit.where == "whole" else len(phase.t_norm))
+        size = len(limit.lower) * (1 if limit.guarantee.is_mean else len(phase.t_norm))
         result[limit.kind] = slice(first, first + size)
         first += size
     result["progress"] = slice(first, first + phase.splines[0].free - 1)
@@ -93,7 +93,7 @@ def test_pattern_is_fixed_has_no_place_twice_and_covers_all(phase, differentiate
         [
             phase.rows_of(limit).ravel()
             for limit in phase.limits
-            if limit.where == "whole"
+            if limit.guarantee.is_mean
         ]
     )
     assert np.all(np.bincount(phase.jacobian_rows)[means] == phase.variables)

@@ -35,6 +35,6 @@ def told(phase, limit, x) -> np.ndarray:
         near &= speed.values(state)[:, 0] > 0.05
     return (
         np.repeat(near, len(limit.lower))
-        if limit.where == "points"
+        if not limit.guarantee.is_mean
         else np.ones(len(limit.lower), dtype=bool)
     )

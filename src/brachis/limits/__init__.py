@@ -28,6 +28,7 @@ from brachis.limits.process_speed import build_least_process_speed, build_proces
 from brachis.limits.protocol import (
     Approach,
     Bound,
+    Guarantee,
     JointMotion,
     Label,
     Limit,
@@ -118,6 +119,7 @@ __all__ = [
     "TABLE",
     "Approach",
     "Bound",
+    "Guarantee",
     "JointMotion",
     "Label",
     "Limit",

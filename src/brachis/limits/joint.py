@@ -46,8 +46,7 @@ class PositionLimit(Limit):
     """
 
     kind = "position"
-    static = True
-    whole_turns = True
+    at_rest = "turns"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
         low, high = (
@@ -140,7 +139,7 @@ class JointRatioLimit(Limit):
         Of the limits of all joints of the robot.
     """
 
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(
         self,

@@ -48,7 +48,7 @@ class TotalPowerLimit(Limit):
     """
 
     kind = "total_power"
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._figure = robot, robot.limits.total_power

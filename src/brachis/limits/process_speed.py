@@ -198,7 +198,7 @@ class GreatestProcessSpeed(_ProcessSpeedLimit):
     """Process speeds are not exceeded by more than their tolerance."""
 
     kind = "process_speed"
-    time_scaling = True
+    longer_time = "relieves"
     _side = 1.0
 
     def __init__(self, robot: Robot, parts: Sequence[ProcessSpeed]) -> None:
@@ -210,7 +210,7 @@ class LeastProcessSpeed(_ProcessSpeedLimit):
     """Nor do process speeds fall short by more."""
 
     kind = "least_process_speed"
-    least_speed = True
+    longer_time = "violates"
     _side = -1.0
 
     def __init__(self, robot: Robot, parts: Sequence[ProcessSpeed]) -> None:

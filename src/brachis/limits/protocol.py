@@ -23,8 +23,22 @@ import numpy as np
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
 
-Where = Literal["points", "whole"]
-"""Where the rows of a limit are: its values at every moment, or their mean over the whole motion."""
+
+class Guarantee(Enum):
+    """Where a limit holds; each value is the sentence that a user reads."""
+
+    AT_ALL_INSTANTS = (
+        "It holds at all instants, which the verification checks on a dense grid."
+    )
+    AT_COLLOCATION_POINTS = (
+        "It holds at the collocation points of the optimiser, and is not verified."
+    )
+    AS_MEAN = "It holds as a mean over the whole motion."
+
+    @property
+    def is_mean(self) -> bool:
+        """Whether the means of the values over the motion are held, and not the values at every moment."""
+        return self is Guarantee.AS_MEAN
 
 
 class Approach(Protocol):
@@ -198,21 +212,18 @@ class Limit(ABC):
     ----------
     kind : str
         Name of the kind, unique.
-    where : {"points", "whole"}
-        Whether the values are held at every moment, or their means over the whole motion are.
+    guarantee : Guarantee
+        Where it holds.
     role : Role
     labels : tuple of Label
         Of each of the c values.
     lower, upper : (c,) ndarray
         Bounds of the values; -inf and inf where open. Values should be of the size of 1.
-    time_scaling : bool
-        Whether a longer end time relieves it: velocity, acceleration, torque.
-    static : bool
-        Whether it says something about an arm that stands still: position, torque against gravity.
-    whole_turns : bool
-        Whether it asks in which turn (multiple of 2 pi) an angle is.
-    least_speed : bool
-        Whether it asks for a least speed somewhere: starts follow the phase plane then.
+    longer_time : {"relieves", "violates", "neither"}
+        What a longer end time does: it relieves a velocity, acceleration or torque, and violates a least speed.
+    at_rest : {"nothing", "posture", "turns"}
+        What it restricts of an arm at rest: the posture up to turns by 2 pi (torque against gravity), or which turn
+        an angle is in as well (position).
     breaks : (b,) ndarray
         Path coordinates at which it changes so abruptly that the motion is to be looked at just there.
     order : int
@@ -229,15 +240,13 @@ class Limit(ABC):
     """
 
     kind: str
-    where: Where = "points"
+    guarantee: Guarantee = Guarantee.AT_ALL_INSTANTS
     role: Role = Role.ROBOT
     labels: tuple[Label, ...]
     lower: np.ndarray
     upper: np.ndarray
-    time_scaling: bool = False
-    static: bool = False
-    whole_turns: bool = False
-    least_speed: bool = False
+    longer_time: Literal["relieves", "violates", "neither"] = "neither"
+    at_rest: Literal["nothing", "posture", "turns"] = "nothing"
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     refusal: str = "is exceeded at rest"
@@ -342,7 +351,7 @@ class Limit(ABC):
         What is held over the whole motion is equally near at all times.
         """
         values = self.values(motion)
-        if self.where == "whole":
+        if self.guarantee.is_mean:
             values = np.broadcast_to(
                 np.trapezoid(values, t, axis=0) / (t[-1] - t[0]), values.shape
             )

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.kinematics import JointMap
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, Role
+from brachis.limits.protocol import (
+    Bound,
+    Guarantee,
+    JointMotion,
+    Label,
+    Limit,
+    Partials,
+    Role,
+)
 
 MARGIN = 5e-3
 """Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid.
@@ -26,7 +34,8 @@ class BranchMargin(Limit):
 
     kind = "branch_margin"
     role = Role.SAFEGUARD
-    static = True
+    guarantee = Guarantee.AT_COLLOCATION_POINTS
+    at_rest = "posture"
 
     def __init__(
         self, joint_map: JointMap, at_start: np.ndarray, margin: float

@@ -93,7 +93,7 @@ class ToolAccelerationLimit(Limit):
 
     kind = "tool_acceleration"
     role = Role.PROCESS
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._tool, self._figure = task_map_of(robot, "position"), figure
@@ -179,7 +179,7 @@ class ToolAngularSpeedLimit(Limit):
 
     kind = "tool_angular_speed"
     role = Role.PROCESS
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._tool, self._figure = task_map_of(robot, "pose"), figure
@@ -333,7 +333,7 @@ class ToolSpeedLimit(Limit):
 
     kind = "tool_speed"
     role = Role.PROCESS
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(
         self, robot: Robot, tables: Sequence[SpeedTable], labels: Sequence[Label]

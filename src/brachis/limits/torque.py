@@ -46,6 +46,7 @@ from brachis.common.arrays import rates
 from brachis.limits.joint import JointRatioLimit, in_words
 from brachis.limits.protocol import (
     Bound,
+    Guarantee,
     JointMotion,
     Label,
     Limit,
@@ -68,7 +69,7 @@ class TorqueLimit(JointRatioLimit):
     """
 
     kind = "torque"
-    static = True
+    at_rest = "posture"
     refusal = "cannot hold the arm against gravity"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
@@ -269,7 +270,7 @@ class TorqueSpeedLimit(Limit):
     """
 
     kind = "torque_speed"
-    time_scaling = True
+    longer_time = "relieves"
 
     def __init__(self, robot: Robot, curves: dict[int, RoundedCurve]) -> None:
         self._robot, self._curves = robot, tuple(curves.values())
@@ -364,7 +365,7 @@ class RmsTorqueLimit(JointRatioLimit):
     """
 
     kind = "rms_torque"
-    where = "whole"
+    guarantee = Guarantee.AS_MEAN
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
         super().__init__(

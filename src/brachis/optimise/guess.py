@@ -80,7 +80,7 @@ def _fast_enough(program: Program, x: np.ndarray) -> bool:
         limit.violation(limit.values(state)).max()
         for phase, state in of_phases
         for limit in phase.limits
-        if limit.least_speed
+        if limit.longer_time == "violates"
     ]
     return max(missed, default=0.0) <= _MISSED
 

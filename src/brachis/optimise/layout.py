@@ -192,13 +192,16 @@ class Layout:
 
 def height(limit: Limit, count: int) -> int:
     """Return how many times a limit's c values are rows, with `count` collocation points."""
-    return 1 if limit.where == "whole" else count
+    return 1 if limit.guarantee.is_mean else count
 
 
 def batches(limits: Sequence[Limit]) -> list[list[Limit]]:
     """Limits that are differentiated together: those held at every point, and those whose means are."""
-    kinds = dict.fromkeys(limit.where for limit in limits)
-    return [[limit for limit in limits if limit.where == where] for where in kinds]
+    kinds = dict.fromkeys(limit.guarantee.is_mean for limit in limits)
+    return [
+        [limit for limit in limits if limit.guarantee.is_mean == is_mean]
+        for is_mean in kinds
+    ]
 
 
 def _bounds(
@@ -255,7 +258,7 @@ def _pattern(
     columns = []
     for batch in batches(limits):
         together = np.concatenate([numbers[id(limit)] for limit in batch], axis=1)
-        if batch[0].where == "whole":
+        if batch[0].guarantee.is_mean:
             rows.append(np.repeat(together, lengths.stop))
             columns.append(np.tile(np.arange(lengths.stop), together.size))
         else:

@@ -158,7 +158,7 @@ def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
     fewest = (
         _WITH_LEAST_SPEED
-        if any(limit.least_speed for limit in program.limits)
+        if any(limit.longer_time == "violates" for limit in program.limits)
         else _FEWEST
     )
     steps = [

@@ -296,7 +296,7 @@ class Phase:
         values = limit.values(self.state(x))
         return (
             self.grid.mean_weights(x[self._lengths])[None] @ values
-            if limit.where == "whole"
+            if limit.guarantee.is_mean
             else values
         )
 
@@ -318,7 +318,7 @@ class Phase:
         means = [
             limit.violation(self._held(limit, x)).max()
             for limit in self.limits
-            if limit.where == "whole"
+            if limit.guarantee.is_mean
         ]
         return float(max(means, default=-np.inf))
 
@@ -348,7 +348,7 @@ class Phase:
         own = [
             limit
             for limit in self.limits
-            if limit.role is not Role.SAFEGUARD and limit.where == "points"
+            if limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean
         ]
         return np.concatenate(
             [limit.violation(limit.values(state)) for limit in own], axis=1
@@ -359,7 +359,7 @@ class Phase:
 
         Raises UnreachableError as `state` does.
         """
-        scaling = [limit for limit in self.limits if limit.time_scaling]
+        scaling = [limit for limit in self.limits if limit.longer_time == "relieves"]
         ratios = [limit.ratio(self._held(limit, x)) for limit in scaling]
         return np.concatenate(
             [np.broadcast_to(own, (len(self.t_norm), own.shape[1])) for own in ratios],
@@ -395,7 +395,7 @@ class Phase:
         """Entries of the rows of limits that are differentiated together."""
         state = self.state(x)
         slopes = list(self._chained([limit.partials(state) for limit in batch], x))
-        if batch[0].where == "points":
+        if not batch[0].guarantee.is_mean:
             return slopes
         entries = self._summed(slopes, self.grid.mean_weights(x[self._lengths]))
         values = np.concatenate([limit.values(state) for limit in batch], axis=1)

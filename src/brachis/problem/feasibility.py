@@ -86,7 +86,7 @@ def check_postures(
 
 def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
     """Let a limit hold at rest in postures, (K, n), that exceed it within the tolerance."""
-    if not limit.static:
+    if limit.at_rest == "nothing":
         return limit
     values = limit.values(Moments.at_rest(postures))
     excess = limit.violation(values).max(axis=0)
@@ -175,7 +175,7 @@ def _check_at_rest(
 ) -> None:
     """Refuse a posture in which a limit is exceeded although the arm stands still."""
     for limit in limits:
-        if not limit.static:
+        if limit.at_rest == "nothing":
             continue
         (values,), (beyond,) = beyond_at_rest(limit, posture[None], tolerance)
         worst = int(np.argmax(beyond))

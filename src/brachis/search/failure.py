@@ -107,7 +107,7 @@ def reason_out_of_reach(
                 remedies,
             )
             for limit in limits
-            if limit.static and not limit.whole_turns
+            if limit.at_rest == "posture"
             for allowed, nearest, remedies in [_allowed(joint_map.robot, limit, own)]
         ),
     )

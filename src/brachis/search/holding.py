@@ -63,7 +63,7 @@ def explain_holding(
             continue
         worst: tuple[float, Limit, int, np.ndarray, float] | None = None
         for limit in start.problem.limits:
-            if limit.where != "whole":
+            if not limit.guarantee.is_mean:
                 continue
             values = limit.values(Moments.at_rest(q))
             ratios = np.abs(limit.ratio(values))

@@ -204,9 +204,7 @@ class Lattice(ABC):
         self._origin = problem.end if self._backwards else problem.start
         self._targets = problem.path.sample(self.s).target
         # The turns of a free start stay open until the joint path is known.
-        self._static = [
-            limit for limit in problem.limits if limit.static and not limit.whole_turns
-        ]
+        self._static = [limit for limit in problem.limits if limit.at_rest == "posture"]
         limits = problem.robot.limits
         self._lower = limits.position_lower - _SLACK
         self._upper = limits.position_upper + _SLACK

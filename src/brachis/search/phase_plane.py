@@ -342,7 +342,7 @@ def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and their times, (S,), s; None where no limit asks for a least speed."""
     return (
         _timed(start)
-        if any(limit.least_speed for limit in start.problem.limits)
+        if any(limit.longer_time == "violates" for limit in start.problem.limits)
         else None
     )
 
@@ -391,7 +391,10 @@ def graded(limits: Sequence[Limit]) -> np.ndarray:
     even = np.linspace(0.0, 1.0, _STATIONS)
     steps = even[1] * 0.5 ** np.arange(_HALVINGS)
     breaks = np.concatenate(
-        [np.empty(0), *(limit.breaks for limit in limits if limit.least_speed)]
+        [
+            np.empty(0),
+            *(limit.breaks for limit in limits if limit.longer_time == "violates"),
+        ]
     )
     near = breaks[:, None] + np.r_[-steps, 0.0, steps]
     places = np.union1d(even, np.clip(near, 0.0, 1.0))

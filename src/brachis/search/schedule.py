@@ -76,7 +76,7 @@ def batches(
     ------
     Batch
     """
-    curved = any(limit.where == "whole" for limit in problem.limits)
+    curved = any(limit.guarantee.is_mean for limit in problem.limits)
     solvers = [
         solver.name for solver in solver_named(problem.task.solver.name, curved=curved)
     ]

@@ -151,7 +151,7 @@ def _roughly(problem: Problem) -> Problem:
 
 def _solver(start: Start, deadline: Deadline) -> SolverSession:
     """Make a session that solves roughly: an answer that nearly holds the limits will do."""
-    curved = any(limit.where == "whole" for limit in start.problem.limits)
+    curved = any(limit.guarantee.is_mean for limit in start.problem.limits)
     backend = solver_named(start.problem.task.solver.name, curved=curved)[0]
 
     options = SolverOptions(

@@ -257,7 +257,9 @@ def joint_space_start(problem: Problem) -> Start:
     times = least_times(problem.limits, s, q, problem.end_rates)
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
-        if limit.static and (times is None or not limit.time_scaling):
+        if limit.at_rest != "nothing" and (
+            times is None or limit.longer_time != "relieves"
+        ):
             _refuse_beyond(
                 problem.robot, limit, s, q, problem.task.refinement.tolerance
             )

@@ -110,7 +110,9 @@ def out_of_reach(
         for attempt in attempts
         if attempt.start is not None and attempt.solver
     ]
-    if not starts or not any(limit.least_speed for limit in starts[0].problem.limits):
+    if not starts or not any(
+        limit.longer_time == "violates" for limit in starts[0].problem.limits
+    ):
         return None
     start = min(starts, key=lambda start: start.estimate)
     problem = dataclasses.replace(start.problem, limits=tuple(_others(start.problem)))
@@ -137,14 +139,14 @@ def unlikely(found: TooFast) -> bool:
 
 
 def _others(problem: Problem) -> Iterator[Limit]:
-    return (limit for limit in problem.limits if not limit.least_speed)
+    return (limit for limit in problem.limits if limit.longer_time != "violates")
 
 
 def _in_phase_plane(start: Start) -> TooFast | None:
     """Tell which speed no motion along the start's joint path has; None where all are possible, or none is asked."""
     problem = start.problem
     rates = start.problem.end_rates
-    asked = any(limit.least_speed for limit in problem.limits)
+    asked = any(limit.longer_time == "violates" for limit in problem.limits)
     if problem.task.boundary.periodic or not (asked or any(rates)):
         return None
     s = np.linspace(0.0, 1.0, _STATIONS)
@@ -231,7 +233,7 @@ def _falling_short(
     problem = start.problem
     worst: tuple[float, Limit, int, np.ndarray, np.ndarray] | None = None
     for limit in problem.limits:
-        if not limit.least_speed:
+        if limit.longer_time != "violates":
             continue
         values = limit.values(motion)
         beyond = np.where(

@@ -39,14 +39,12 @@ class CoupledRange:
 class BoundRange(Limit):
     """A `CoupledRange` on a robot: one value, the sum itself, in rad."""
 
-    kind, static, whole_turns = "coupled_range", True, True
+    kind = "coupled_range"
+    at_rest = "turns"
 
     def __init__(self, given: CoupledRange, robot: Robot) -> None:
-        self.labels = (
-            Label(
-                " + ".join(given.joints), "range", "rad", "custom_limits.coupled_range"
-            ),
-        )
+        subject = " + ".join(given.joints)
+        self.labels = (Label(subject, "range", "rad", "custom_limits.coupled_range"),)
         self.lower, self.upper = np.array([given.lower]), np.array([given.upper])
         self._sum = np.array(
             [[float(name in given.joints) for name in robot.joint_names]]

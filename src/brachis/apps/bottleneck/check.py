@@ -318,7 +318,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
         No backend found a feasible point, and x is not feasible either.
     """
     answers: list[np.ndarray] = []
-    curved = any(limit.where == "whole" for limit in program.limits)
+    curved = any(limit.guarantee.is_mean for limit in program.limits)
     for solver in solver_named("auto", curved=curved):
         try:
             report = solver.solve(program, x, _OPTIONS, None)

@@ -153,7 +153,7 @@ def _answers(
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, deadline
     )
-    curved = any(limit.where == "whole" for limit in program.limits)
+    curved = any(limit.guarantee.is_mean for limit in program.limits)
     for backend in solver_named(task.solver.name, curved=curved):
         if deadline.passed:
             return

@@ -91,7 +91,7 @@ def _bound_limit(trajectory: Trajectory, limit: Limit) -> np.ndarray:
         limit.centre,
         np.where(np.isfinite(limit.upper), -np.inf, np.inf),
     )
-    alone = limit.role is not Role.ROBOT or limit.where == "whole"
+    alone = limit.role is not Role.ROBOT or limit.guarantee.is_mean
     for stride in _STRIDES[:1] if alone else _STRIDES:
         windows = np.arange(max(count - order * stride, 0))[
             :, None
@@ -110,7 +110,7 @@ def _bound_limit(trajectory: Trajectory, limit: Limit) -> np.ndarray:
         off = np.sum(products, axis=0)[:, :, 0]
         values = limit.values(moments)
         values = values - np.clip(values - towards, -off, off)
-        if limit.where == "whole":
+        if limit.guarantee.is_mean:
             return (
                 np.abs(
                     limit.ratio(

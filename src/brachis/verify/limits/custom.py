@@ -46,7 +46,7 @@ def check_own(model: LimitModel, given: Given) -> tuple[str, Worst]:
         return found
 
     subjects = [label.subject for label in limit.labels]
-    if independent is None and limit.where == "whole":
+    if independent is None and limit.guarantee.is_mean:
         whole = ratios(given.states)[0]
         worst = Worst(
             float(whole.max()),
