@@ -165,8 +165,7 @@ def sweep(
     scheduler: Annotated[
         str | None,
         typer.Option(
-            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file; ray, "
-            "or ray://host:10001."
+            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file."
         ),
     ] = None,
     retry: Annotated[
