@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import brachis
 import fuzz_cases
-from brachis.apps.cli.inspection import inspect_command
+from brachis.apps.cli.inspection import inspect
 
 _MEMORY = 2_000_000_000
 _BUSY, _MAKING = 8.0, 30.0
@@ -82,14 +82,7 @@ def run(case: fuzz_cases.Case, folder: Path) -> str:
             elif what == "plan":
                 brachis.plan(folder / "task.yaml")
             else:
-                options = {
-                    "task_space": "x,y",
-                    "tool_frame": None,
-                    "base_frame": None,
-                    "lock": [],
-                    "changes": [],
-                }
-                inspect_command(folder / "robot.urdf", **options, as_json=True)
+                inspect(folder / "robot.urdf", task_space="x,y", json=True)
         except brachis.BrachisError as error:
             outcome = type(error).__name__
             _ = str(error)

@@ -63,7 +63,6 @@ HEAVY = {
     "pyarrow",
     "pandas",
     "dask",
-    "ray",
 }
 MOST_LINES = 620
 

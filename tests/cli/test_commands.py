@@ -289,7 +289,7 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
 )
 def test_interrupt_while_importing(command, run, monkeypatch):
     def interrupt(name, *_arguments):
-        if name == "brachis.apps.cli":
+        if name == "brachis.apps.cli.settings":
             raise KeyboardInterrupt
         return honest(name, *_arguments)
 

@@ -7,7 +7,7 @@ import urllib.request
 
 import pytest
 
-from brachis.apps.cli.motions import _candidates_beside
+from brachis.apps.cli.motions import _read_candidates
 from brachis.apps.view import Viewer
 from brachis.planner import plan
 from brachis.task import load_task
@@ -64,7 +64,7 @@ def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path)
     trajectory = Trajectory.load(saved)
     beside = saved.with_suffix(".json")
     data = json.loads(beside.read_text())
-    assert _candidates_beside(saved, trajectory) == data["candidates"] != []
+    assert _read_candidates(saved, trajectory) == data["candidates"] != []
     for other in (
         "nonsense",
         json.dumps({**data, "t_end": 9.0}),
@@ -72,7 +72,7 @@ def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path)
         "[1]",
     ):
         (tmp_path / "result.json").write_text(other)
-        assert _candidates_beside(tmp_path / "result.npz", trajectory) == []
+        assert _read_candidates(tmp_path / "result.npz", trajectory) == []
 
 
 def test_a_folder_without_a_motion_is_refused(run, tmp_path):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.apps.cli.inspection import inspect_command
+from brachis.apps.cli.inspection import inspect
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, Family, check_answers, find, find_all
 from brachis.ik.idealised import Polished, idealised
@@ -376,15 +376,7 @@ def test_xarm7_of_example_robot_data_has_decompositions():
 
 def test_inspect_says_what_is_polished(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "240")
-    options = {
-        "task_space": "pose",
-        "tool_frame": None,
-        "base_frame": None,
-        "lock": [],
-        "changes": [],
-    }
-    inspect = functools.partial(inspect_command, xarm(), **options)
-    inspect(as_json=True)
+    inspect(xarm(), task_space="pose", json=True)
     data = json.loads(capsys.readouterr().out)
     assert data["tool_frame"] == "link_eef"
     remarks = {row["redundant joints"]: row["remark"] for row in data["decompositions"]}
@@ -393,7 +385,7 @@ def test_inspect_says_what_is_polished(capsys, monkeypatch):
         == "axes within 3.7e-06 rad and 1.1e-06 m of an ideal arm's: answers are polished"
     )
     assert remarks["joint1"] == ""
-    inspect(as_json=False)
+    inspect(xarm(), task_space="pose")
     assert capsys.readouterr().out.count("answers are polished") == 4
 
 

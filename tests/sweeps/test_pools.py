@@ -168,10 +168,3 @@ def test_a_scheduler_that_is_lost(monkeypatch):
         match=r"tcp://here:1: the Dask scheduler was lost; found in <TCP .closed.*goes on",
     ):
         list(on_dask([], "tcp://here:1", print))
-
-
-def test_a_sweep_through_ray(content, tmp_path, same_as_undisturbed):
-    pytest.importorskip("ray", reason="Ray is not installed")
-    assert same_as_undisturbed(
-        brachis.sweep(content, tmp_path / "out", scheduler="ray").table
-    )

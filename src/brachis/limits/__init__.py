@@ -128,6 +128,5 @@ __all__ = [
     "Partials",
     "PhaseLines",
     "Role",
-    "branch_margin",
     "limits_of",
 ]

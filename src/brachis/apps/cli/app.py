@@ -1,12 +1,6 @@
-"""The application: what all commands have in common. The commands themselves are in `brachis.apps.cli.main`.
+"""The application: help, exit codes, and options that all or several commands have.
 
-Examples of every command, and the exit codes, as the help shows them.
-
-Run in this order the examples work, given a sweep file ``lines.yaml`` (docs/sweeps.md).
-
-How much a command says: the options ``--quiet`` and ``--verbose`` of every command.
-
-Options that several commands have.
+`brachis.apps.cli.main` adds the commands.
 """
 
 from __future__ import annotations
@@ -73,7 +67,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "brachis sweep lines.yaml --retry  # goes on where it was ended",
     ),
 }
-"""By command; those of the whole program under no name."""
+"""By command; those of the whole program under no name. They work in this order, given a sweep file ``lines.yaml``."""
 
 
 class Verbosity(IntEnum):
@@ -92,15 +86,6 @@ def chosen() -> Verbosity:
     return _CHOSEN.get()
 
 
-def choose(verbosity: Verbosity) -> None:
-    """Say this much from now on, within the context of the running command."""
-    _CHOSEN.set(verbosity)
-
-
-_OF_ALL = ("quiet", "verbose")
-"""Options that every command takes, after its name too."""
-
-
 class InterruptedByUserError(BrachisError):
     """The user pressed Ctrl-C."""
 
@@ -116,21 +101,21 @@ class _Commands(TyperGroup):
             with interrupts.heard():
                 return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
-            told = str(interrupt)
-            raise InterruptedByUserError(
-                f"interrupted; {told}" if told else "interrupted"
-            ) from interrupt
+            message = "; ".join(filter(None, ("interrupted", str(interrupt))))
+            raise InterruptedByUserError(message) from interrupt
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]
         """Find a command, and give it what all of them have."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and command.epilog is None:
             command.epilog = _paragraphs("Examples", EXAMPLES.get(cmd_name, ()))
-            command.params += [each for each in self.params if each.name in _OF_ALL]
+            command.params += [
+                each for each in self.params if each.name in {"quiet", "verbose"}
+            ]
         return command
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]
-        """Find the command that is named; a file is none."""
+        """Find a command by its name; a file in its place gets a hint."""
         if self.get_command(ctx, args[0]) is None and is_file(args[0]):
             command = "inspect" if Path(args[0]).suffix == ".urdf" else "plan"
             ctx.fail(f"A command comes before a file: brachis {command} {args[0]}")
@@ -156,7 +141,7 @@ app = typer.Typer(
 
 
 def _print_version(asked: bool) -> None:
-    """Print the version and stop, where asked."""
+    """Print the version and stop."""
     if asked:
         import brachis
 
@@ -166,12 +151,12 @@ def _print_version(asked: bool) -> None:
 
 def _be_quiet(asked: bool) -> None:
     if asked:
-        choose(Verbosity.QUIET)
+        _CHOSEN.set(Verbosity.QUIET)
 
 
 def _be_verbose(asked: bool) -> None:
     if asked:
-        choose(Verbosity.VERBOSE)
+        _CHOSEN.set(Verbosity.VERBOSE)
 
 
 @app.callback()
@@ -233,11 +218,3 @@ Degrees = Annotated[
         "--degrees", help="Show angles in degrees; files and JSON stay in rad."
     ),
 ]
-
-
-def with_strict(changes: list[str] | None, *, strict: bool | None) -> list[str]:
-    """Add what ``--strict`` or ``--no-strict`` says to the changes of a task."""
-    return [
-        *(changes or []),
-        *([] if strict is None else [f"strict={str(strict).lower()}"]),
-    ]

@@ -16,31 +16,20 @@ from typing import TextIO, cast
 
 import typer
 
-from brachis.apps.cli.app import Verbosity, app, chosen
-from brachis.apps.cli.composition import VectorCommand, compose
-from brachis.apps.cli.motion_commands import (
-    bottleneck,
-    compare,
-    export,
-    import_,
-    plot,
-    report,
-    verify,
-    view,
+from brachis.apps.cli import (
+    inspection,
+    motions,
+    planning,
+    recordings,
+    starting,
+    sweeps,
 )
+from brachis.apps.cli.app import Verbosity, app, chosen
 from brachis.apps.cli.output import (
     StandardOutput,
     open_streams,
     print_failure,
     print_usage_error,
-)
-from brachis.apps.cli.task_commands import (
-    inspect,
-    list_robots,
-    new,
-    plan,
-    schema,
-    sweep,
 )
 from brachis.errors import BrachisError
 
@@ -48,26 +37,28 @@ _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
 """What Typer raises for wrong options; it names it nowhere else."""
 
 _COMMANDS: dict[str, Callable[..., None]] = {
-    "robots": list_robots,
-    "new": new,
-    "plan": plan,
-    "bottleneck": bottleneck,
-    "verify": verify,
-    "export": export,
-    "plot": plot,
-    "report": report,
-    "view": view,
-    "inspect": inspect,
-    "compose": compose,
-    "import": import_,
-    "compare": compare,
-    "sweep": sweep,
-    "schema": schema,
+    "robots": starting.list_robots,
+    "new": starting.new,
+    "plan": planning.plan,
+    "bottleneck": planning.bottleneck,
+    "verify": motions.verify,
+    "export": motions.export,
+    "plot": motions.plot,
+    "report": motions.report,
+    "view": motions.view,
+    "inspect": inspection.inspect,
+    "compose": starting.compose,
+    "import": recordings.import_,
+    "compare": recordings.compare,
+    "sweep": sweeps.sweep,
+    "schema": motions.schema,
 }
 """By name, in the order of the help."""
 
 for _name, _command in _COMMANDS.items():
-    app.command(_name, cls=VectorCommand if _command is compose else None)(_command)
+    app.command(_name, cls=starting.VectorCommand if _name == "compose" else None)(
+        _command
+    )
 
 
 def main() -> None:

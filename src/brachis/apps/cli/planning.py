@@ -1,32 +1,24 @@
-"""``brachis plan``.
-
-``brachis sweep``.
-"""
+"""``brachis plan | bottleneck``: plan a task, show the motion and what holds it back."""
 
 from __future__ import annotations
 
-import re
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from rich.console import Console
+import typer
 
-from brachis import planner
-from brachis.apps.cli.app import Verbosity, chosen
+from brachis.apps.cli.app import Changes, Degrees, Strict
 from brachis.apps.cli.folder import (
     Writer,
     Written,
-    ended_cleanly,
     make_folder,
     write_files,
     write_text,
 )
-from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
     Column,
+    Json,
     exit_code,
     json_text,
     print_error,
@@ -38,20 +30,14 @@ from brachis.apps.cli.output import (
     result_console,
     shown_warnings,
 )
-from brachis.apps.cli.settings import changed_task, urdf_of
-from brachis.apps.plots import save_figure
-from brachis.apps.sweeps import SweepResult, sweep
-from brachis.apps.sweeps.pools import FAILED, UNVERIFIED, VERIFIED
-from brachis.apps.sweeps.run import in_words
-from brachis.apps.view import require_viser
-from brachis.common.files import writing_errors
+from brachis.common import interrupts
 from brachis.errors import InputError, write_count
-from brachis.optimise.candidate import coordinates
-from brachis.result import Result
-from brachis.robot.joints import shown_unit
-from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
 
-_FILES = {
+if TYPE_CHECKING:
+    from brachis.result import Result
+    from brachis.trajectory import Trajectory
+
+_PLANNED = {
     True: ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png"),
     False: (
         "unverified.npz",
@@ -61,39 +47,65 @@ _FILES = {
         "unverified_fit.png",
     ),
 }
-"""Names of the trajectory, the figures of merit, the drawings of motion, search and fit, by whether it was verified."""
+"""Files of a plan: trajectory, figures of merit, drawings of motion, search and fit; by whether it was verified."""
+_BOTTLENECK = {
+    True: ("bottleneck.json", "timeline.png"),
+    False: ("unverified_bottleneck.json", "unverified_timeline.png"),
+}
+"""Files of a bottleneck report: figures and drawing; by whether the motion was verified."""
 _MANY = 40
 """Candidates that are listed on the screen."""
 
+Urdf = Annotated[
+    Path | None, typer.Option(help="URDF file to use instead of the task's.")
+]
 
-def plan_command(
-    task: Path,
-    changes: Sequence[str],
-    *,
-    urdf: Path | None,
-    out: Path | None,
-    view: bool,
-    degrees: bool,
-    as_json: bool,
-) -> int:
-    """Plan, show, write; returns the exit code."""
+
+def plan(
+    task: Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for result.npz, result.json, overview.png and candidates.png (and fit.png, where the path was "
+            "fitted to points); of a motion that fails the verification the names begin with unverified."
+        ),
+    ] = None,
+    urdf: Urdf = None,
+    changes: Changes = None,
+    view: Annotated[
+        bool,
+        typer.Option("--view", help="Show the motion in the browser, until Ctrl-C."),
+    ] = False,
+    strict: Strict = None,
+    degrees: Degrees = False,
+    json: Json = False,
+) -> None:
+    """Plan a task, verify the motion, and show what came out."""
+    with interrupts.postponed():
+        from brachis import planner
+        from brachis.apps.cli.motions import show
+        from brachis.apps.cli.settings import changed_task, urdf_of
+        from brachis.apps.view import require_viser
     if view:
         require_viser()
     if out is not None:
-        make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
+        make_folder(out, (*_PLANNED[True], *_PLANNED[False]), (task, urdf))
     with shown_warnings(), progress() as listener:
         result = planner.plan(
-            urdf and urdf_of(urdf), changed_task(task, changes), listener=listener
+            urdf and urdf_of(urdf),
+            changed_task(task, changes, strict=strict),
+            listener=listener,
         )
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     failures: tuple[InputError, ...] = ()
     if out is not None:
-        written = _write(result, data, out)
-        data["files"], failures = list(written.files), written.failures
-    if as_json:
+        written = _write_plan(result, data, out)
+        failures = written.failures
+        data["files"] = list(written.files)
+    if json:
         print_json(data)
     else:
-        _show(result, data, degrees=degrees)
+        _print_plan(result, data, degrees=degrees)
     print_what_was_left(result.undone, interrupted=result.interrupted)
     if not result.verified:
         print_error(
@@ -106,17 +118,15 @@ def plan_command(
             verified=result.verified,
             degrees=degrees,
         )
-    return exit_code(result.verified, failures)
+    raise typer.Exit(exit_code(result.verified, failures))
 
 
-def _write(result: Result, data: dict[str, object], out: Path) -> Written:
-    """Write trajectory, figures of merit and drawing; an unverified motion gets names that say so.
-
-    Files of an earlier plan with the other names are removed: they would be another motion's.
-    """
+def _write_plan(result: Result, data: dict[str, object], out: Path) -> Written:
+    """Write trajectory, figures of merit and drawings, and remove those of an earlier plan with the other names."""
     from brachis.apps.plots import plot_candidates, plot_fit, plot_overview, save_figure
 
-    trajectory, figures_of_merit, overview, candidates, fit = _FILES[result.verified]
+    names = _PLANNED[result.verified]
+    trajectory, figures_of_merit, overview, candidates, fit = names
     results: dict[str, Writer] = {
         trajectory: result.trajectory.save,
         figures_of_merit: lambda path: write_text(json_text(data), path),
@@ -125,15 +135,20 @@ def _write(result: Result, data: dict[str, object], out: Path) -> Written:
         overview: lambda path: save_figure(plot_overview(result.trajectory), path),
         candidates: lambda path: save_figure(plot_candidates(result.candidates), path),
     }
-    if any(told.profile for told in result.fits):
+    if any(report.profile for report in result.fits):
         figures[fit] = lambda path: save_figure(plot_fit(result.trajectory), path)
-    return write_files(out, results, figures, stale=(*_FILES[not result.verified], fit))
+    stale = (*_PLANNED[not result.verified], fit)
+    return write_files(out, results, figures, stale=stale)
 
 
-def _show(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
+def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
+    from brachis.optimise.candidate import coordinates
+
     console = result_console()
-    attempt, trajectory = result.attempt, result.trajectory
+    attempt = result.attempt
+    trajectory = result.trajectory
+    iterations = sum(report.iterations for report in attempt.reports)
     named = trajectory.branch not in {"", result.family}
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
@@ -143,7 +158,7 @@ def _show(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         "end posture": _posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
-        "iterations": f"{sum(r.iterations for r in attempt.reports)} in {write_count(len(attempt.reports), 'solve')} "
+        "iterations": f"{iterations} in {write_count(len(attempt.reports), 'solve')} "
         f"(refined to {attempt.collocation_points} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",
         "least motion": "off"
@@ -154,13 +169,15 @@ def _show(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         "verified": "yes" if result.verified else "NO",
     }
     if attempt.time_scaled > 1.0:
-        lengthened = f"{100.0 * (attempt.time_scaled - 1.0):.2g} % to meet the limits between collocation points"
-        rows["end time lengthened by"] = lengthened
+        share = 100.0 * (attempt.time_scaled - 1.0)
+        rows["end time lengthened by"] = (
+            f"{share:.2g} % to meet the limits between collocation points"
+        )
     print_table(console, "plan", ("", ""), rows.items(), header=False)
     for fit in result.fits:
         console.print(f"path from {fit}")
     if len(data["candidates"]) > 1:
-        _print_candidates(console, data["candidates"])
+        _print_candidates(data["candidates"])
     print_verification(console, result.verification, degrees=degrees)
     for name in data.get("files", []):
         console.print(f"wrote {name}")
@@ -168,6 +185,8 @@ def _show(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
 
 def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     """Write a posture with names and units."""
+    from brachis.robot.joints import shown_unit
+
     parts = []
     for name, value, si_unit in zip(
         data["joint_names"], data[key], data["position_units"], strict=True
@@ -177,115 +196,150 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     return ", ".join(parts)
 
 
-def _print_candidates(
-    console: Console, candidates: Sequence[Mapping[str, Any]]
-) -> None:
+def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
     """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once."""
-    rows = candidate_rows(candidates)
-    others = len(candidates) - len(rows[:_MANY])
-    title = f"candidates ({len(candidates)}" + (
-        f", {others} of them in the JSON only)" if others else ")"
-    )
+    from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
+
+    rows = candidate_rows(candidates)[:_MANY]
+    others = len(candidates) - len(rows)
+    more = f", {others} of them in the JSON only" if others else ""
     times = (Column(name, number=True) for name in TIMES)
-    print_table(console, title, (*WORDS, *times, STATUS), rows[:_MANY])
+    title = f"candidates ({len(candidates)}{more})"
+    print_table(result_console(), title, (*WORDS, *times, STATUS), rows)
 
 
-_STEPS = 20
-"""How often progress is told where standard error is no terminal."""
-_FIGURE = "sweep.png"
+def bottleneck(
+    task: Annotated[
+        Path,
+        typer.Argument(
+            help="Task file (YAML), or result file (npz) of a motion planned before.",
+            metavar="TASK|RESULT",
+        ),
+    ],
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Solve again with every limit raised by 1 %, and compare."
+        ),
+    ] = False,
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference",
+            help="Compare with the best value known: the same problem with discontinuous torque allowed, on a fine "
+            "mesh; not a proven bound. Takes seconds.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for bottleneck.json and timeline.png; of a motion that fails the verification the names "
+            "begin with unverified_."
+        ),
+    ] = None,
+    urdf: Urdf = None,
+    changes: Changes = None,
+    strict: Strict = None,
+    degrees: Degrees = False,
+    json: Json = False,
+) -> None:
+    """Say what holds a motion back: which limits cost time.
 
-
-def sweep_command(
-    source: Path,
-    *,
-    out: Path | None,
-    jobs: int | None,
-    scheduler: str | None,
-    retry: bool,
-    as_json: bool,
-) -> int:
-    """Run a sweep, show, write; returns the exit code."""
-    with ended_cleanly(), _progress() as listener:
-        result = sweep(
-            source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
+    How much each of them costs, and when it is active, of a task that is planned for it or of a saved motion.
+    """
+    with interrupts.postponed():
+        from brachis import planner
+        from brachis.apps import bottleneck as bottlenecks
+        from brachis.apps.cli.settings import changed_task, motion_file, urdf_of
+        from brachis.optimise.candidate import coordinates
+        from brachis.trajectory import Trajectory
+    if out is not None:
+        make_folder(out, (*_BOTTLENECK[True], *_BOTTLENECK[False]), (task, urdf))
+    source = motion_file(task)
+    result = None
+    with shown_warnings(), progress() as listener:
+        if source.suffix.lower() == ".npz":
+            options = {"--urdf": urdf, "--set": changes, "--strict": strict}
+            _refuse_options_of_tasks(options)
+            trajectory = Trajectory.load(source)
+            verified, data = _verify_again(trajectory)
+        else:
+            result = planner.plan(
+                urdf and urdf_of(urdf),
+                changed_task(source, changes, strict=strict),
+                listener=listener,
+            )
+            trajectory = result.trajectory
+            verified = result.verified
+            data = result.to_dict()
+        listener("looking for what holds the motion back")
+        found = bottlenecks.report(
+            result or trajectory, check=check, reference=reference
         )
-    files, failures = [str(path) for path in result.files], []
-    figure = result.folder / _FIGURE
-    with writing_errors(figure):
-        figure.unlink(missing_ok=True)
-    if result.varied and result.count(VERIFIED):
-        try:
-            save_figure(result.plot(), figure)
-            files.append(str(figure))
-        except InputError as error:
-            failures.append(error)
-    if as_json:
-        print_json({**result.summary(), "keys": list(result.keys), "files": files})
+    data["bottleneck"] = found.to_dict()
+    written = Written((), ())
+    if out is not None:
+        written = _write_bottleneck(trajectory, data, out, verified=verified)
+        data["files"] = list(written.files)
+    if json:
+        print_json(data)
     else:
-        _show_sweep(result, files)
-    return exit_code(result.count(VERIFIED) > 0, failures)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """Show how far the sweep is: in place on a terminal, else in some lines on standard error, for the logs of jobs."""
-    with progress() as status:
-        if sys.stderr.isatty() or chosen() is not Verbosity.NORMAL:
-            yield status
-            return
-        told = -1
-
-        def listener(text: str) -> None:
-            nonlocal told
-            status(text)
-            done = re.match(r"(\d+) of (\d+)", text)
-            step = int(done[1]) * _STEPS // max(1, int(done[2])) if done else -1
-            if step != told:
-                print_error(text)
-            told = step
-
-        yield listener
-
-
-def _show_sweep(result: SweepResult, files: Sequence[str]) -> None:
-    """Print the sweep for a person."""
-    console, found = result_console(), result.summary()
-    counts = ", ".join(
-        f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
-    )
-    title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
-    shown = [name for name in ("best", "median", "worst") if name in found]
-    if shown:
-        keys = {
-            "t_end_s": "t_end [s]",
-            "plan": "plan",
-            **{key: key for key in result.keys},
-        }
-        rows = [
-            (words, *(_text(found[name][key]) for name in shown))
-            for key, words in keys.items()
-        ]
-        print_table(
-            console, title, ("", *(Column(name, number=True) for name in shown)), rows
-        )
-    else:
-        console.print(title)
-    for error, told in found["failures"].items():
+        console = result_console()
+        redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
         console.print(
-            f"{told['plans']} failed with {error}, for example: {told['message']}"
+            f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
         )
-    console.print(
-        f"planning took {in_words(found['wall_time_s'])} in all processes together"
-    )
-    for name in files:
-        console.print(f"wrote {name}")
+        console.print(found.text(degrees=degrees))
+        for name in written.files:
+            console.print(f"wrote {name}")
+    if result is not None:
+        print_what_was_left(result.undone, interrupted=result.interrupted)
+    if not verified:
+        print_error(
+            "the motion found did not pass the verification; what is said of it may not hold"
+        )
+    raise typer.Exit(exit_code(verified, written.failures))
 
 
-def _text(value: object) -> str:
-    return (
-        f"{value:.6g}"
-        if isinstance(value, float)
-        else ""
-        if value is None
-        else str(value)
-    )
+def _refuse_options_of_tasks(given: Mapping[str, object]) -> None:
+    """Refuse options that change a task where a saved motion is given."""
+    for option, value in given.items():
+        if value is not None:
+            raise InputError(
+                "a saved motion belongs to the robot and task that it was planned for",
+                where=option,
+                found=value,
+                allowed="this option with a task file",
+            )
+
+
+def _verify_again(trajectory: Trajectory) -> tuple[bool, dict[str, Any]]:
+    """Verify a saved motion; returns whether it passes, and its figures."""
+    from brachis.verify import verify_trajectory
+
+    verification = verify_trajectory(trajectory)
+    return verification.passed, {
+        "t_end": trajectory.t_end,
+        "redundant_joints": list(trajectory.redundant_joints),
+        "branch": trajectory.branch,
+        "joint_names": list(trajectory.joint_names),
+        "verified": verification.passed,
+        "worst_ratio": verification.worst_ratio,
+        "path_error": verification.path_error,
+    }
+
+
+def _write_bottleneck(
+    trajectory: Trajectory, data: dict[str, Any], out: Path, *, verified: bool
+) -> Written:
+    """Write the figures and the drawing."""
+    from brachis.apps.plots import plot_timeline, save_figure
+
+    figures_of_merit, timeline = _BOTTLENECK[verified]
+    results: dict[str, Writer] = {
+        figures_of_merit: lambda path: write_text(json_text(data), path)
+    }
+    figures: dict[str, Writer] = {
+        timeline: lambda path: save_figure(plot_timeline(trajectory), path)
+    }
+    return write_files(out, results, figures, stale=_BOTTLENECK[not verified])

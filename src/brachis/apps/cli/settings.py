@@ -40,19 +40,21 @@ def task_space_of(text: str) -> str | list[str]:
     return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
-def changed_task(path: Path, changes: Sequence[str]) -> Task:
-    """Load a task file, with keys set as ``spline.intervals=40``; of a key that is set twice the last value counts.
+def changed_task(
+    path: Path, changes: Sequence[str] | None, *, strict: bool | None = None
+) -> Task:
+    """Load a task file, with keys set as ``spline.intervals=40``, and ``strict`` where it is given.
 
-    Raises
-    ------
-    TaskError
-        See `load_task` and `read_assignment`.
+    Of a key that is set twice the last value counts.
     """
     if robots.is_robot(str(path)) and path.suffix == "":
         name = robots.path_of(str(path)).parent.name
         hint = f"brachis new {name} writes a first task for it"
         raise TaskError("is a robot", where=name, allowed="a task file", hint=hint)
-    return load_task(path, changes=dict(read_assignment(text) for text in changes))
+    keys = dict(read_assignment(text) for text in changes or ())
+    if strict is not None:
+        keys["strict"] = strict
+    return load_task(path, changes=keys)
 
 
 def urdf_of(given: Path) -> Path:

@@ -1,13 +1,6 @@
-"""Where plans are made: processes of this machine, a Dask cluster, or Ray.
+"""Where plans are made: processes of this machine or a Dask cluster.
 
-A pool takes plans and gives each back with its outcome, as soon as there is one, in any order: one function, and one
-line in `pool_for`.
-
-Plans made on a Dask cluster, or through Ray.
-
-Plans handed out to an executor, and what comes back.
-
-What a worker does: one plan, whatever comes of it.
+A pool takes plans and gives each back with its outcome, as soon as there is one, in any order.
 """
 
 from __future__ import annotations
@@ -261,62 +254,6 @@ def _answering(address: str) -> Iterator[None]:
         ) from error
 
 
-def on_ray(
-    plans: Iterable[Plan], address: str | None
-) -> Generator[tuple[Plan, Outcome], None, None]:
-    """Make plans through joblib's Ray backend, batch by batch.
-
-    Parameters
-    ----------
-    plans : iterable of Plan
-    address : str or None
-        Of a Ray cluster; None: the one that Ray finds, or starts, here.
-
-    Yields
-    ------
-    Plan, Outcome
-
-    Raises
-    ------
-    InputError
-        Ray is not installed.
-    ClusterError
-        The cluster does not answer, or was lost, with it the batch that was under way.
-    """
-    try:
-        import ray
-        from ray.util.joblib import register_ray
-    except ImportError as error:
-        raise InputError(
-            "Ray is not installed", found=str(error), hint="pip install ray"
-        ) from error
-    from joblib import Parallel, delayed, parallel_config
-
-    started = not ray.is_initialized()
-    try:
-        ray.init(address=address, ignore_reinit_error=True)
-        register_ray()
-        waiting, width = (
-            iter(plans),
-            AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1))),
-        )
-        with parallel_config(backend="ray", n_jobs=-1), Parallel() as parallel:
-            while batch := list(itertools.islice(waiting, width)):
-                interrupts.check()
-                yield from zip(
-                    batch,
-                    parallel(delayed(planned)(plan) for plan in batch),
-                    strict=True,
-                )
-    except (ray.exceptions.RayError, OSError, RuntimeError, ValueError) as error:
-        raise ClusterError(
-            "Ray does not answer, or was lost", where=address or "ray", found=str(error)
-        ) from error
-    finally:
-        if started:
-            ray.shutdown()
-
-
 Pool = Callable[[Sequence[Plan]], Generator[tuple[Plan, Outcome], None, None]]
 
 _ONE_THREAD = dict.fromkeys(
@@ -342,8 +279,8 @@ def pool_for(
     jobs : int or None
         Processes on this machine; None: as many as it has processors.
     scheduler : str or None
-        Address of a Dask scheduler (``tcp://host:8786``), its scheduler file (``scheduler.json``), ``ray`` or
-        ``ray://host:10001``; None: processes on this machine.
+        Address of a Dask scheduler (``tcp://host:8786``) or its scheduler file (``scheduler.json``); None: processes on
+        this machine.
     listener : callable
         Told of what is odd about a cluster.
 
@@ -369,8 +306,6 @@ def pool_for(
             found=jobs,
             allowed="jobs or scheduler",
         )
-    if scheduler == "ray" or scheduler.startswith("ray://"):
-        return lambda plans: on_ray(plans, None if scheduler == "ray" else scheduler)
     return lambda plans: on_dask(plans, scheduler, listener)
 
 

@@ -49,8 +49,8 @@ def sweep(
     jobs : int, optional
         Processes on this machine, no more than it has processors, which is also the default.
     scheduler : str, optional
-        Where plans are made instead: address of a Dask scheduler, such as ``tcp://host:8786``, or its scheduler file;
-        ``ray`` or ``ray://host:10001`` for Ray. The workers need brachis, and no files.
+        Where plans are made instead: address of a Dask scheduler, such as ``tcp://host:8786``, or its scheduler file.
+        The workers need brachis, and no files.
     retry : bool, optional
         Whether stored failures are planned again.
     listener : callable, optional

@@ -1,0 +1,144 @@
+"""``brachis sweep``: plan a task many times."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from brachis.apps.cli.app import Verbosity, chosen
+from brachis.apps.cli.folder import ended_cleanly
+from brachis.apps.cli.output import (
+    Column,
+    Json,
+    exit_code,
+    print_error,
+    print_json,
+    print_table,
+    progress,
+    result_console,
+)
+from brachis.common import interrupts
+from brachis.common.files import writing_errors
+from brachis.errors import InputError, write_count
+
+if TYPE_CHECKING:
+    from brachis.apps.sweeps import SweepResult
+
+
+def sweep(
+    source: Annotated[Path, typer.Argument(help="Sweep file (YAML).", metavar="SWEEP")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for plans, table.parquet, table.csv and sweep.png; by default one in the current folder, "
+            "named as the file. A sweep that was ended goes on where it was."
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            help="Processes; by default, and at most, as many as there are processors."
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file."
+        ),
+    ] = None,
+    retry: Annotated[
+        bool, typer.Option("--retry", help="Plan stored failures again.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Plan a task many times, with its keys varied."""
+    with interrupts.postponed():
+        from brachis.apps import sweeps
+        from brachis.apps.plots import save_figure
+        from brachis.apps.sweeps.pools import VERIFIED
+    with ended_cleanly(), _progress() as listener:
+        result = sweeps.sweep(
+            source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
+        )
+    files = [str(path) for path in result.files]
+    failures = []
+    figure = result.folder / "sweep.png"
+    with writing_errors(figure):
+        figure.unlink(missing_ok=True)
+    verified = result.count(VERIFIED) > 0
+    if result.varied and verified:
+        try:
+            save_figure(result.plot(), figure)
+            files.append(str(figure))
+        except InputError as error:
+            failures.append(error)
+    if json:
+        print_json({**result.summary(), "keys": list(result.keys), "files": files})
+    else:
+        _print_sweep(result, files)
+    raise typer.Exit(exit_code(verified, failures))
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """Show how far the sweep is: in place on a terminal, else in 20 lines on standard error, for the logs of jobs."""
+    with progress() as status:
+        if sys.stderr.isatty() or chosen() is not Verbosity.NORMAL:
+            yield status
+            return
+        last_step = -1
+
+        def listener(text: str) -> None:
+            nonlocal last_step
+            status(text)
+            done = re.match(r"(\d+) of (\d+)", text)
+            step = int(done[1]) * 20 // max(1, int(done[2])) if done else -1
+            if step != last_step:
+                print_error(text)
+            last_step = step
+
+        yield listener
+
+
+def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
+    """Print the sweep for a person."""
+    from brachis.apps.sweeps.pools import FAILED, UNVERIFIED, VERIFIED
+    from brachis.apps.sweeps.run import in_words
+
+    console = result_console()
+    found = result.summary()
+    counts = ", ".join(
+        f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
+    )
+    title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
+    shown = [name for name in ("best", "median", "worst") if name in found]
+    if shown:
+        rows = []
+        for key in ("t_end_s", "plan", *result.keys):
+            heading = "t_end [s]" if key == "t_end_s" else key
+            rows.append((heading, *(_write_value(found[name][key]) for name in shown)))
+        columns = [Column(""), *(Column(name, number=True) for name in shown)]
+        print_table(console, title, columns, rows)
+    else:
+        console.print(title)
+    for error, cause in found["failures"].items():
+        console.print(
+            f"{cause['plans']} failed with {error}, for example: {cause['message']}"
+        )
+    console.print(
+        f"planning took {in_words(found['wall_time_s'])} in all processes together"
+    )
+    for name in files:
+        console.print(f"wrote {name}")
+
+
+def _write_value(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "" if value is None else str(value)
