@@ -495,7 +495,7 @@ def _closed_forms(name: str) -> list[ik.Candidate]:
     """Choices of redundant joints of a robot that have a closed form, whatever its limits."""
     robot = Robot.from_urdf(urdf_of(name), tool_frame=TOOLS.get(name))
     found = ik.find_all(robot, task_map_of(robot, SPACES.get(name, "pose")))
-    return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+    return [c for c in found if c.solver is not None]
 
 
 def _redundant(

@@ -53,7 +53,7 @@ def robots() -> dict[str, Robot]:
 def closed_forms(robot: Robot) -> list[ik.Candidate]:
     """Choices of redundant joints that have a closed form for poses."""
     found = ik.find_all(robot, task_map_of(robot, "pose"))
-    return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+    return [c for c in found if c.solver is not None]
 
 
 def room(joint_path: np.ndarray, candidate: ik.Candidate) -> float:

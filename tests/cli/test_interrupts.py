@@ -52,7 +52,7 @@ def brachis(
         ("rich.console", "raised"),
         ("numpy", "swallowed"),
         ("pinocchio", "raised"),
-        ("yourdfpy", "swallowed"),
+        ("lxml", "swallowed"),
         ("unopy", "swallowed"),
     ],
 )
