@@ -322,8 +322,7 @@ def _frames(
     urdf: Path, base: str | None, tool: str | None, remarks: list[str]
 ) -> tuple[str | None, str]:
     """Take the first limb of the URDF where base and tool frame are not given, and say so where there is a choice."""
-    from brachis.robot.urdf import first_limb
-    from brachis.robot.urdf import read_file
+    from brachis.robot.urdf import first_limb, read_file
 
     if tool is not None:
         return base, tool
