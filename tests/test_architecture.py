@@ -64,7 +64,7 @@ HEAVY = {
     "pandas",
     "dask",
 }
-MOST_LINES = 640  # 500 is the aim; seven modules are above it since code is wrapped at 88 columns
+MOST_LINES = 500
 
 
 def module_of(path: Path) -> str:

@@ -2,17 +2,14 @@
 
 1. `plan` reads the task and the robot.
 2. `_plan` builds the problem: path, limits, decompositions into redundant joints.
-3. The search finds joint paths. It says which are solved and finished, and in which order.
-4. `solve_candidate` solves from a joint path at the first collocation points.
-5. `finish_candidate` adapts the mesh, refines and verifies.
-6. `find_least_motion` looks for the calmest motion that is as fast.
+3. `find_fastest` finds joint paths, solves from them, and refines and verifies the most promising ones.
+4. `find_least_motion` looks for the calmest motion that is as fast.
 
 `transcribe` stops before the solve; `plan_many` plans many tasks in several processes.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,7 +17,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Unpack
 
-import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik
@@ -29,16 +25,12 @@ from brachis.common.arguments import check_callable, check_list, count
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, report_progress
 from brachis.errors import BrachisError, InputError, write_count
-from brachis.optimise.backends import SolveStatus, solver_named
+from brachis.optimise.backends import solver_named
 from brachis.optimise.candidate import Attempt, Start
-from brachis.optimise.completion import refine_and_verify
 from brachis.optimise.layout import SHORTEST_TIME
 from brachis.optimise.least_motion import find_least_motion
-from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
-from brachis.optimise.refine import RefinementOptions
-from brachis.optimise.session import SolverSession
-from brachis.optimise.transcription import breaks_of, phase_in, program_of
+from brachis.optimise.transcription import breaks_of, program_of
 from brachis.problem.plausibility import (
     check_within_reach,
     of_end_time,
@@ -56,18 +48,10 @@ from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, located
 from brachis.search import (
     GIVEN,
-    MARGINS,
-    Stages,
-    best_of_joints,
     find_fastest,
-    first_breaks,
     first_map,
-    first_point,
     given_start,
     is_planned,
-    solve_by_margin_continuation,
-    solve_without_third_order_limits,
-    solved_in_chart,
     try_remedies,
 )
 from brachis.search.processes import each, processes
@@ -76,8 +60,6 @@ from brachis.trajectory import Motion, Trajectory, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
-_MANY_VARIABLES = 150
-"""Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
 _OWN_KEYWORDS = (
     "start_from",
     "families",
@@ -86,8 +68,6 @@ _OWN_KEYWORDS = (
     "progress",
     "check_advice",
 )
-_KNOT_TIME = 0.4
-"""Part of the remaining time that may go into the knots."""
 
 
 def plan(
@@ -267,7 +247,6 @@ def _plan(
     found = find_fastest(
         problem,
         decompositions,
-        Stages(solve_candidate, finish_candidate),
         deadline,
         listener,
         warm,
@@ -325,117 +304,6 @@ def _first(
     return start if isinstance(start, str) else start.with_solver(solver.name)
 
 
-def solve_candidate(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
-    """Solve from a start, at the first collocation points.
-
-    Parameters
-    ----------
-    start : Start
-    deadline : Deadline
-    listener : callable
-
-    Returns
-    -------
-    Attempt
-    """
-    problem = start.problem
-    target = program_of(problem, start.joint_map, first_breaks(start))
-    program = coarsest(target) if target.variables > _MANY_VARIABLES else target
-    x = first_point(program, start)
-    if x is None:
-        return Attempt.of(
-            start, "the splines through the joint path leave the branch, or the chart"
-        )
-    session = _session(start, deadline, listener)
-    try:
-        x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
-        if start.in_chart and not start.timed:
-            program, reports = solved_in_chart(problem, program, x, session)
-            joint_map = program.phases[0].joint_map
-            target = target.with_phases(
-                phase_in(problem, joint_map, phase.grid) for phase in target.phases
-            )
-        else:
-            program, reports = solve_by_margin_continuation(
-                program, x, session, MARGINS
-            )
-    except ImportError as error:
-        return Attempt.of(start, f"{start.solver}: not installed ({error})")
-    last = reports[-1]
-    reports = (*before, *reports)
-    coarse = last.objective if last.status.usable else np.inf
-    return Attempt.of(
-        start,
-        _in_words(last.status),
-        program=program,
-        target=target,
-        reports=reports,
-        coarse=coarse,
-    )
-
-
-def finish_candidate(
-    attempt: Attempt, deadline: Deadline, listener: Listener
-) -> Attempt:
-    """Adapt the mesh, refine and verify; only verify where the time is up.
-
-    Parameters
-    ----------
-    attempt : Attempt
-        A usable one.
-    deadline : Deadline
-    listener : callable
-
-    Returns
-    -------
-    Attempt
-    """
-    start = attempt.start
-    program = attempt.program
-    assert start is not None and program is not None
-    task = start.problem.task
-    settings = task.refinement
-    soon = deadline.part(_KNOT_TIME)
-    options = RefinementOptions(
-        settings.tolerance, settings.density, settings.max_rounds, soon
-    )
-    session = _session(start, soon, listener)
-    reports = attempt.reports
-    target = attempt.target
-    if (
-        attempt.keeps_knots
-        and start.in_chart
-        and not start.timed
-        and not deadline.passed
-    ):
-        program, further = best_of_joints(start.problem, program, reports[-1], session)
-        reports = (*reports[:-1], *further)
-        target = program
-    adapted = adapt_mesh(program, reports, session, task.spline, options, target=target)
-    attempt = dataclasses.replace(attempt, undone=adapted.undone)
-    options = dataclasses.replace(options, deadline=deadline)
-    session = dataclasses.replace(session, deadline=deadline)
-    return refine_and_verify(
-        attempt, adapted.program, adapted.reports, session, options
-    )
-
-
-def _session(start: Start, deadline: Deadline, listener: Listener) -> SolverSession:
-    """Open a session of the start's solver under the task's bounds."""
-    (backend,) = solver_named(start.solver)
-    settings = start.problem.task.solver
-    return SolverSession.for_task(
-        backend, settings, start.joint_map, deadline, listener
-    )
-
-
-def _in_words(status: SolveStatus) -> str:
-    name = status.name.lower().replace("_", " ")
-    if not status.usable:
-        return name
-    return "planned" if status is SolveStatus.OPTIMAL else f"planned, {name}"
-
-
 def _not_used(first: Start | str | None, best: Attempt) -> tuple[str, ...]:
     """Say where the plan was to start from a known motion and does not."""
     if first is None or best.origin == GIVEN:
@@ -466,7 +334,6 @@ def _is_planned(
     return is_planned(
         problem,
         decompositions_of(problem, families),
-        Stages(solve_candidate, finish_candidate),
         deadline,
         most,
     )

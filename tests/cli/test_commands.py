@@ -22,6 +22,7 @@ from brachis.apps import plots
 from brachis.apps.cli import planning
 from brachis.errors import InputError
 from brachis.optimise import completion
+from brachis.search import candidates
 from brachis.trajectory import Trajectory
 
 from .conftest import SCARA
@@ -248,7 +249,7 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(planner, "solve_candidate", interrupt)
+    monkeypatch.setattr(candidates, "solve_candidate", interrupt)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
     assert outcome.code == 130
     assert "interrupted" in outcome.err
@@ -256,14 +257,14 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
 
 
 def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monkeypatch):
-    honest, now = planner.solve_candidate, [0.0]
+    honest, now = candidates.solve_candidate, [0.0]
 
     def slow(*arguments):
         made = honest(*arguments)
         now[0] += 90.0
         return made
 
-    monkeypatch.setattr(planner, "solve_candidate", slow)
+    monkeypatch.setattr(candidates, "solve_candidate", slow)
     monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
     task |= {
         "spline": {"intervals": 10, "points_per_interval": 1},

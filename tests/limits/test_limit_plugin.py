@@ -64,7 +64,7 @@ def sums(trajectory):
 
 
 def test_it_is_one_short_file():
-    assert len(MODULE.read_text().splitlines()) <= 70
+    assert len(MODULE.read_text().splitlines()) <= 60
 
 
 def test_an_object_limits_the_motion(plugin):

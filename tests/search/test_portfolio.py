@@ -15,14 +15,13 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis import planner
 from brachis.apps.plots import plot_candidates
 from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import chart_starts, record, schedule, starts
+from brachis.search import candidates, chart_starts, record, schedule, starts
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import reason_out_of_reach
 from brachis.search.joint_path import DeadEnd
@@ -268,7 +267,11 @@ def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
 
 
 def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
-    honest, finished, calls = planner.solve_candidate, planner.finish_candidate, []
+    honest, finished, calls = (
+        candidates.solve_candidate,
+        candidates.finish_candidate,
+        [],
+    )
 
     def interrupted(*arguments: Any) -> Any:
         if "verified" in calls:
@@ -281,8 +284,8 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
         calls.extend(["verified"] * done.verified)
         return done
 
-    monkeypatch.setattr(planner, "solve_candidate", interrupted)
-    monkeypatch.setattr(planner, "finish_candidate", noted)
+    monkeypatch.setattr(candidates, "solve_candidate", interrupted)
+    monkeypatch.setattr(candidates, "finish_candidate", noted)
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.interrupted
     assert result.verified
@@ -313,7 +316,7 @@ def test_a_real_ctrl_c_ends_worker_processes(robot):
 def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
     robot, monkeypatch
 ):
-    honest, calls = planner.finish_candidate, []
+    honest, calls = candidates.finish_candidate, []
 
     def interrupted(*arguments: Any) -> Any:
         calls.append(1)
@@ -321,7 +324,7 @@ def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
             raise KeyboardInterrupt
         return honest(*arguments)
 
-    monkeypatch.setattr(planner, "finish_candidate", interrupted)
+    monkeypatch.setattr(candidates, "finish_candidate", interrupted)
     with pytest.raises(
         KeyboardInterrupt,
         match=r"takes \d\.\d{4} s, and exceeds a limit by \d.* % \(unverified\)",
@@ -357,7 +360,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
-    calls = clock.jump(planner, "finish_candidate", at=1)
+    calls = clock.jump(candidates, "finish_candidate", at=1)
     result = brachis.plan(robot, task(search={"effort": "exhaustive"}))
     assert len(calls) == 1
     assert result.verified
@@ -377,7 +380,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     robot, clock, monkeypatch, asked, solved, left
 ):
     monkeypatch.setattr(schedule, "_SIZE", 4)
-    clock.jump(planner, "solve_candidate", at=solved)
+    clock.jump(candidates, "solve_candidate", at=solved)
     result = brachis.plan(robot, task(spline=FEW_POINTS, **asked))
     assert result.interrupted
     assert not result.verified
@@ -412,7 +415,7 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joi
 
 
 def test_no_solve_begins_without_time_and_the_time_limit_is_to_blame(robot, clock):
-    calls = clock.jump(planner, "first_point", at=1)
+    calls = clock.jump(candidates, "first_point", at=1)
     joints = {
         "task_space": "joints",
         "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}],
@@ -475,15 +478,15 @@ def test_a_lattice_ends_between_its_layers(robot, clock):
 
 
 def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
-    honest = planner.finish_candidate
+    honest = candidates.finish_candidate
     monkeypatch.setattr(
-        planner,
+        candidates,
         "finish_candidate",
         lambda *given: dataclasses.replace(
             honest(*given), trajectory=None, verification=None
         ),
     )
-    calls = clock.jump(planner, "finish_candidate", at=1, by=0.6)
+    calls = clock.jump(candidates, "finish_candidate", at=1, by=0.6)
     with pytest.raises(PlanningError, match="within the time limit"):
         brachis.plan(robot, task(search={"time_limit": 1.5}))
     assert sum(calls) <= math.ceil((1.5 + 1.0) / 0.6) + 3, (

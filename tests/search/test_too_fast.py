@@ -110,7 +110,7 @@ def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
     def solved(*_):
         raise TriedError
 
-    monkeypatch.setattr("brachis.planner.solve_candidate", solved)
+    monkeypatch.setattr("brachis.search.candidates.solve_candidate", solved)
     limits = {"acceleration": None, "torque": 25.0}
     with pytest.raises(TriedError):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits, friction={"coulomb": 10.0}))

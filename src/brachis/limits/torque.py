@@ -54,7 +54,7 @@ from brachis.limits.protocol import (
     PhaseLines,
 )
 from brachis.robot import Robot, dynamics
-from brachis.robot.limits import Curve
+from brachis.robot.torque_curves import Curve
 from brachis.task import Task
 
 

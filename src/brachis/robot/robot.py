@@ -1,13 +1,10 @@
-"""The robot: a Pinocchio model of the chain from base to tool, its limits and friction.
-
-What a robot was made with, as the ``robot`` part of a task.
-"""
+"""The robot: a Pinocchio model of the chain from base to tool, its limits and friction."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self, Unpack
 
@@ -30,11 +27,11 @@ from brachis.robot.limits import (
     without_joints,
 )
 from brachis.robot.model import build_model
+from brachis.robot.settings import kept_settings
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import StatedChain
 from brachis.robot.urdf_elements import read_tree
 from brachis.task import (
-    FROM_URDF,
     LimitKeywords,
     LimitSpec,
     Payload,
@@ -42,59 +39,6 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
-
-
-def kept_settings(
-    added: RobotSettings,
-    path: str | os.PathLike[str],
-    names: Sequence[str],
-    tool_frame: str | None,
-    base_frame: str | None,
-    gravity: np.ndarray,
-    locked_joints: Mapping[str, float] | None,
-    limits: LimitSpec,
-    friction: Mapping[str, object] | None,
-) -> RobotSettings:
-    """Keep the arguments of `Robot.from_urdf` as the ``robot`` part of a task; `added` has those that it checked."""
-    by_name: dict[str, Any] = {
-        each.name: _by_name(getattr(limits, each.name), names, each.default)
-        for each in fields(limits)
-    }
-    content = {
-        "urdf": str(Path(path).absolute()),
-        "tool_frame": tool_frame,
-        "base_frame": base_frame,
-        "gravity": gravity,
-        "locked_joints": dict(locked_joints or {}),
-        "limits": replace(limits, **by_name),
-        "friction": dict(friction or {}),
-        **{
-            name: getattr(added, name)
-            for name in ("payload", "tool_offset", "mounting", "speed_override")
-        },
-    }
-    made, default = check_robot_settings(content), RobotSettings()
-    # What is as by default counts as left out where the settings meet those of another robot or task.
-    stated = {
-        key: value
-        for key, value in content.items()
-        if getattr(made, key) != getattr(default, key)
-    }
-    return check_robot_settings(stated)
-
-
-def _by_name(value: object, names: Sequence[str], absent: object) -> object:
-    """Return a limit that is given joint by joint as a mapping, without the joints that take the URDF's."""
-    if not isinstance(value, tuple | dict):
-        return value
-    listed = per_joint_values("limits", value, names, FROM_URDF)
-    kept = {
-        name: entry
-        for name, entry in zip(names, listed, strict=True)
-        if not isinstance(entry, str)
-    }
-    return kept or absent
-
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 ROLL_JOINT = "tool_roll"

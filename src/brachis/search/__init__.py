@@ -3,7 +3,7 @@
 from brachis.search.chart_starts import first_map
 from brachis.search.given_motion import GIVEN, given_start
 from brachis.search.phase_plane import first_breaks, first_point
-from brachis.search.portfolio import Stages, find_fastest, is_planned
+from brachis.search.portfolio import find_fastest, is_planned
 from brachis.search.record import Record
 from brachis.search.remedies import try_remedies
 from brachis.search.solving import (
@@ -18,7 +18,6 @@ __all__ = [
     "GIVEN",
     "MARGINS",
     "Record",
-    "Stages",
     "best_of_joints",
     "find_fastest",
     "first_breaks",

@@ -15,13 +15,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
-from typing import NamedTuple
 
 from brachis.common import interrupts
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.candidate import Attempt, Start
 from brachis.problem.problem import Decomposition, Problem
+from brachis.search import candidates
 from brachis.search.failure import no_motion, out_of_time, refuse_what_is_out_of_reach
 from brachis.search.holding import explain_holding
 from brachis.search.processes import each, processes
@@ -41,25 +41,9 @@ _LAST_CHANCES = 3
 """Attempts of which one becomes the unverified motion where none could be finished."""
 
 
-class Stages(NamedTuple):
-    """What is done with a start; functions of a module, so that they can be sent to other processes.
-
-    Attributes
-    ----------
-    solve : callable
-        ``solve(start, deadline, listener)`` returns an `Attempt`, solved at the first collocation points.
-    finish : callable
-        ``finish(attempt, deadline, listener)`` returns it refined and verified; merely verified where the time is up.
-    """
-
-    solve: Callable[[Start, Deadline, Listener], Attempt]
-    finish: Callable[[Attempt, Deadline, Listener], Attempt]
-
-
 def find_fastest(
     problem: Problem,
     decompositions: Sequence[Decomposition],
-    stages: Stages,
     deadline: Deadline,
     listener: Listener,
     first: Start | None = None,
@@ -71,7 +55,6 @@ def find_fastest(
     problem : Problem
     decompositions : sequence of Decomposition
         The most promising first.
-    stages : Stages
     deadline : Deadline
         When to return the best motion so far; one that is not verified where none is.
     listener : callable
@@ -92,7 +75,7 @@ def find_fastest(
     KeyboardInterrupt
         Ctrl-C before any motion was verified; its text tells of the best one, if there is one.
     """
-    search = _Search(problem, decompositions, stages, deadline, listener)
+    search = _Search(problem, decompositions, deadline, listener)
     record = search.record
     try:
         if first is not None:
@@ -129,7 +112,6 @@ def find_fastest(
 def is_planned(
     problem: Problem,
     decompositions: Sequence[Decomposition],
-    stages: Stages,
     deadline: Deadline,
     most: int | None = None,
 ) -> bool | None:
@@ -137,7 +119,7 @@ def is_planned(
 
     Parameters
     ----------
-    problem, decompositions, stages, deadline
+    problem, decompositions, deadline
         See `find_fastest`.
     most : int, optional
         How many batches are tried; all of them where it is left out.
@@ -151,7 +133,7 @@ def is_planned(
     def listener(_text: str) -> None:
         """Hear nothing."""
 
-    search = _Search(problem, decompositions, stages, deadline, listener)
+    search = _Search(problem, decompositions, deadline, listener)
     schedule = batches(
         problem, decompositions, deadline, listener, search.record.note_lattice
     )
@@ -169,12 +151,10 @@ class _Search:
         self,
         problem: Problem,
         decompositions: Sequence[Decomposition],
-        stages: Stages,
         deadline: Deadline,
         listener: Listener,
     ) -> None:
         self._decompositions = decompositions
-        self._stages = stages
         self._deadline = deadline
         self._listener = listener
         self._task = problem.task
@@ -217,7 +197,7 @@ class _Search:
         record = self.record
         record.too_fast = out_of_reach(
             record.attempts,
-            lambda start: self._stages.solve(start, limit, self._listener),
+            lambda start: candidates.solve_candidate(start, limit, self._listener),
         )
         if record.too_fast is not None and unlikely(record.too_fast):
             raise record.too_fast.error
@@ -234,7 +214,7 @@ class _Search:
         work = (
             _solved_in_time,
             batch.starts,
-            self._stages.solve,
+            candidates.solve_candidate,
             limit,
             max(_LEAST_SHARE, share),
         )
@@ -252,7 +232,11 @@ class _Search:
             batch = ranked[first : first + jobs]
             if not self._goes_on(ranked[first:], left):
                 return
-            work = self._stages.finish, [attempt for _, attempt in batch], self._latest
+            work = (
+                candidates.finish_candidate,
+                [attempt for _, attempt in batch],
+                self._latest,
+            )
             with closing(each(*work, jobs=jobs, listener=self._listener)) as outcomes:
                 for place, attempt in enumerate(outcomes):
                     if place and not self._goes_on(ranked[first + place :], left):
@@ -282,7 +266,7 @@ class _Search:
             if self.record.best is not None:
                 return
             self.record.finish(
-                number, self._stages.finish(attempt, over, lambda _text: None)
+                number, candidates.finish_candidate(attempt, over, lambda _text: None)
             )
 
 

@@ -20,7 +20,7 @@ from brachis.task.load import (
     set_key,
     with_keys,
 )
-from brachis.task.models import BoundarySettings, Posture, Task
+from brachis.task.models import Posture, Task
 from brachis.task.orientation import (
     AlongTangent,
     Attitude,
@@ -32,6 +32,7 @@ from brachis.task.orientation import (
     TurnTo,
 )
 from brachis.task.planning_models import (
+    BoundarySettings,
     RefinementSettings,
     SearchSettings,
     SolverSettings,

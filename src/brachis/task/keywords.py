@@ -11,9 +11,10 @@ from brachis.task.fields import Model, plain
 from brachis.task.limit_models import Array, LimitKeywords, LimitSpec, ToolLimits
 from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
-from brachis.task.models import BoundarySettings, Task
+from brachis.task.models import Task
 from brachis.task.orientation import ToolPose
 from brachis.task.planning_models import (
+    BoundarySettings,
     RefinementSettings,
     SearchSettings,
     SolverSettings,

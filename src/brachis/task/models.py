@@ -2,8 +2,6 @@
 
 `Task` mirrors the task file key by key. Use `brachis.task.load_task` to make one: it reads files and mappings alike,
 and answers mistakes with a `brachis.errors.TaskError` that names the key.
-
-How a motion begins and ends, as the task file writes it.
 """
 
 from __future__ import annotations
@@ -22,10 +20,8 @@ from pydantic import (
 )
 
 from brachis.task.fields import (
-    Flag,
     Model,
     Name,
-    NonNegative,
     Number,
     by_form,
     or_form,
@@ -35,10 +31,12 @@ from brachis.task.fields import (
 from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import ToolPose
 from brachis.task.planning_models import (
+    BoundarySettings,
     RefinementSettings,
     SearchSettings,
     SolverSettings,
     SplineSettings,
+    expand_solver_name,
 )
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
@@ -50,47 +48,6 @@ from brachis.task.segments import (
     SegmentModel,
     SplineThrough,
 )
-
-
-class BoundarySettings(Model):
-    """Speeds at both ends of the path, or a motion that goes round for ever."""
-
-    start_speed: NonNegative = Field(
-        default=0.0,
-        le=1e6,
-        description="Speed along the path at its start, m/s (rad/s where the position stands still; along a path of "
-        "joints the norm of their velocities). At an end in motion the redundant joints' velocities are free, and "
-        "spline.rest: full says that the speed begins, or ends, constant.",
-    )
-    end_speed: NonNegative = Field(
-        default=0.0, le=1e6, description="As start_speed, at the path's end."
-    )
-    periodic: Flag = Field(
-        default=False,
-        description="Whether a closed path is gone round for ever: posture, velocity and acceleration at its end are "
-        "those at its start (with spline.degree: 2 the acceleration jumps).",
-    )
-
-    @model_validator(mode="after")
-    def _periodic_has_no_ends(self) -> BoundarySettings:
-        if self.periodic and (self.start_speed or self.end_speed):
-            key = ".start_speed" if self.start_speed else ".end_speed"
-            problem = (
-                "a periodic motion has no ends: how fast it passes the seam is planned"
-            )
-            raise refuse(
-                problem,
-                key=key,
-                found=self.start_speed or self.end_speed,
-                allowed="0, or periodic: false",
-            )
-        return self
-
-    @property
-    def in_motion(self) -> bool:
-        """Whether an end is passed in motion."""
-        return self.periodic or self.start_speed > 0.0 or self.end_speed > 0.0
-
 
 Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
@@ -170,11 +127,6 @@ RedundantJoints = Annotated[
     | Annotated[Annotated[tuple[Name, ...], AfterValidator(_each_once)], Tag("<list>")],
     by_form("auto, or a list of joint names", "auto"),
 ]
-
-
-def _with_name(solver: object) -> object:
-    """Read ``solver: ipopt`` as the solver's name."""
-    return {"name": solver} if isinstance(solver, str) else solver
 
 
 def _is_matrix(row: object) -> bool:
@@ -276,7 +228,7 @@ class Task(Model):
     spline: SplineSettings = Field(
         default_factory=SplineSettings, description="B-splines."
     )
-    solver: Annotated[SolverSettings, BeforeValidator(_with_name)] = Field(
+    solver: Annotated[SolverSettings, BeforeValidator(expand_solver_name)] = Field(
         default_factory=SolverSettings,
         description="Solver: its name, or a mapping.",
         json_schema_extra=or_form({"type": "string"}),

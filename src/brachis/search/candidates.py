@@ -1,0 +1,145 @@
+"""What is done with a start: it is solved, and, where it is worth it, refined and verified.
+
+1. `solve_candidate` solves from a joint path at the first collocation points.
+2. `finish_candidate` adapts the mesh, refines and verifies.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener
+from brachis.optimise.backends import SolveStatus, solver_named
+from brachis.optimise.candidate import Attempt, Start
+from brachis.optimise.completion import refine_and_verify
+from brachis.optimise.mesh import adapt_mesh, coarsest
+from brachis.optimise.refine import RefinementOptions
+from brachis.optimise.session import SolverSession
+from brachis.optimise.transcription import phase_in, program_of
+from brachis.search.phase_plane import first_breaks, first_point
+from brachis.search.solving import (
+    MARGINS,
+    best_of_joints,
+    solve_by_margin_continuation,
+    solve_without_third_order_limits,
+    solved_in_chart,
+)
+
+_MANY_VARIABLES = 150
+"""Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
+_KNOT_TIME = 0.4
+"""Part of the remaining time that may go into the knots."""
+
+
+def solve_candidate(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
+    """Solve from a start, at the first collocation points.
+
+    Parameters
+    ----------
+    start : Start
+    deadline : Deadline
+    listener : callable
+
+    Returns
+    -------
+    Attempt
+    """
+    problem = start.problem
+    target = program_of(problem, start.joint_map, first_breaks(start))
+    program = coarsest(target) if target.variables > _MANY_VARIABLES else target
+    x = first_point(program, start)
+    if x is None:
+        return Attempt.of(
+            start, "the splines through the joint path leave the branch, or the chart"
+        )
+    session = _session(start, deadline, listener)
+    try:
+        x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
+        if start.in_chart and not start.timed:
+            program, reports = solved_in_chart(problem, program, x, session)
+            joint_map = program.phases[0].joint_map
+            target = target.with_phases(
+                phase_in(problem, joint_map, phase.grid) for phase in target.phases
+            )
+        else:
+            program, reports = solve_by_margin_continuation(
+                program, x, session, MARGINS
+            )
+    except ImportError as error:
+        return Attempt.of(start, f"{start.solver}: not installed ({error})")
+    last = reports[-1]
+    reports = (*before, *reports)
+    coarse = last.objective if last.status.usable else np.inf
+    return Attempt.of(
+        start,
+        _in_words(last.status),
+        program=program,
+        target=target,
+        reports=reports,
+        coarse=coarse,
+    )
+
+
+def finish_candidate(
+    attempt: Attempt, deadline: Deadline, listener: Listener
+) -> Attempt:
+    """Adapt the mesh, refine and verify; only verify where the time is up.
+
+    Parameters
+    ----------
+    attempt : Attempt
+        A usable one.
+    deadline : Deadline
+    listener : callable
+
+    Returns
+    -------
+    Attempt
+    """
+    start = attempt.start
+    program = attempt.program
+    assert start is not None and program is not None
+    task = start.problem.task
+    settings = task.refinement
+    soon = deadline.part(_KNOT_TIME)
+    options = RefinementOptions(
+        settings.tolerance, settings.density, settings.max_rounds, soon
+    )
+    session = _session(start, soon, listener)
+    reports = attempt.reports
+    target = attempt.target
+    if (
+        attempt.keeps_knots
+        and start.in_chart
+        and not start.timed
+        and not deadline.passed
+    ):
+        program, further = best_of_joints(start.problem, program, reports[-1], session)
+        reports = (*reports[:-1], *further)
+        target = program
+    adapted = adapt_mesh(program, reports, session, task.spline, options, target=target)
+    attempt = dataclasses.replace(attempt, undone=adapted.undone)
+    options = dataclasses.replace(options, deadline=deadline)
+    session = dataclasses.replace(session, deadline=deadline)
+    return refine_and_verify(
+        attempt, adapted.program, adapted.reports, session, options
+    )
+
+
+def _session(start: Start, deadline: Deadline, listener: Listener) -> SolverSession:
+    """Open a session of the start's solver under the task's bounds."""
+    (backend,) = solver_named(start.solver)
+    settings = start.problem.task.solver
+    return SolverSession.for_task(
+        backend, settings, start.joint_map, deadline, listener
+    )
+
+
+def _in_words(status: SolveStatus) -> str:
+    name = status.name.lower().replace("_", " ")
+    if not status.usable:
+        return name
+    return "planned" if status is SolveStatus.OPTIMAL else f"planned, {name}"
