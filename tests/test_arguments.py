@@ -5,7 +5,7 @@ import pytest
 
 import brachis
 from brachis import export
-from brachis.common.arguments import count, named, number, numbers
+from brachis.common.arguments import check_keywords, count, number, numbers
 from brachis.errors import InputError, ResultFileError, UnknownNameError
 
 SCARA = brachis.robots.path_of("scara3")
@@ -174,7 +174,7 @@ def test_numbers():
 
 
 def test_a_function_keeps_its_name_and_arguments():
-    @named
+    @check_keywords
     def greet(name, *, loud=False):
         return f"{name}{'!' * loud}"
 

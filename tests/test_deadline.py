@@ -37,4 +37,4 @@ def test_parts_and_extensions(clock):
     assert deadline.part(0.5).at == 106.0
     assert deadline.within(3.0).at == 105.0
     assert deadline.within(30.0) == deadline
-    assert deadline.extended(1.0).at == 111.0
+    assert deadline.extend(1.0).at == 111.0

@@ -18,7 +18,7 @@ def presses(monkeypatch):
     """The command line's handler, in place for the test."""
     before = signal.getsignal(signal.SIGINT)
     monkeypatch.setattr(sys, "unraisablehook", lambda _unraisable: None)
-    interrupts.listen()
+    interrupts.install()
     yield interrupts.presses()
     signal.signal(signal.SIGINT, before)
 
@@ -30,7 +30,7 @@ def press() -> None:
 def test_a_press_is_only_remembered_until_it_may_be_heard(presses):
     press()
     assert presses.pending
-    with pytest.raises(KeyboardInterrupt), interrupts.heard():
+    with pytest.raises(KeyboardInterrupt), interrupts.interruptible():
         pytest.fail("a press before should be heard first")
     assert not presses.raising
 
@@ -38,7 +38,7 @@ def test_a_press_is_only_remembered_until_it_may_be_heard(presses):
 @pytest.mark.usefixtures("presses")
 def test_a_press_interrupts():
     def command():
-        with interrupts.heard():
+        with interrupts.interruptible():
             press()
             pytest.fail("not interrupted")
 
@@ -67,7 +67,7 @@ def test_a_press_that_is_swallowed_is_heard_in_the_end(presses, lose):
     after = []
 
     def command():
-        with interrupts.heard():
+        with interrupts.interruptible():
             lose()
             after.append(1)
             interrupts.check()
@@ -80,10 +80,10 @@ def test_a_press_that_is_swallowed_is_heard_in_the_end(presses, lose):
 
 
 def test_what_was_heard_is_forgotten(presses):
-    with interrupts.heard():
+    with interrupts.interruptible():
         with pytest.raises(KeyboardInterrupt):
             press()
-        interrupts.forget()
+        interrupts.clear()
     interrupts.check()
     assert not presses.pending
 
@@ -98,7 +98,7 @@ def test_a_press_waits_for_the_end_of_a_block(request, listening):
     done = []
 
     def work():
-        with interrupts.postponed():
+        with interrupts.defer():
             press()
             done.append("the block")
         done.append("what follows")
@@ -111,7 +111,7 @@ def test_a_press_waits_for_the_end_of_a_block(request, listening):
 
 def test_a_block_ends_with_the_press_whatever_it_raises():
     def work():
-        with interrupts.postponed():
+        with interrupts.defer():
             press()
             raise ImportError("could not be imported")
 
@@ -123,7 +123,7 @@ def test_other_threads_postpone_nothing():
     seen = []
 
     def work():
-        with interrupts.postponed():
+        with interrupts.defer():
             seen.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=work)
@@ -135,7 +135,7 @@ def test_other_threads_postpone_nothing():
 def test_processes_begun_in_a_blocked_block_do_not_hear_a_press():
     code = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
     for block in (True, False):
-        with interrupts.blocked() if block else interrupts.postponed():
+        with interrupts.block_in_children() if block else interrupts.defer():
             done = subprocess.run(
                 [sys.executable, "-c", code], capture_output=True, text=True, check=True
             )
@@ -146,7 +146,7 @@ def test_a_press_in_a_blocked_block_comes_at_its_end():
     done = []
 
     def work():
-        with interrupts.blocked():
+        with interrupts.block_in_children():
             press()
             done.append("the block")
         done.append("what follows")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.common.summary import COLUMNS, LINES, shown
+from brachis.common.summary import COLUMNS, LINES, show_value
 
 PUBLIC = {
     "result": lambda result: result,
@@ -83,7 +83,7 @@ def test_notebooks_show_a_figure_beside_a_table_and_figures_as_pictures(result):
     ],
 )
 def test_values_are_shortened(value, text):
-    assert shown(value) == text
+    assert show_value(value) == text
 
 
 def test_a_plot_that_does_not_exist_is_answered_with_those_that_do(result):

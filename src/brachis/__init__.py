@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
-    from brachis.optimise.candidate import Attempt as Attempt
+    from brachis.optimise.candidate import Candidate as Candidate
     from brachis.path import bspline_segment as bspline_segment
     from brachis.planner import plan as plan
     from brachis.planner import plan_many as plan_many

@@ -7,7 +7,7 @@ from brachis.common import interrupts
 
 def main() -> None:
     """Run the command line."""
-    interrupts.listen()
+    interrupts.install()
     from brachis.apps.cli.main import main as run
 
     run()

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from brachis.common.files import shipped
+from brachis.common.files import shipped_folder
 from brachis.errors import no_attribute
 
 
@@ -21,13 +21,13 @@ def names() -> tuple[str, ...]:
     """Return the names of the examples, from the easiest on."""
     return tuple(
         path.stem.split("_", 1)[1]
-        for path in sorted(shipped("examples").glob("[0-9]*_*.yaml"))
+        for path in sorted(shipped_folder("examples").glob("[0-9]*_*.yaml"))
     )
 
 
 def __getattr__(name: str) -> Path:
     """Find an example's task file."""
-    found = list(shipped("examples").glob(f"[0-9][0-9]_{name}.yaml"))
+    found = list(shipped_folder("examples").glob(f"[0-9][0-9]_{name}.yaml"))
     if not found:
         raise no_attribute(__name__, "examples", name, names())
     return found[0]

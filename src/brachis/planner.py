@@ -26,7 +26,7 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, report_progress
 from brachis.errors import BrachisError, InputError, write_count
 from brachis.optimise.backends import solver_named
-from brachis.optimise.candidate import Attempt, Start
+from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.optimise.layout import SHORTEST_TIME
 from brachis.optimise.least_motion import find_least_motion
 from brachis.optimise.program import Program
@@ -45,7 +45,7 @@ from brachis.robot.custom_limits import LimitModel
 from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.robot.plausibility import tell
 from brachis.robot.urdf import read_file
-from brachis.robots import is_robot, located
+from brachis.robots import is_robot, locate
 from brachis.search import (
     GIVEN,
     find_fastest,
@@ -99,7 +99,7 @@ def plan(
     start_from : Result, Trajectory or path, optional
         A motion, or its file, of this task or one like it (other limits, another path), to start from in place of the
         search. The optimum next to it is found, in a fraction of the time. Where the motion cannot be used, or leads to
-        no verified plan, the search goes on as usual, and ``result.undone`` says so.
+        no verified plan, the search goes on as usual, and ``result.not_completed`` says so.
     families : sequence of Family, optional
         Closed forms to try before the built-in ones.
     own_limits : sequence of LimitModel, optional
@@ -181,7 +181,7 @@ def plan(
             try:
                 try_remedies(error, asked, robot.joint_names, is_task_planned, until)
             except KeyboardInterrupt:
-                interrupts.forget()
+                interrupts.clear()
             raise
 
 
@@ -208,7 +208,7 @@ def _read(
     # Everything else than a robot is a task.
     alone = task is None and first is not None and not is_robot(first)
     given, source = (None, first) if alone else (first, task)
-    named = located(given)  # type: ignore[arg-type]
+    named = locate(given)  # type: ignore[arg-type]
     if isinstance(named, str | os.PathLike):
         read_file(Path(named))  # a missing file is the first thing to say
     asked = task_with(source, **keywords)  # type: ignore[arg-type]
@@ -243,7 +243,7 @@ def _plan(
     decompositions = decompositions_of(problem, families)
     check_within_reach(problem.task_map, problem.path)
     first = None if known is None else _first(problem, decompositions, known)
-    warm = first if isinstance(first, Start) else None
+    warm = first if isinstance(first, InitialGuess) else None
     found = find_fastest(
         problem,
         decompositions,
@@ -281,7 +281,7 @@ def _plan(
         },
         candidates=found.in_order(),
         interrupted=found.interrupted,
-        undone=(*_not_used(first, best), *found.undone()),
+        not_completed=(*_not_used(first, best), *found.not_completed()),
         warnings=remarks,
     )
 
@@ -296,7 +296,7 @@ def _space(task: Task) -> str:
 
 def _first(
     problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory
-) -> Start | str:
+) -> InitialGuess | str:
     """Make a start of a known motion, for the solver that is tried first; or say why there is none."""
     curved = any(limit.guarantee.is_mean for limit in problem.limits)
     solver = solver_named(problem.task.solver.name, curved=curved)[0]
@@ -304,7 +304,7 @@ def _first(
     return start if isinstance(start, str) else start.with_solver(solver.name)
 
 
-def _not_used(first: Start | str | None, best: Attempt) -> tuple[str, ...]:
+def _not_used(first: InitialGuess | str | None, best: Candidate) -> tuple[str, ...]:
     """Say where the plan was to start from a known motion and does not."""
     if first is None or best.origin == GIVEN:
         return ()

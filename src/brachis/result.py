@@ -42,7 +42,7 @@ class Result(PlannedMotion):
         All that the search looked at, the fastest verified one first; without their programs.
     interrupted : bool
         True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
-    undone : tuple of str
+    not_completed : tuple of str
         What was left undone, in plain words.
     warnings : tuple of Remark
         What of robot, task and motion is hardly meant.

@@ -16,7 +16,7 @@ import os
 from functools import cache
 from pathlib import Path
 
-from brachis.common.files import is_file, shipped
+from brachis.common.files import is_file, shipped_folder
 from brachis.errors import UnknownNameError, no_attribute
 from brachis.robot import Robot
 
@@ -27,7 +27,9 @@ _MISSPELT = 0.75
 def names() -> tuple[str, ...]:
     """Return the names of the robots, in alphabetical order."""
     return tuple(
-        sorted(path.parent.name for path in shipped("robots").glob("*/robot.urdf"))
+        sorted(
+            path.parent.name for path in shipped_folder("robots").glob("*/robot.urdf")
+        )
     )
 
 
@@ -41,7 +43,7 @@ def path_of(name: str) -> Path:
     """
     if name not in names():
         raise UnknownNameError("robot", name, names(), where="brachis.robots")
-    return shipped("robots") / name / "robot.urdf"
+    return shipped_folder("robots") / name / "robot.urdf"
 
 
 def is_robot(given: object) -> bool:
@@ -53,7 +55,7 @@ def is_robot(given: object) -> bool:
     )
 
 
-def located(
+def locate(
     robot: str | os.PathLike[str] | Robot | None,
 ) -> str | os.PathLike[str] | Robot | None:
     """Return the URDF file where a robot is given by its name, and everything else as it is.

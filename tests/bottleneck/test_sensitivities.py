@@ -108,7 +108,7 @@ def test_ends_of_a_range(slide):
     assert ends["lower"].label.unit == "m"
     for entry in ends.values():
         wider, column = (
-            entry.limit.relaxed(entry.bound, 0.5 * entry.bound.whole),
+            entry.limit.relax(entry.bound, 0.5 * entry.bound.whole),
             entry.bound.column,
         )
         ends_now = (

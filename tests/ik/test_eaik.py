@@ -19,7 +19,7 @@ from brachis.ik import (
     margin_gradient,
 )
 from brachis.ik.eaik import eaik, exact_axes
-from brachis.ik.idealised import Polished
+from brachis.ik.idealised import PolishedSolver
 from brachis.robot import task_map_of
 from support.closed_forms import wrapped
 from support.pose_arms import (
@@ -374,7 +374,7 @@ def test_angles_that_the_urdf_rounds_too_far_are_named_as_the_cause():
     with pytest.raises(NotApplicableError, match="EAIK knows no decomposition"):
         eaik.build(ChainGeometry.of(robot), rows(robot), (2,))
     # The registry then looks at the ideal arm; of one that is farther off it says what is the matter.
-    assert isinstance(find(robot, rows(robot), ["j3"]).solver, Polished)
+    assert isinstance(find(robot, rows(robot), ["j3"]).solver, PolishedSolver)
     robot = iiwa_by_angles(1.57)
     with pytest.raises(DecompositionError) as caught:
         find(robot, rows(robot), ["j7"])

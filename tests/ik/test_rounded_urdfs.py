@@ -17,7 +17,7 @@ import brachis
 from brachis.apps.cli.inspection import inspect
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, Family, check_answers, find, find_all
-from brachis.ik.idealised import Polished, idealised
+from brachis.ik.idealised import PolishedSolver, snap_axes
 from brachis.ik.polish import Poses, polished
 from brachis.robot import Robot, bind, task_map_of
 from support.arms import Arm, PoseBench, Y, tx90l
@@ -63,10 +63,10 @@ def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
     assert sum(c.solver is not None for c in exact) == counts.get(name, 4)
     for candidate in exact:
         assert candidate.remark == ""
-        assert not isinstance(candidate.solver, Polished)
+        assert not isinstance(candidate.solver, PolishedSolver)
     for candidate, ideal in zip(rounded, exact, strict=True):
         if candidate.solver is not None:
-            assert isinstance(candidate.solver, Polished)
+            assert isinstance(candidate.solver, PolishedSolver)
             assert candidate.solver.branches == ideal.solver.branches
             assert re.fullmatch(
                 r"axes within \de-0[56] rad and \de-0[67] m of an ideal arm's: answers are polished",
@@ -197,11 +197,11 @@ def test_what_cannot_be_reached_is_nan():
 def test_ideal_arm(name):
     robot = by_angles(ARMS[name], ROUNDED)
     space, geometry = task_map_of(robot, "pose"), ChainGeometry.of(robot)
-    ideal = idealised(geometry, space)
+    ideal = snap_axes(geometry, space)
     assert 7e-6 < ideal.turned < 8e-6
     assert 1e-8 < ideal.shifted < 1e-5
-    assert idealised(ideal.geometry, space) is None, "nothing is left to do"
-    assert idealised(ChainGeometry.of(by_angles(ARMS[name], EXACT)), space) is None
+    assert snap_axes(ideal.geometry, space) is None, "nothing is left to do"
+    assert snap_axes(ChainGeometry.of(by_angles(ARMS[name], EXACT)), space) is None
     q = np.random.default_rng(2).uniform(-np.pi, np.pi, (200, robot.n))
     given, made = geometry.posed(q), ideal.geometry.posed(q)
     assert np.abs(given.tool_position - made.tool_position).max() < 2e-4
@@ -219,7 +219,7 @@ def test_small_offsets_of_a_measured_arm_count_as_rounding():
     robot = by_angles(type(arm)(arm.letters, arm.axes, tuple(steps)), ROUNDED)
     match = find(robot, task_map_of(robot, "pose"), ["j3"])
     assert match.family == "spherical_wrist"
-    assert isinstance(match.solver, Polished)
+    assert isinstance(match.solver, PolishedSolver)
 
 
 @pytest.mark.parametrize(
@@ -322,7 +322,7 @@ def test_positions():
         assert candidate.family == expected.family
         assert expected.remark == ""
         assert ("polished" in candidate.remark) == isinstance(
-            candidate.solver, Polished
+            candidate.solver, PolishedSolver
         )
         if candidate.solver is not None:
             check_answers(

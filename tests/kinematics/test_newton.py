@@ -44,7 +44,7 @@ def arm(request):
 
 def test_placed_is_what_pinocchio_says(arm):
     task_map, q = arm
-    values, found = Newton(task_map).placed(q)
+    values, found = Newton(task_map).task_coordinates(q)
     np.testing.assert_allclose(
         values, task_map.of_placements(*task_map.robot.tool_placements(q)), atol=1e-13
     )

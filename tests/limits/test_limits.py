@@ -103,7 +103,7 @@ def test_every_value_has_a_label_and_a_figure(limit):
 
 def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
     for bound in limit.bounds:
-        other = limit.relaxed(bound, 0.1 * bound.whole)
+        other = limit.relax(bound, 0.1 * bound.whole)
         np.testing.assert_allclose(
             other.values(STATES), limit.values(STATES), rtol=1e-12, atol=1e-12
         )

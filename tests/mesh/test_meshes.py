@@ -253,7 +253,7 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
     )
     assert settled.reports[-1] is report
     assert (
-        settled.undone
+        settled.not_completed
         == "the motion has 13 of 100 intervals, of which more were not solved"
     )
 
@@ -268,7 +268,7 @@ def test_no_level_is_begun_after_the_deadline(solved):
     coarse = coarsest(target)
     first = solve(coarse, next(starting_points(coarse)))
     over = RefinementOptions(deadline=Deadline(0.0))
-    assert solve_nested(target, coarse, first, never, over.deadline).undone
+    assert solve_nested(target, coarse, first, never, over.deadline).not_completed
     for spline in (
         SplineSettings(knots="free", intervals=10),
         SplineSettings(intervals="auto"),

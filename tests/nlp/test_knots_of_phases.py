@@ -65,7 +65,7 @@ def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
 def test_a_feasible_motion_stays_feasible_at_old_points():
     phase = phase_of("r1", intervals=6)
     x = reachable_points(phase, 1, spread=0.0)[0]
-    fine = finer(phase).resampled(phase.t_norm)
+    fine = finer(phase).with_grid(phase.t_norm)
     there = fine.variables_from(phase.motion(x).over(fine.knots))
     # A mean over time is one of the values at the points, weighted by the intervals that they are in.
     rows = np.concatenate(

@@ -54,19 +54,19 @@ def test_phases_add_up():
         atol=1e-6 * np.abs(both.gradient(x)).max(),
     )
     np.testing.assert_array_equal(both.x_upper[[0, phase.variables]], [3.0, 4.0])
-    finer = both.resampled([np.linspace(0.0, 1.0, 31)] * 2)
+    finer = both.with_grid([np.linspace(0.0, 1.0, 31)] * 2)
     assert finer.minimised is objective
     np.testing.assert_array_equal(finer.x_upper, both.x_upper)
 
 
 def test_value_is_the_mean_square_over_time():
-    phase = phase_of("r1").resampled(
+    phase = phase_of("r1").with_grid(
         np.union1d(np.linspace(0.0, 1.0, 4001), [0.123, 0.1231, 0.7])
     )
     weights = weights_of("r1")
     (x,) = reachable_points(phase, 1)
     t_norm = np.linspace(0.0, 1.0, 4001)
-    qddot = phase.resampled(t_norm).state(x).qddot
+    qddot = phase.with_grid(t_norm).state(x).qddot
     expected = np.mean(
         0.5 * ((qddot[1:] * weights) ** 2 + (qddot[:-1] * weights) ** 2).sum(axis=1)
     )

@@ -126,7 +126,7 @@ def test_refinement_holds_the_limits_in_every_phase():
     report = solve(program, first_point(program))
 
     def worst(x):
-        dense = program.resampled([np.linspace(0.0, 1.0, 2001)] * 2)
+        dense = program.with_grid([np.linspace(0.0, 1.0, 2001)] * 2)
         return [phase.violation(part).max() for phase, part in dense.split(x)]
 
     assert min(worst(report.x)) > 1e-3
@@ -183,7 +183,7 @@ def test_a_limit_of_several_phases_is_one_figure():
     )
     (entry,) = found.limits
     assert entry.change(1.0) == pytest.approx(-0.5 * report.objective, rel=1e-3)
-    relaxed = program.relaxed(TORQUE, entry.bound, 0.21 * FORCE)
+    relaxed = program.relax(TORQUE, entry.bound, 0.21 * FORCE)
     assert len(relaxed.limits) == 1
     assert solve(relaxed, report.x).objective == pytest.approx(
         report.objective / 1.1, rel=1e-4
@@ -255,6 +255,6 @@ def test_one_phase_is_the_program():
     np.testing.assert_allclose(
         program.jacobian(x), phase.jacobian(x), rtol=1e-9, atol=1e-9
     )
-    slower = program.time_scaled(x, 2.0)
+    slower = program.with_time_scaled(x, 2.0)
     assert slower[0] == 2.0 * x[0]
     np.testing.assert_array_equal(slower[1:], x[1:])

@@ -8,14 +8,14 @@ import pytest
 
 from brachis.apps.plots import plot_candidates
 from brachis.errors import InputError
-from brachis.optimise.candidate import Attempt
+from brachis.optimise.candidate import Candidate
 from brachis.search.record import SAME_MOTION
 
 
 def attempt(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):
     """An attempt with times of its own."""
 
-    class Made(Attempt):
+    class Made(Candidate):
         pass
 
     Made.t_end, Made.verified = property(lambda _: t_end), property(lambda _: verified)

@@ -206,7 +206,7 @@ def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(
         "robot.limits.velocity", "looks like degrees", "120 rad/s", "1 to 60 rad/s"
     )
     result = dataclasses.replace(
-        planar, warnings=(remark,), undone=("the knots",), interrupted=True
+        planar, warnings=(remark,), not_completed=("the knots",), interrupted=True
     )
     page = result.report(tmp_path / "motion.html")
     assert (tmp_path / "motion.html").read_text(encoding="utf-8") == page.html

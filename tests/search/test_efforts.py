@@ -29,12 +29,12 @@ def test_the_documented_efforts_are_the_real_ones():
     in_charts, in_closed_forms = table(columns=4), table(columns=5)
     assert set(in_charts) == set(in_closed_forms) == set(SEARCH_LEVELS)
     for name, (looked, plans, refined) in in_charts.items():
-        level = [level for level in SEARCH_LEVELS[name] if not level.last_resort][-1]
+        level = [level for level in SEARCH_LEVELS[name] if not level.fallback][-1]
         assert looked.split(",")[0] == str(SCREENED * level.in_charts)
         assert ("," in looked) is (name != "exhaustive" and not level.only_minima)
         assert (plans, refined) == (str(level.in_charts), str(level.refined))
     for name, (decompositions, seeds, plans, refined) in in_closed_forms.items():
-        level = [level for level in SEARCH_LEVELS[name] if not level.last_resort][-1]
+        level = [level for level in SEARCH_LEVELS[name] if not level.fallback][-1]
         assert decompositions == {1: "the first one", 6: "6", 20: "20"}.get(
             level.decompositions, "all"
         )

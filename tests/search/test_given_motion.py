@@ -43,7 +43,7 @@ def test_a_known_motion_takes_the_place_of_the_search(known, name):
         known.task, start_from=known, listener=told.append, **CHANGES[name]
     )
     assert result.verified
-    assert result.undone == ()
+    assert result.not_completed == ()
     assert [attempt.origin for attempt in result.candidates] == [GIVEN]
     assert not any("lattice" in text for text in told), "nothing was searched for"
     if not CHANGES[name]:
@@ -83,7 +83,11 @@ def test_of_other_task_spaces(space):
 def test_what_cannot_be_used_is_said_and_the_search_goes_on(known, changes, reason):
     result = brachis.plan(TASK, start_from=known, **changes)
     assert result.verified
-    assert (reason in " ".join(result.undone)) if reason else result.undone == ()
+    assert (
+        (reason in " ".join(result.not_completed))
+        if reason
+        else result.not_completed == ()
+    )
 
 
 def test_a_motion_of_another_robot_is_not_used(known):
@@ -96,6 +100,6 @@ def test_a_motion_of_another_robot_is_not_used(known):
         effort="single",
         start_from=known,
     )
-    assert "its joints are j1, j2, j3" in gantry.undone[0]
-    assert "searched for as usual" in gantry.undone[0]
+    assert "its joints are j1, j2, j3" in gantry.not_completed[0]
+    assert "searched for as usual" in gantry.not_completed[0]
     assert gantry.verified

@@ -26,7 +26,7 @@ def breaks(times: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
         "_paced",
         lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times),
     )
-    return phase_plane.first_breaks(start)
+    return phase_plane.initial_knots(start)
 
 
 def test_a_constant_speed_has_even_knots(monkeypatch):

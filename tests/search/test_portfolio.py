@@ -307,7 +307,10 @@ def test_a_real_ctrl_c_ends_worker_processes(robot):
     result = brachis.plan(robot, asked, listener=listener)
     assert result.verified
     assert result.interrupted
-    assert result.undone[-1] == "what search.effort asks for was not tried to its end"
+    assert (
+        result.not_completed[-1]
+        == "what search.effort asks for was not tried to its end"
+    )
     assert brachis.plan(robot, task(search={"jobs": 2})).verified, (
         "a new search has processes again"
     )
@@ -365,8 +368,11 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
     assert len(calls) == 1
     assert result.verified
     assert result.interrupted
-    assert result.to_dict()["undone"] == list(result.undone)
-    assert result.undone[-1] == "what search.effort asks for was not tried to its end"
+    assert result.to_dict()["undone"] == list(result.not_completed)
+    assert (
+        result.not_completed[-1]
+        == "what search.effort asks for was not tried to its end"
+    )
 
 
 @pytest.mark.parametrize(
@@ -392,7 +398,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     ]
     assert len(planned) == solved
     assert result.t_end <= 1.01 * min(planned)
-    assert left in result.undone, "closed forms: two batches of four each"
+    assert left in result.not_completed, "closed forms: two batches of four each"
 
 
 def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, clock):
@@ -415,7 +421,7 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joi
 
 
 def test_no_solve_begins_without_time_and_the_time_limit_is_to_blame(robot, clock):
-    calls = clock.jump(candidates, "first_point", at=1)
+    calls = clock.jump(candidates, "initial_guess", at=1)
     joints = {
         "task_space": "joints",
         "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}],
@@ -448,7 +454,10 @@ def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.verified
     assert result.interrupted
-    assert "the lattice of all postures was not searched to its end" in result.undone
+    assert (
+        "the lattice of all postures was not searched to its end"
+        in result.not_completed
+    )
     assert len(result.candidates) == len(usual.candidates)
 
 
@@ -467,7 +476,7 @@ def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clo
     result = brachis.plan(robot, task(**EVERY_CHOICE))
     assert result.verified
     assert len({candidate.redundant_joints for candidate in result.candidates}) == 1
-    assert any(undone.startswith("the lattice of") for undone in result.undone)
+    assert any(undone.startswith("the lattice of") for undone in result.not_completed)
 
 
 def test_a_lattice_ends_between_its_layers(robot, clock):
@@ -518,7 +527,7 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeyp
     assert result.verified
     assert (
         "the motion has 25 of 100 intervals, of which more were not solved"
-        in result.undone
+        in result.not_completed
     )
 
 

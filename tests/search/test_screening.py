@@ -72,7 +72,7 @@ def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatc
     def missing(*_arguments: object) -> None:
         raise ImportError("unopy")
 
-    monkeypatch.setattr(screening, "solved_in_chart", missing)
+    monkeypatch.setattr(screening, "solve_in_chart", missing)
     without = screening.screened(starts, MOST, NEVER, quiet)
     assert [start.origin for start in without] == [
         start.origin for start in starts[:MOST]
@@ -81,14 +81,14 @@ def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatc
 
 def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeypatch):
     solved = iter([True, *[False] * len(starts)])
-    honest = screening.solved_in_chart
+    honest = screening.solve_in_chart
 
     def once(*arguments: object) -> object:
         if next(solved):
             return honest(*arguments)
         raise ImportError("unopy")
 
-    monkeypatch.setattr(screening, "solved_in_chart", once)
+    monkeypatch.setattr(screening, "solve_in_chart", once)
     first, *others = screening.screened(starts, MOST, NEVER, quiet)
     assert first.origin == starts[0].origin
     assert others == [], "what was not solved is slower for all that is known"

@@ -12,7 +12,7 @@ from brachis.robot import Robot
 from brachis.search import chart_starts as module
 from brachis.search.joint_path import JointPath
 from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import varied
+from brachis.search.starts import perturb
 from brachis.task import load_task
 
 URDF = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
@@ -43,7 +43,7 @@ def test_given_ends_stay_and_ranges_are_kept(given):
     place = {} if given == "start" else {"start": "free", "path_start": [0.5, 0.1, 0.6]}
     problem = problem_of(**place)
     one = straight(problem)
-    found = varied([one], 12, 0)
+    found = perturb([one], 12, 0)
     moved = np.array([each.q - one.q for each in found])
     assert len(found) == 12
     assert (np.abs(moved[:, 0]).max() == 0.0) == (given == "start")
@@ -58,7 +58,7 @@ def test_given_ends_stay_and_ranges_are_kept(given):
 def test_they_are_the_same_for_the_same_seed():
     one = straight(problem_of())
     first, again, other = (
-        np.array([each.q for each in varied([one], 3, seed)]) for seed in (0, 0, 1)
+        np.array([each.q for each in perturb([one], 3, seed)]) for seed in (0, 0, 1)
     )
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0.01

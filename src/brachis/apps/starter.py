@@ -23,7 +23,7 @@ import yaml
 from brachis import planner
 from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, write_count
-from brachis.ik.registry import natural_space
+from brachis.ik.registry import default_task_space
 from brachis.result import Result
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.dynamics import rigid_torque
@@ -243,7 +243,7 @@ def _is_empty(limit: UrdfLimit) -> bool:
 
 def spaces(robot: Robot) -> Iterator[str | list[str]]:
     """Give what a robot might prescribe, the most natural first, then ever fewer rows of its tool's position."""
-    yield natural_space(robot)
+    yield default_task_space(robot)
     for count in range(min(robot.n, len(AXES)), 0, -1):
         yield from (list(rows) for rows in combinations(AXES, count))
 

@@ -18,7 +18,9 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
-def named(function: Callable[_P, _R], where: str | None = None) -> Callable[_P, _R]:
+def check_keywords(
+    function: Callable[_P, _R], where: str | None = None
+) -> Callable[_P, _R]:
     """Let a function refuse keywords that it does not have by naming those that it has.
 
     `where` is what the user calls the function; None: as it is named.

@@ -42,7 +42,7 @@ class Deadline:
         """Return the moment at which a part of the time that is left is over."""
         return self.within(share * self.left)
 
-    def extended(self, seconds: float) -> Deadline:
+    def extend(self, seconds: float) -> Deadline:
         """Return a moment so many seconds later."""
         return Deadline(self.at + seconds)
 

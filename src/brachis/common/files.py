@@ -259,7 +259,7 @@ class _File(io.FileIO):
             raise
 
 
-def shipped(folder: str) -> Path:
+def shipped_folder(folder: str) -> Path:
     """Return a folder of files that come with brachis: within an installed package, or in the source tree beside it.
 
     Parameters

@@ -2,7 +2,7 @@
 
 Python raises KeyboardInterrupt wherever the program happens to be. A compiled library that is being imported may
 swallow it, or turn it into an ImportError; a finaliser may only print it. The command line therefore remembers every
-press (`Presses`), and looks between its stages whether one went unheard.
+press (`SigintHandler`), and looks between its stages whether one went unheard.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ INTERRUPTED = 130
 """Exit code."""
 
 
-class Presses:
+class SigintHandler:
     """A handler of SIGINT that remembers a press until it is heard; a second one ends the program at once.
 
     Attributes
@@ -58,17 +58,17 @@ class Presses:
         self.pending = True
 
 
-def listen() -> None:
+def install() -> None:
     """Remember presses from now on; where SIGINT is ignored, it stays so."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, Presses())
+        signal.signal(signal.SIGINT, SigintHandler())
         sys.unraisablehook = _quiet(sys.unraisablehook)
 
 
-def presses() -> Presses | None:
+def presses() -> SigintHandler | None:
     """Return the handler that remembers presses; None within another program, for example."""
     handler = signal.getsignal(signal.SIGINT)
-    return handler if isinstance(handler, Presses) else None
+    return handler if isinstance(handler, SigintHandler) else None
 
 
 def check() -> None:
@@ -78,7 +78,7 @@ def check() -> None:
         raise KeyboardInterrupt
 
 
-def forget() -> None:
+def clear() -> None:
     """Put down that the press was heard."""
     handler = presses()
     if handler is not None:
@@ -86,7 +86,7 @@ def forget() -> None:
 
 
 @contextlib.contextmanager
-def heard() -> Iterator[None]:
+def interruptible() -> Iterator[None]:
     """Let presses interrupt the program within this block, one before it included.
 
     A press that was swallowed within ends the block with KeyboardInterrupt, whatever came of it otherwise.
@@ -105,16 +105,16 @@ def heard() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def expected() -> Iterator[None]:
+def end_on_interrupt() -> Iterator[None]:
     """Let a press end this block, which is how it is meant to end, and nothing else."""
     try:
         yield
     except KeyboardInterrupt:
-        forget()
+        clear()
 
 
 @contextlib.contextmanager
-def postponed() -> Iterator[None]:
+def defer() -> Iterator[None]:
     """Let a press wait for the end of this block, which raises KeyboardInterrupt then.
 
     For what must not be broken off, or might swallow it: imports of compiled libraries, finalisers.
@@ -130,7 +130,7 @@ def postponed() -> Iterator[None]:
     def keep(_number: int, _frame: FrameType | None) -> None:
         nonlocal pressed
         pressed = True
-        if isinstance(before, Presses):
+        if isinstance(before, SigintHandler):
             before.remember()
 
     signal.signal(signal.SIGINT, keep)
@@ -143,9 +143,9 @@ def postponed() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def blocked() -> Iterator[None]:
+def block_in_children() -> Iterator[None]:
     """Let processes that are started within this block never hear Ctrl-C; this one hears a press at its end."""
-    with postponed():
+    with defer():
         before = signal.pthread_sigmask(
             signal.SIG_BLOCK, {signal.SIGINT}
         )  # which processes inherit

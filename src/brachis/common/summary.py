@@ -21,8 +21,8 @@ class Summary:
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown, by name."""
-        shown = [each.name for each in fields(self) if each.repr]  # type: ignore[arg-type]
-        return {name: getattr(self, name) for name in shown}
+        names = [each.name for each in fields(self) if each.repr]  # type: ignore[arg-type]
+        return {name: getattr(self, name) for name in names}
 
     if not TYPE_CHECKING:
 
@@ -55,13 +55,13 @@ class Summary:
 
     def _entries(self) -> list[tuple[str, str]]:
         given = list(self.summary().items())
-        entries = [(key, shown(value)) for key, value in given[:LINES]]
+        entries = [(key, show_value(value)) for key, value in given[:LINES]]
         return entries + (
             [("...", f"{len(given) - LINES} more")] if len(given) > LINES else []
         )
 
 
-def shown(value: Any, room: int = _ROOM) -> str:
+def show_value(value: Any, room: int = _ROOM) -> str:
     """Show a value in at most `room` characters: arrays by their shape, long sequences by their length."""
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple) and shape:
@@ -78,7 +78,8 @@ def shown(value: Any, room: int = _ROOM) -> str:
         return _list_items(value, room)
     if isinstance(value, Mapping):
         items = ", ".join(
-            f"{key}: {shown(each, room)}" for key, each in list(value.items())[:_ITEMS]
+            f"{key}: {show_value(each, room)}"
+            for key, each in list(value.items())[:_ITEMS]
         )
         return (
             items
@@ -97,7 +98,7 @@ def _shorten(text: str, room: int) -> str:
 
 
 def _list_items(values: list[Any] | tuple[Any, ...], room: int) -> str:
-    text = f"[{', '.join(shown(each, room) for each in values[:_ITEMS])}]"
+    text = f"[{', '.join(show_value(each, room) for each in values[:_ITEMS])}]"
     return (
         text if len(text) <= room and len(values) <= _ITEMS else f"{len(values)} items"
     )

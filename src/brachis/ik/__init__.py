@@ -22,10 +22,10 @@ from brachis.ik.registry import (
     NO_CLOSED_FORM,
     Candidate,
     Match,
+    default_task_space,
     find,
     find_all,
     missing_eaik,
-    natural_space,
 )
 from brachis.ik.screws import ChainGeometry, PosedScrews
 
@@ -40,10 +40,10 @@ __all__ = [
     "NotApplicableError",
     "PosedScrews",
     "check_answers",
+    "default_task_space",
     "find",
     "find_all",
     "ik_family",
     "margin_gradient",
     "missing_eaik",
-    "natural_space",
 ]

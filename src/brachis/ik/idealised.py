@@ -33,7 +33,7 @@ _SKEW = 1e-2
 
 
 @dataclass(frozen=True)
-class Ideal:
+class SnappedChain:
     """A chain with exactly parallel, perpendicular and meeting axes near a given one.
 
     Attributes
@@ -59,9 +59,9 @@ class Ideal:
         )
 
 
-def idealised(
+def snap_axes(
     geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE
-) -> Ideal | None:
+) -> SnappedChain | None:
     """Make axes that are almost parallel, perpendicular or meeting so exactly.
 
     Parameters
@@ -97,7 +97,7 @@ def idealised(
         tool_position=chain.moved(geometry.tool_position),
         tool_rotation=chain.rotation @ geometry.tool_rotation,
     )
-    return Ideal(moved, chain.turned, chain.shifted)
+    return SnappedChain(moved, chain.turned, chain.shifted)
 
 
 class _Chain:
@@ -205,7 +205,7 @@ def _least_rotation(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     return np.eye(3) + skew + skew @ skew / (1.0 + start @ end)
 
 
-class Polished(IKSolver):
+class PolishedSolver(IKSolver):
     """Closed form of an ideal chain, made exact for the given one by Newton's method.
 
     Answers are those of the ideal chain as far as the method leads from them to one beside them; labels and margins of

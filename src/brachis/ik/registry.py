@@ -4,7 +4,7 @@ The families are listed in `BUILTIN`; other packages add theirs through the entr
 entries are `Family` objects (see `ik_family`). No answer is believed: a solver is returned only after its answers have
 been put into the chain's forward kinematics (`check`).
 
-Where no family fits the chain as it is, the ideal one is tried that it almost is (`idealised`); answers are polished.
+Where no family fits the chain as it is, the ideal one is tried that it almost is (`snap_axes`); answers are polished.
 
 What is said of closed forms that a robot lacks.
 
@@ -25,7 +25,7 @@ import numpy as np
 from brachis.errors import DecompositionError, UnknownNameError, write_count
 from brachis.ik.check import check_answers
 from brachis.ik.eaik import NOT_INSTALLED, eaik
-from brachis.ik.idealised import TOLERANCE, Ideal, Polished, idealised
+from brachis.ik.idealised import TOLERANCE, PolishedSolver, SnappedChain, snap_axes
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar
 from brachis.ik.positioning import positioning
@@ -187,10 +187,10 @@ def find_all(
     ]
 
 
-def _ideals(robot: Robot, task_map: TaskMap) -> Callable[[float], Ideal | None]:
+def _ideals(robot: Robot, task_map: TaskMap) -> Callable[[float], SnappedChain | None]:
     """Return the ideal arm within a tolerance as a function of it; the redundant joints have no part in it."""
     geometry = ChainGeometry.of(robot)
-    return cache(lambda tolerance: idealised(geometry, task_map, tolerance))
+    return cache(lambda tolerance: snap_axes(geometry, task_map, tolerance))
 
 
 def _try(
@@ -198,7 +198,7 @@ def _try(
     task_map: TaskMap,
     names: tuple[str, ...],
     families: Sequence[Family],
-    ideals: Callable[[float], Ideal | None],
+    ideals: Callable[[float], SnappedChain | None],
 ) -> Candidate:
     """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
     redundant = tuple(sorted(robot.joint_names.index(name) for name in names))
@@ -220,7 +220,7 @@ def _fitting(
     redundant: tuple[int, ...],
     families: Sequence[Family],
     reasons: dict[str, str],
-    ideal: Ideal | None,
+    ideal: SnappedChain | None,
 ) -> Match | None:
     """Find the first family that fits the robot or the ideal arm; put down the others' reasons."""
     geometry = ChainGeometry.of(robot)
@@ -230,7 +230,7 @@ def _fitting(
                 ideal.geometry if ideal else geometry, task_map, redundant
             )
             if ideal:
-                solver = Polished(solver, geometry, task_map, redundant)
+                solver = PolishedSolver(solver, geometry, task_map, redundant)
             check_answers(robot, task_map, redundant, solver)
         except NotApplicableError as reason:
             reasons[family.name] = str(reason)
@@ -262,7 +262,7 @@ def _name_rounding(
     redundant: tuple[int, ...],
     families: Sequence[Family],
     reasons: dict[str, str],
-    ideal: Ideal,
+    ideal: SnappedChain,
 ) -> None:
     """Put down which families would fit if the axes were nearer to the ideal arm's."""
     if max(ideal.turned, ideal.shifted) < TOLERANCE:
@@ -313,7 +313,7 @@ def missing_eaik(candidates: Sequence[Candidate]) -> str:
 _PARALLEL = 1e-9
 
 
-def natural_space(robot: Robot) -> str | list[str]:
+def default_task_space(robot: Robot) -> str | list[str]:
     """Return the task space of a whole pose, of three rows, or of those of the plane in which a robot moves."""
     geometry = ChainGeometry.of(robot)
     along = np.abs(

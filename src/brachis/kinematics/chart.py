@@ -206,7 +206,9 @@ class ChartMap:
 
     def _augmented_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
         """J_aug, (K, n, n), in postures (K, n) at path coordinates (K,)."""
-        return np.concatenate([self._newton.placed(q)[1], self.rows.at(s)[0]], axis=1)
+        return np.concatenate(
+            [self._newton.task_coordinates(q)[1], self.rows.at(s)[0]], axis=1
+        )
 
     def _inverse_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
         """J_aug^-1, (K, n, n); a pseudo-inverse, as some are singular where a reference is not regular throughout."""

@@ -59,7 +59,7 @@ def chart_around(
     s, reference = s[kept], reference[kept]
     if rows is not None:
         return ChartMap(task_map, path, rows, s, reference)
-    null = null_spaces(Newton(task_map).placed(reference)[1])
+    null = null_spaces(Newton(task_map).task_coordinates(reference)[1])
     r = null.shape[2]
     constant = np.linalg.eigh(np.einsum("kir,kjr->ij", null, null))[1][:, ::-1][:, :r].T
     if transversality(constant[None], null).min(initial=np.inf) >= _ENOUGH:

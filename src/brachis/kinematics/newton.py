@@ -33,7 +33,7 @@ class Newton:
         self._task_map = task_map
         self._geometry = ChainGeometry.of(task_map.robot)
 
-    def placed(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def task_coordinates(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Task coordinates (K, c) and task Jacobian (K, m, n) in postures (K, n)."""
         posed = self._geometry.posed(q)
         linear, angular = np.split(posed.jacobian_columns(range(self._geometry.n)), 2)
@@ -77,7 +77,7 @@ class Newton:
         for _ in range(_STEPS):
             if not len(left):
                 break
-            values, jacobian = self.placed(q)
+            values, jacobian = self.task_coordinates(q)
             own = rows[left]
             miss = np.concatenate(
                 [
@@ -103,7 +103,7 @@ class Newton:
 
     def nearest(self, targets: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Find the postures that meet targets, (K, c), without self-motion from given ones; (K, n), NaN where none."""
-        rows = np.swapaxes(null_spaces(self.placed(q)[1]), 1, 2)
+        rows = np.swapaxes(null_spaces(self.task_coordinates(q)[1]), 1, 2)
         return self.solve(targets, q, rows, np.einsum("kij,kj->ki", rows, q))
 
 

@@ -311,7 +311,7 @@ class Limit(ABC):
         """Return the limit for a path: where its bounds set in depends on how speeds are reached there."""
         return self
 
-    def relaxed(self, bound: Bound, amount: float) -> Self:
+    def relax(self, bound: Bound, amount: float) -> Self:
         """Return the limit with one figure giving way by `amount`, in its unit."""
         other = copy.copy(self)
         step = np.zeros(len(self.lower))

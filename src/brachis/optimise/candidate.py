@@ -29,7 +29,7 @@ def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Start(Summary):
+class InitialGuess(Summary):
     """A joint path from which a plan is begun.
 
     Attributes
@@ -65,13 +65,13 @@ class Start(Summary):
         """Whether the coordinates are a chart's."""
         return isinstance(self.joint_map, ChartMap)
 
-    def with_solver(self, name: str) -> Start:
+    def with_solver(self, name: str) -> InitialGuess:
         """Return the same start for a solver."""
         return dataclasses.replace(self, solver=name)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Attempt(Summary):
+class Candidate(Summary):
     """What came of a start: first a solved program, then, once it is finished, a verified motion.
 
     Attributes
@@ -81,11 +81,11 @@ class Attempt(Summary):
     branch : str
         Label of the branch, or ``chart``; empty where no joint path was found.
     origin : str
-        See `Start`.
+        See `InitialGuess`.
     solver : str
         Empty where nothing was solved.
     estimate : float
-        See `Start`; a rough one.
+        See `InitialGuess`; a rough one.
     status : str
         In plain words.
     start : Start or None
@@ -104,7 +104,7 @@ class Attempt(Summary):
         None while it is not finished, and where none came out.
     verification : Verification or None
         Of the trajectory.
-    undone : str
+    not_completed : str
         What the time, or a solve that failed, left undone, in words; empty where nothing.
 
     Examples
@@ -121,7 +121,7 @@ class Attempt(Summary):
     solver: str
     estimate: float
     status: str
-    start: Start | None = None
+    start: InitialGuess | None = None
     program: Program | None = None
     target: Program | None = None
     reports: tuple[SolverReport, ...] = ()
@@ -129,10 +129,10 @@ class Attempt(Summary):
     refined: Refined | None = None
     trajectory: Trajectory | None = None
     verification: Verification | None = None
-    undone: str = ""
+    not_completed: str = ""
 
     @classmethod
-    def of(cls, start: Start, status: str, **more: Any) -> Attempt:
+    def of(cls, start: InitialGuess, status: str, **more: Any) -> Candidate:
         """Begin an attempt."""
         joint_map = start.joint_map
         names = joint_map.redundant_joints
@@ -212,7 +212,7 @@ class Attempt(Summary):
         trajectory: Trajectory | None,
         verification: Verification | None,
         tolerance: float,
-    ) -> Attempt:
+    ) -> Candidate:
         """Return the attempt with its motion, and with a status that says what became of it.
 
         Parameters
@@ -254,7 +254,7 @@ class Attempt(Summary):
             verification=verification,
         )
 
-    def without_programs(self) -> Attempt:
+    def without_programs(self) -> Candidate:
         """Return the attempt without what only the search needs."""
         return dataclasses.replace(self, start=None, program=None, target=None)
 

@@ -9,7 +9,7 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, interpolate
 from brachis.optimise.backends import SolverReport
-from brachis.optimise.candidate import Attempt, Start
+from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Refined, RefinementOptions, Solve, refine
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
@@ -19,7 +19,7 @@ _SAME_TIME = 1e-7
 _BESIDE = 1e-4
 
 
-def extract(start: Start, refined: Refined) -> Trajectory:
+def extract(start: InitialGuess, refined: Refined) -> Trajectory:
     """Turn the answer of a program into a trajectory that can be evaluated without the closed form.
 
     Parameters
@@ -72,7 +72,7 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     )
 
 
-def with_points_at_violations(attempt: Attempt) -> Program | None:
+def with_points_at_violations(attempt: Candidate) -> Program | None:
     """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
     trajectory = attempt.trajectory
     refined = attempt.refined
@@ -84,7 +84,7 @@ def with_points_at_violations(attempt: Attempt) -> Program | None:
     t_norm = np.array([check.time for check in failed]) / trajectory.t_end
     near = t_norm[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
     (phase,) = refined.program.phases
-    return refined.program.resampled(
+    return refined.program.with_grid(
         [np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))]
     )
 
@@ -94,12 +94,12 @@ _SECOND_LOOKS = 4
 
 
 def refine_and_verify(
-    attempt: Attempt,
+    attempt: Candidate,
     program: Program,
     reports: tuple[SolverReport, ...],
     solve: Solve,
     options: RefinementOptions,
-) -> Attempt:
+) -> Candidate:
     """Refine and verify; only verify where the time is up.
 
     Parameters
@@ -132,8 +132,8 @@ def refine_and_verify(
 
 
 def _verified(
-    attempt: Attempt, before: tuple[SolverReport, ...], refined: Refined
-) -> Attempt:
+    attempt: Candidate, before: tuple[SolverReport, ...], refined: Refined
+) -> Candidate:
     """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
     start = attempt.start
     assert start is not None

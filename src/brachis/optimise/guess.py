@@ -98,7 +98,7 @@ def _followed(
     phase: Phase, joint_path: np.ndarray, duration: float | None
 ) -> np.ndarray:
     t_norm = spread(phase.breaks, _FIT_DENSITY)
-    return fitted(
+    return fit_curves(
         phase,
         _first_duration(phase, duration),
         t_norm,
@@ -149,7 +149,7 @@ def _values(joint_path: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(places, grid, column) for column in joint_path.T])
 
 
-def fitted(
+def fit_curves(
     phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
 ) -> np.ndarray:
     """Point x whose curves come nearest to given values, by least squares; exact where the splines contain them.
@@ -202,12 +202,12 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
         best = x
         least = worst
         # Without gravity and friction, torque falls with the square of the time.
-        x = program.time_scaled(x, _STRETCH * min(np.sqrt(worst), 8.0))
+        x = program.with_time_scaled(x, _STRETCH * min(np.sqrt(worst), 8.0))
     else:
         return best
     shorter = x
     while program.end_time(shorter) > _SHORTEST_TIME:
-        shorter = program.time_scaled(shorter, _SHRINKAGE)
+        shorter = program.with_time_scaled(shorter, _SHRINKAGE)
         if worst_time_scaling_ratio(program, shorter) > 1.0:
             break
         x = shorter

@@ -29,7 +29,7 @@ from brachis.optimise.backends import (
     SolverReport,
     solver_named,
 )
-from brachis.optimise.candidate import Attempt
+from brachis.optimise.candidate import Candidate
 from brachis.optimise.completion import refine_and_verify
 from brachis.optimise.program import LeastAcceleration, Program
 from brachis.optimise.refine import RefinementOptions
@@ -87,7 +87,7 @@ class LeastMotion(Summary):
 
 
 def find_least_motion(
-    fastest: Attempt, deadline: Deadline, listener: Listener
+    fastest: Candidate, deadline: Deadline, listener: Listener
 ) -> LeastMotion:
     """Find the calmest motion that is as fast as a finished attempt, or as little slower as the task allows.
 
@@ -107,11 +107,11 @@ def find_least_motion(
     except UnreachableError as error:
         return _kept(fastest, f"the fastest motion stays: {error}")
     except KeyboardInterrupt:
-        interrupts.forget()
+        interrupts.clear()
         return _kept(fastest, "interrupted")
 
 
-def _solve(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
+def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastMotion:
     """Solve, and complete what came of it if it is worth it."""
     start = fastest.start
     before = fastest.refined
@@ -127,7 +127,9 @@ def _solve(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMot
     soon = deadline.part(0.5)
     name = _FOR_MANY if program.variables > 150 else start.solver
     solve = _session(name, soon, listener, patience=5)
-    first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
+    first = solve(
+        program, program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
+    )
     if not first.status.usable:
         return _kept(
             fastest, f"the fastest motion stays: {first.status.value}", (first,)
@@ -154,7 +156,7 @@ def _solve(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMot
     )
 
 
-def _better(fastest: Attempt, found: Attempt, reduction: float) -> LeastMotion:
+def _better(fastest: Candidate, found: Candidate, reduction: float) -> LeastMotion:
     """Take the motion that was found if it is verified and calmer by a fraction that is worth it."""
     if found.trajectory is None or found.verification is None or not found.verified:
         return _kept(
@@ -181,7 +183,7 @@ def _better(fastest: Attempt, found: Attempt, reduction: float) -> LeastMotion:
 
 
 def _kept(
-    fastest: Attempt, status: str, reports: tuple[SolverReport, ...] = ()
+    fastest: Candidate, status: str, reports: tuple[SolverReport, ...] = ()
 ) -> LeastMotion:
     """Keep the fastest motion."""
     assert fastest.trajectory is not None and fastest.verification is not None

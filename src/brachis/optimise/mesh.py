@@ -39,13 +39,13 @@ class Answer(NamedTuple):
     program : Program
     reports : tuple of SolverReport
         Of all solves; the last one belongs to `program`.
-    undone : str
+    not_completed : str
         What the time, or a solve that failed, left undone, in words; empty where nothing.
     """
 
     program: Program
     reports: tuple[SolverReport, ...]
-    undone: str = ""
+    not_completed: str = ""
 
 
 _EARLY = (
@@ -146,12 +146,12 @@ def solve_nested(
         solved = report
     reached = coarse.intervals
     asked = target.intervals
-    undone = (
+    not_completed = (
         f"the motion has {reached} of {asked} intervals, of which more were not solved"
         if reached < asked
         else ""
     )
-    return Answer(coarse, with_last(solved, reports), undone)
+    return Answer(coarse, with_last(solved, reports), not_completed)
 
 
 def _levels(program: Program) -> Iterator[Program]:
@@ -300,7 +300,7 @@ def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.nd
 def _lost(phase: Phase, x: np.ndarray) -> np.ndarray:
     """Part of the duration that each interval loses, (N,): how far as many limits as there are curves swing."""
     breaks = phase.breaks
-    ratios = np.abs(phase.resampled(spread(breaks, _SAMPLES)).time_scaling_ratios(x))
+    ratios = np.abs(phase.with_grid(spread(breaks, _SAMPLES)).time_scaling_ratios(x))
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :].clip(max=1.0)
     within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[
         ::_SAMPLES
@@ -404,14 +404,14 @@ def optimise_knots(
             break
         program = refined.program
         x = refined.x
-    undone = (
+    not_completed = (
         "the knots were not moved as far as that pays"
         if refinement.deadline.passed
         else ""
     )
     if best is None or not np.isfinite(end_time(best, refinement)):
-        return Answer(given, with_last(first, reports), undone)
-    return Answer(best.program, with_last(best.reports[-1], reports), undone)
+        return Answer(given, with_last(first, reports), not_completed)
+    return Answer(best.program, with_last(best.reports[-1], reports), not_completed)
 
 
 def adapt_mesh(
@@ -458,7 +458,11 @@ def adapt_mesh(
         adapted = refine_mesh(nested.program, last, solve, options, refinement.deadline)
     else:
         adapted = Answer(nested.program, (last,))
-    undone = "; ".join(filter(None, (nested.undone, adapted.undone)))
+    not_completed = "; ".join(
+        filter(None, (nested.not_completed, adapted.not_completed))
+    )
     return Answer(
-        adapted.program, (*reports[:-1], *nested.reports[:-1], *adapted.reports), undone
+        adapted.program,
+        (*reports[:-1], *nested.reports[:-1], *adapted.reports),
+        not_completed,
     )

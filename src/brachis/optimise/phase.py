@@ -160,7 +160,7 @@ class Phase:
         other._lay_out(grid, boundary or self.boundary)  # noqa: SLF001  (its own class)
         return other
 
-    def resampled(self, t_norm: np.ndarray) -> Phase:
+    def with_grid(self, t_norm: np.ndarray) -> Phase:
         """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
         return self.with_knots(self.knots, t_norm)
 

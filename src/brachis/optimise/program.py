@@ -266,7 +266,7 @@ class Program(Summary):
         """End time t_E, s: the sum of the durations."""
         return float(sum(x[first] for first in self._durations))
 
-    def time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
+    def with_time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
         """Return the same motion, every phase longer by a factor."""
         x = x.copy()
         x[self._durations] *= factor
@@ -345,10 +345,10 @@ class Program(Summary):
         """Return the program with other phases for the present ones, all else as it is."""
         return Program(phases, self.links, self.minimised)
 
-    def resampled(self, t_norm: Sequence[np.ndarray]) -> Program:
+    def with_grid(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with other collocation points of every phase; see `Phase.resampled`."""
         return self.with_phases(
-            phase.resampled(own) for phase, own in zip(self.phases, t_norm, strict=True)
+            phase.with_grid(own) for phase, own in zip(self.phases, t_norm, strict=True)
         )
 
     def with_free_knots(self, shortest: float) -> Program:
@@ -375,9 +375,9 @@ class Program(Summary):
         """Return the same program with another least branch margin; x keeps its meaning."""
         return self.with_phases(phase.with_margin(margin) for phase in self.phases)
 
-    def relaxed(self, limit: Limit, bound: Bound, amount: float) -> Program:
+    def relax(self, limit: Limit, bound: Bound, amount: float) -> Program:
         """Return the same program with a figure of one of its limits giving way by `amount`, in the figure's unit."""
-        other = limit.relaxed(bound, amount)
+        other = limit.relax(bound, amount)
         return self.with_phases(
             phase.with_limits(
                 tuple(other if each is limit else each for each in phase.limits)

@@ -392,7 +392,7 @@ def refine(
     -------
     Refined
     """
-    dense = program.resampled(
+    dense = program.with_grid(
         [dense_grid(phase, options.density) for phase in program.phases]
     )
     goal = options.tolerance * _GOAL
@@ -418,7 +418,7 @@ def refine(
             merged(phase, extra)
             for phase, extra in zip(program.phases, places, strict=True)
         ]
-        finer = program.resampled(extended)
+        finer = program.with_grid(extended)
         if (
             finer.collocation_points == program.collocation_points
             or options.deadline.passed
@@ -463,7 +463,7 @@ def _time_scaled(
         factor = 1.0 + violation - 0.5 * goal
         if not dense.end_time(x) * factor <= longest:
             break
-        x = dense.time_scaled(x, factor)
+        x = dense.with_time_scaled(x, factor)
         before = violation
         (violation, _) = violations(dense, x, goal)
         best = min(best, (x, violation), key=lambda pair: pair[1])

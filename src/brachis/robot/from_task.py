@@ -22,7 +22,7 @@ from brachis.robot.limits import (
     Limits,
     per_joint_values,
     resolve_limits,
-    spelled_out,
+    to_spec,
     without_joints,
 )
 from brachis.robot.robot import ROLL_JOINT, Robot
@@ -144,7 +144,7 @@ def _stated(robot: Robot) -> RobotSettings:
         settings.limits, names, robot.stated_limits[:n], settings.speed_override
     )
     if not _same(made, robot.limits, n):
-        changes |= {"limits": spelled_out(robot.limits, names), "speed_override": 1.0}
+        changes |= {"limits": to_spec(robot.limits, names), "speed_override": 1.0}
     if not _same(
         Friction.of(names, robot.stated.friction, **settings.friction.model_dump()),
         robot.friction,

@@ -240,7 +240,7 @@ def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
     return LimitSpec(**changed)
 
 
-def spelled_out(limits: Limits, names: Sequence[str]) -> LimitSpec:
+def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
     """State limits joint by joint; joints beyond `names` are left out."""
 
     def finite(values: np.ndarray) -> list[float | None]:

@@ -11,7 +11,7 @@ from typing import Any, Self, Unpack
 import numpy as np
 import pinocchio as pin
 
-from brachis.common.arguments import named
+from brachis.common.arguments import check_keywords
 from brachis.common.summary import Summary
 from brachis.errors import InputError, UnknownNameError
 from brachis.robot.friction import Friction
@@ -23,11 +23,11 @@ from brachis.robot.limits import (
     UrdfLimit,
     per_joint_values,
     resolve_limits,
-    spelled_out,
+    to_spec,
     without_joints,
 )
 from brachis.robot.model import build_model
-from brachis.robot.settings import kept_settings
+from brachis.robot.settings import settings_used
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import StatedChain
 from brachis.robot.urdf_elements import read_tree
@@ -200,7 +200,7 @@ class Robot(Summary):
             stated_limits=chain.limits,
             stated=chain.stated,
             friction=terms,
-            settings=kept_settings(
+            settings=settings_used(
                 added,
                 path,
                 names,
@@ -237,7 +237,7 @@ class Robot(Summary):
         ([20.0, 10.0, 10.0], [2.0, 2.0, 2.0])
         """
         own = self.joint_names[: len(self.joint_names) - self.rolls_freely]
-        kept = spelled_out(self.limits, own)
+        kept = to_spec(self.limits, own)
         changes: dict[str, Any] = {}
         for kind, value in limits.items():
             if kind not in LimitKeywords.__annotations__:
@@ -258,7 +258,7 @@ class Robot(Summary):
         )
         return replace(self, limits=resolved, settings=settings)
 
-    @named
+    @check_keywords
     def with_payload(
         self,
         mass: float | None,

@@ -14,7 +14,7 @@ from brachis.robot.limits import per_joint_values
 from brachis.task import FROM_URDF, LimitSpec, RobotSettings, check_robot_settings
 
 
-def kept_settings(
+def settings_used(
     added: RobotSettings,
     path: str | os.PathLike[str],
     names: Sequence[str],

@@ -237,7 +237,7 @@ def read_file(path: Path) -> str:
     try:
         return files.read_file(path).decode()
     except FileNotFoundError as error:
-        ours = files.shipped("robots") / path.name / "robot.urdf"
+        ours = files.shipped_folder("robots") / path.name / "robot.urdf"
         hint = (
             f"The robot of this name that comes with brachis is {ours}"
             if files.is_file(ours)

@@ -2,7 +2,7 @@
 
 from brachis.search.chart_starts import first_map
 from brachis.search.given_motion import GIVEN, given_start
-from brachis.search.phase_plane import first_breaks, first_point
+from brachis.search.phase_plane import initial_guess, initial_knots
 from brachis.search.portfolio import find_fastest, is_planned
 from brachis.search.record import Record
 from brachis.search.remedies import try_remedies
@@ -10,8 +10,8 @@ from brachis.search.solving import (
     MARGINS,
     best_of_joints,
     solve_by_margin_continuation,
+    solve_in_chart,
     solve_without_third_order_limits,
-    solved_in_chart,
 )
 
 __all__ = [
@@ -20,13 +20,13 @@ __all__ = [
     "Record",
     "best_of_joints",
     "find_fastest",
-    "first_breaks",
     "first_map",
-    "first_point",
     "given_start",
+    "initial_guess",
+    "initial_knots",
     "is_planned",
     "solve_by_margin_continuation",
+    "solve_in_chart",
     "solve_without_third_order_limits",
-    "solved_in_chart",
     "try_remedies",
 ]

@@ -13,19 +13,19 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.backends import SolveStatus, solver_named
-from brachis.optimise.candidate import Attempt, Start
+from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.optimise.completion import refine_and_verify
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import phase_in, program_of
-from brachis.search.phase_plane import first_breaks, first_point
+from brachis.search.phase_plane import initial_guess, initial_knots
 from brachis.search.solving import (
     MARGINS,
     best_of_joints,
     solve_by_margin_continuation,
+    solve_in_chart,
     solve_without_third_order_limits,
-    solved_in_chart,
 )
 
 _MANY_VARIABLES = 150
@@ -34,7 +34,9 @@ _KNOT_TIME = 0.4
 """Part of the remaining time that may go into the knots."""
 
 
-def solve_candidate(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
+def solve_candidate(
+    start: InitialGuess, deadline: Deadline, listener: Listener
+) -> Candidate:
     """Solve from a start, at the first collocation points.
 
     Parameters
@@ -48,18 +50,18 @@ def solve_candidate(start: Start, deadline: Deadline, listener: Listener) -> Att
     Attempt
     """
     problem = start.problem
-    target = program_of(problem, start.joint_map, first_breaks(start))
+    target = program_of(problem, start.joint_map, initial_knots(start))
     program = coarsest(target) if target.variables > _MANY_VARIABLES else target
-    x = first_point(program, start)
+    x = initial_guess(program, start)
     if x is None:
-        return Attempt.of(
+        return Candidate.of(
             start, "the splines through the joint path leave the branch, or the chart"
         )
     session = _session(start, deadline, listener)
     try:
         x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
         if start.in_chart and not start.timed:
-            program, reports = solved_in_chart(problem, program, x, session)
+            program, reports = solve_in_chart(problem, program, x, session)
             joint_map = program.phases[0].joint_map
             target = target.with_phases(
                 phase_in(problem, joint_map, phase.grid) for phase in target.phases
@@ -69,11 +71,11 @@ def solve_candidate(start: Start, deadline: Deadline, listener: Listener) -> Att
                 program, x, session, MARGINS
             )
     except ImportError as error:
-        return Attempt.of(start, f"{start.solver}: not installed ({error})")
+        return Candidate.of(start, f"{start.solver}: not installed ({error})")
     last = reports[-1]
     reports = (*before, *reports)
     coarse = last.objective if last.status.usable else np.inf
-    return Attempt.of(
+    return Candidate.of(
         start,
         _in_words(last.status),
         program=program,
@@ -84,8 +86,8 @@ def solve_candidate(start: Start, deadline: Deadline, listener: Listener) -> Att
 
 
 def finish_candidate(
-    attempt: Attempt, deadline: Deadline, listener: Listener
-) -> Attempt:
+    attempt: Candidate, deadline: Deadline, listener: Listener
+) -> Candidate:
     """Adapt the mesh, refine and verify; only verify where the time is up.
 
     Parameters
@@ -121,7 +123,7 @@ def finish_candidate(
         reports = (*reports[:-1], *further)
         target = program
     adapted = adapt_mesh(program, reports, session, task.spline, options, target=target)
-    attempt = dataclasses.replace(attempt, undone=adapted.undone)
+    attempt = dataclasses.replace(attempt, not_completed=adapted.not_completed)
     options = dataclasses.replace(options, deadline=deadline)
     session = dataclasses.replace(session, deadline=deadline)
     return refine_and_verify(
@@ -129,7 +131,9 @@ def finish_candidate(
     )
 
 
-def _session(start: Start, deadline: Deadline, listener: Listener) -> SolverSession:
+def _session(
+    start: InitialGuess, deadline: Deadline, listener: Listener
+) -> SolverSession:
     """Open a session of the start's solver under the task's bounds."""
     (backend,) = solver_named(start.solver)
     settings = start.problem.task.solver

@@ -10,7 +10,7 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Listener
 from brachis.errors import PathError, UnreachableError
 from brachis.kinematics import CHART, Newton, chart_around
-from brachis.optimise.candidate import PathMap, Start
+from brachis.optimise.candidate import InitialGuess, PathMap
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.holding import check_holding
@@ -25,8 +25,8 @@ from brachis.search.starts import (
     fine_places,
     joint_space_start,
     lattice_starts,
-    smoothed,
-    varied,
+    perturb,
+    smooth,
 )
 from brachis.search.too_fast import refuse_hopeless_speeds
 
@@ -45,7 +45,7 @@ def chart_starts(
     level: SearchLevel,
     deadline: Deadline = NEVER,
     listener: Listener = lambda _text: None,
-) -> list[Start] | DeadEnd:
+) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from the lattice of all postures; from a finer one where it ends.
 
     Parameters
@@ -86,7 +86,7 @@ def chart_starts(
         for number, joint_path in enumerate(found, 1)
     ]
     if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:
-        more = varied(
+        more = perturb(
             found, _AT_LEAST * level.in_charts - len(found), problem.task.search.seed
         )
         named += [
@@ -119,7 +119,9 @@ def _origin(number: int, joint_path: JointPath) -> str:
     )
 
 
-def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | None:
+def _start_along(
+    newton: Newton, joint_path: JointPath, origin: str
+) -> InitialGuess | None:
     """Smooth a joint path, lay a chart around it, and estimate its time; None where no chart can follow it."""
     problem = joint_path.problem
     places = fine_places(joint_path.s)
@@ -134,7 +136,9 @@ def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | 
         if problem.task.boundary.periodic and not chart.rows.closes:
             continue
         estimate = least_time(problem.limits, places, q)
-        return Start(problem, chart, chart.curves(places, q), estimate, origin, CHART)
+        return InitialGuess(
+            problem, chart, chart.curves(places, q), estimate, origin, CHART
+        )
     return None
 
 
@@ -147,7 +151,7 @@ def _followed(
             [np.interp(places, joint_path.s, joint) for joint in joint_path.q.T]
         )
     else:
-        q = smoothed(joint_path.s, joint_path.q, places, pieces)
+        q = smooth(joint_path.s, joint_path.q, places, pieces)
     q = newton.nearest(joint_path.problem.path.sample(places).target, q)
     given = joint_path.problem.start, joint_path.problem.end
     for place, posture in zip((0, -1), given, strict=True):

@@ -16,7 +16,7 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import BrachisError, PathError, PlanningError, Remedy
 from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, Moments
-from brachis.optimise.candidate import Attempt
+from brachis.optimise.candidate import Candidate
 from brachis.problem.feasibility import in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
@@ -267,7 +267,7 @@ _SLOWER = 0.7
 
 def refuse_what_is_out_of_reach(
     decompositions: Sequence[Decomposition],
-    candidates: Sequence[Attempt],
+    candidates: Sequence[Candidate],
     deadline: Deadline,
 ) -> None:
     """Raise the reason where the path is out of reach, so that further attempts would be in vain.
@@ -308,7 +308,7 @@ def refuse_what_is_out_of_reach(
 def no_motion(
     problem: Problem,
     decompositions: Sequence[Decomposition],
-    candidates: Sequence[Attempt],
+    candidates: Sequence[Candidate],
     dead_ends: Mapping[str, DeadEnd],
     deadline: Deadline,
 ) -> BrachisError:
@@ -381,7 +381,7 @@ def out_of_time(task: Task, undone: Sequence[str]) -> PlanningError:
     return PlanningError(problem, hint="Raise search.time_limit")
 
 
-def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
+def _advice(task: Task, candidates: Sequence[Candidate]) -> str:
     """Say what may help where there are joint paths, but no motion along them: only what has not been tried."""
     statuses = " ".join(candidate.status for candidate in candidates)
     few = SolverSettings.model_fields
@@ -416,13 +416,13 @@ def _what_is_missing(problem: Problem) -> str:
     return f". {missing}" if missing else ""
 
 
-def _lattices(candidates: Sequence[Attempt]) -> list[Attempt]:
+def _lattices(candidates: Sequence[Candidate]) -> list[Candidate]:
     return [
         candidate for candidate in candidates if candidate.origin.startswith("lattice")
     ]
 
 
-def _some_joint_path(candidates: Sequence[Attempt]) -> bool:
+def _some_joint_path(candidates: Sequence[Candidate]) -> bool:
     """Tell whether a lattice that was looked at has a joint path."""
     return any(candidate.branch for candidate in _lattices(candidates))
 

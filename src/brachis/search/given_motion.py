@@ -21,7 +21,7 @@ from brachis.kinematics import (
     null_spaces,
     transversality,
 )
-from brachis.optimise.candidate import PathMap, Start
+from brachis.optimise.candidate import InitialGuess, PathMap
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.lattice import LARGEST_STEP
@@ -36,7 +36,7 @@ _TIMES = 401
 
 def given_start(
     problem: Problem, decompositions: Sequence[Decomposition], motion: Trajectory
-) -> Start | str:
+) -> InitialGuess | str:
     """Make a start of a known motion.
 
     Parameters
@@ -65,7 +65,9 @@ def given_start(
         return str(error)
     if not reached:
         return "its postures cannot be brought onto the path"
-    return Start(problem, joint_map, curves, motion.t_end, GIVEN, family, timed=True)
+    return InitialGuess(
+        problem, joint_map, curves, motion.t_end, GIVEN, family, timed=True
+    )
 
 
 def _in_coordinates(
@@ -118,7 +120,7 @@ def _chart(
         else None
     )
     if own is not None:
-        null = null_spaces(Newton(problem.task_map).placed(q)[1])
+        null = null_spaces(Newton(problem.task_map).task_coordinates(q)[1])
         if transversality(own.at(s)[0], null).min() < SELECTABLE:
             own = None
     return chart_around(problem.task_map, problem.path, s, q, own)

@@ -8,7 +8,7 @@ import numpy as np
 
 from brachis.errors import PlanningError
 from brachis.limits import Limit, Moments
-from brachis.optimise.candidate import Start
+from brachis.optimise.candidate import InitialGuess
 from brachis.problem.feasibility import load_remedies
 from brachis.search.phase_plane import along
 
@@ -19,7 +19,7 @@ _SUSPECT = 0.95
 """Ratio from which on the limit is the reason where no plan was found."""
 
 
-def check_holding(starts: Sequence[Start]) -> None:
+def check_holding(starts: Sequence[InitialGuess]) -> None:
     """Refuse a limit that all postures of all joint paths exceed at rest, before plans are tried.
 
     Friction may help to hold the arm, and a motion between different speeds may be a fall: these are tried.
@@ -44,7 +44,7 @@ def check_holding(starts: Sequence[Start]) -> None:
 
 
 def explain_holding(
-    starts: Sequence[Start], *, everywhere: bool = False
+    starts: Sequence[InitialGuess], *, everywhere: bool = False
 ) -> PlanningError | None:
     """Tell which limit of a mean leaves too little for holding the arm along all joint paths; None: none does.
 
@@ -89,7 +89,7 @@ def explain_holding(
 
 
 def _error(
-    start: Start, limit: Limit, column: int, ratios: np.ndarray, mean: float
+    start: InitialGuess, limit: Limit, column: int, ratios: np.ndarray, mean: float
 ) -> PlanningError:
     """Make the error that names the limit."""
     label = limit.labels[column]

@@ -28,7 +28,7 @@ class SearchLevel:
         Of the lattice.
     only_minima : bool
         Whether of the lattice of all postures only joint paths of locally least length are taken.
-    last_resort : bool
+    fallback : bool
         Whether it is gone through only while no motion is verified.
     """
 
@@ -41,7 +41,7 @@ class SearchLevel:
     cells_per_turn: int
     nodes: int
     only_minima: bool = True
-    last_resort: bool = False
+    fallback: bool = False
 
 
 _LEVELS = {
@@ -92,7 +92,7 @@ _LEVELS = {
 SEARCH_LEVELS = {
     "single": (
         _LEVELS["single"],
-        dataclasses.replace(_LEVELS["fast"], last_resort=True),
+        dataclasses.replace(_LEVELS["fast"], fallback=True),
     ),
     "fast": (_LEVELS["fast"],),
     "thorough": (_LEVELS["fast"], _LEVELS["thorough"]),

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.limits import Limit
-from brachis.optimise.candidate import Start
+from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import breaks_of
@@ -264,7 +264,7 @@ _BISECTIONS = 60
 are needed for the least one all of them become shorter, as slopes over 1e-9 of the time would say nothing."""
 
 
-def first_breaks(start: Start) -> np.ndarray:
+def initial_knots(start: InitialGuess) -> np.ndarray:
     """Choose the ends of the knot intervals in normalised time, (N + 1,), for a plan from a start."""
     breaks = breaks_of(start.problem.task)
     paced = _paced(start)
@@ -312,7 +312,7 @@ def _graded(switches: np.ndarray, count: int) -> np.ndarray:
     return np.concatenate([[0.0], breaks[1:-1], [1.0]])
 
 
-def first_point(program: Program, start: Start) -> np.ndarray | None:
+def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     """Fit splines to the joint path of a start; see `starting_point`.
 
     Parameters
@@ -338,7 +338,7 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
     )
 
 
-def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
+def _paced(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and their times, (S,), s; None where no limit asks for a least speed."""
     return (
         _timed(start)
@@ -347,7 +347,7 @@ def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     )
 
 
-def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
+def _between_speeds(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves and times likewise where an end is in motion and the joint path is not a motion's yet; else None."""
     first, last = start.problem.end_rates
     fastest = None if start.timed or first == last == 0.0 else _timed(start)
@@ -362,7 +362,7 @@ def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     return curves, 0.5 * (times + even)
 
 
-def _timed(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
+def _timed(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and when the phase plane passes them, (S,), s."""
     problem = start.problem
     joint_path = start.joint_path

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from brachis.common.summary import Summary
 from brachis.optimise.backends import SolverReport
-from brachis.optimise.candidate import Attempt
+from brachis.optimise.candidate import Candidate
 from brachis.optimise.least_motion import LeastMotion
 from brachis.robot.from_task import in_use
 from brachis.robot.plausibility import Remark
@@ -29,12 +29,12 @@ class PlannedMotion(Summary):
     trajectory: Trajectory
     verification: Verification
     family: str
-    attempt: Attempt
+    attempt: Candidate
     least_motion: LeastMotion | None = None
     timing: dict[str, float] = field(default_factory=dict)
-    candidates: tuple[Attempt, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
     interrupted: bool = False
-    undone: tuple[str, ...] = ()
+    not_completed: tuple[str, ...] = ()
     warnings: tuple[Remark, ...] = ()
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
@@ -53,7 +53,11 @@ class PlannedMotion(Summary):
         """Return what is shown."""
         trajectory = self.trajectory
         last = self.solver_report
-        left = {"undone": "; ".join(self.undone)} if self.undone else {}
+        left = (
+            {"not_completed": "; ".join(self.not_completed)}
+            if self.not_completed
+            else {}
+        )
         remarks = (
             {"warnings": "; ".join(remark.message for remark in self.warnings)}
             if self.warnings
@@ -121,7 +125,7 @@ class PlannedMotion(Summary):
             "fits": [fit.to_dict() for fit in self.fits],
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,
-            "undone": list(self.undone),
+            "not_completed": list(self.not_completed),
             "warnings": [remark.to_dict() for remark in self.warnings],
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,

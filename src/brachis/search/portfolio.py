@@ -19,13 +19,13 @@ from contextlib import closing
 from brachis.common import interrupts
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.optimise.candidate import Attempt, Start
+from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import candidates
 from brachis.search.failure import no_motion, out_of_time, refuse_what_is_out_of_reach
 from brachis.search.holding import explain_holding
 from brachis.search.processes import each, processes
-from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
+from brachis.search.record import NOT_TRIED, Numbered, Record, round_end_time
 from brachis.search.schedule import Batch, batches
 from brachis.search.too_fast import out_of_reach, unlikely
 
@@ -46,7 +46,7 @@ def find_fastest(
     decompositions: Sequence[Decomposition],
     deadline: Deadline,
     listener: Listener,
-    first: Start | None = None,
+    first: InitialGuess | None = None,
 ) -> Record:
     """Search for the fastest verified motion.
 
@@ -83,11 +83,11 @@ def find_fastest(
         if not record.content:
             search.run(
                 batches(
-                    problem, decompositions, deadline, listener, record.note_lattice
+                    problem, decompositions, deadline, listener, record.report_dead_end
                 )
             )
     except KeyboardInterrupt:
-        interrupts.forget()
+        interrupts.clear()
         record.interrupted = True
         search.take_what_there_is()
         if not record.content:
@@ -103,7 +103,7 @@ def find_fastest(
         raise heavy
     if record.interrupted or record.cut_short(problem.task.solver.time_limit):
         record.interrupted = True
-        raise out_of_time(problem.task, record.undone())
+        raise out_of_time(problem.task, record.not_completed())
     raise no_motion(
         problem, decompositions, record.attempts, record.dead_ends, deadline
     )
@@ -135,7 +135,7 @@ def is_planned(
 
     search = _Search(problem, decompositions, deadline, listener)
     schedule = batches(
-        problem, decompositions, deadline, listener, search.record.note_lattice
+        problem, decompositions, deadline, listener, search.record.report_dead_end
     )
     search.run(itertools.islice(schedule, most))
     best = search.record.best
@@ -167,21 +167,19 @@ class _Search:
     @property
     def _latest(self) -> Deadline:
         """When the last work ends: later while nothing is verified."""
-        return (
-            self._deadline if self.record.content else self._deadline.extended(_GRACE)
-        )
+        return self._deadline if self.record.content else self._deadline.extend(_GRACE)
 
     def run(self, schedule: Iterable[Batch]) -> None:
         """Try batch after batch."""
         refused = False
         for batch in schedule:
-            if batch.last_resort and self.record.content:
+            if batch.fallback and self.record.content:
                 return
             if self._deadline.passed:
-                self.record.begin(0 if batch.last_resort else len(batch.starts))
+                self.record.begin(0 if batch.fallback else len(batch.starts))
                 self.record.interrupted = True
                 break
-            if batch.last_resort and not refused:
+            if batch.fallback and not refused:
                 refuse_what_is_out_of_reach(
                     self._decompositions, self.record.attempts, self._deadline
                 )
@@ -222,7 +220,7 @@ class _Search:
             for attempt in outcomes:
                 record.add(attempt)
         # In the last resort a motion that could not be verified gets another chance, with another solver.
-        return record.ranked(record.solved[known:], again=batch.last_resort)
+        return record.ranked(record.solved[known:], again=batch.fallback)
 
     def _finish(self, ranked: Sequence[Numbered], most: int) -> None:
         """Refine and verify attempts in the order of their end times while they may be the fastest."""
@@ -261,7 +259,7 @@ class _Search:
         """Verify the best attempts as they are until one gives a motion, where none is known."""
         over = Deadline(0.0)
         for number, attempt in sorted(
-            self.record.solved, key=lambda item: rounded(item[1].coarse)
+            self.record.solved, key=lambda item: round_end_time(item[1].coarse)
         )[:_LAST_CHANCES]:
             if self.record.best is not None:
                 return
@@ -271,13 +269,13 @@ class _Search:
 
 
 def _solved_in_time(
-    start: Start,
-    solve: Callable[[Start, Deadline, Listener], Attempt],
+    start: InitialGuess,
+    solve: Callable[[InitialGuess, Deadline, Listener], Candidate],
     deadline: Deadline,
     share: float,
     listener: Listener,
-) -> Attempt:
+) -> Candidate:
     """Solve from a start within its share of the time, s, unless the time is up."""
     if deadline.passed:
-        return Attempt.of(start, NOT_TRIED)
+        return Candidate.of(start, NOT_TRIED)
     return solve(start, deadline.within(share), listener)

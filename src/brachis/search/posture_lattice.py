@@ -248,7 +248,7 @@ class PostureLattice(Lattice):
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
         """List edges to the postures at the cells around the nodes, along self-motion."""
-        values, jacobian = self._newton.placed(before.q)
+        values, jacobian = self._newton.task_coordinates(before.q)
         null = null_spaces(jacobian)
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
         still = np.zeros((len(null), self._r))  # without self-motion

@@ -67,7 +67,9 @@ def each(
 
     made: Any = None
     try:
-        with interrupts.blocked():  # joblib would lose a press while its processes start, and they would die of it
+        with (
+            interrupts.block_in_children()
+        ):  # joblib would lose a press, and its processes die of it
             made = Parallel(n_jobs=jobs, backend="loky", return_as="generator")(
                 delayed(_apart)(function, item, *others) for item in given
             )
@@ -81,7 +83,7 @@ def each(
         ) from error
     finally:
         with (
-            interrupts.postponed(),
+            interrupts.defer(),
             warnings.catch_warnings(),
         ):  # that work is thrown away is meant
             warnings.simplefilter("ignore")

@@ -14,7 +14,7 @@ import numpy as np
 
 from brachis.errors import UnreachableError, write_count
 from brachis.optimise.backends import SolveStatus
-from brachis.optimise.candidate import Attempt, coordinates
+from brachis.optimise.candidate import Candidate, coordinates
 from brachis.problem.problem import Decomposition
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.too_fast import TooFast
@@ -32,7 +32,7 @@ _SAME_MOTION = 0.1  # rad or m
 _GAIN_SLACK = 0.005
 """Better knots shorten a motion when it is finished; an attempt may gain this part more by them than any one so far."""
 
-Numbered = tuple[int, Attempt]
+Numbered = tuple[int, Candidate]
 """Index among the attempts, and the attempt as it was when it was solved."""
 
 
@@ -47,16 +47,16 @@ class Record:
 
     def __init__(self, *, refined: bool) -> None:
         self._refined = refined
-        self.attempts: list[Attempt] = []
+        self.attempts: list[Candidate] = []
         self.dead_ends: dict[str, DeadEnd] = {}
-        self.best: Attempt | None = None
+        self.best: Candidate | None = None
         self.interrupted = False
         self.too_fast: TooFast | None = None
         self.solved: list[Numbered] = []
         self._unsolved = 0
         self._waiting: list[Numbered] = []
         self._left_out: dict[str, None] = {}
-        self._known: list[Attempt] = []
+        self._known: list[Candidate] = []
         self._gain = 1.0
 
     @property
@@ -64,7 +64,7 @@ class Record:
         """Whether a verified motion is known; without refinement any motion will do."""
         return self.best is not None and self._merit(self.best)[0] == -np.inf
 
-    def _merit(self, attempt: Attempt) -> tuple[float, float]:
+    def _merit(self, attempt: Candidate) -> tuple[float, float]:
         """By what finished attempts are compared: violation of a limit, -inf where it will do, and end time, s."""
         assert attempt.verification is not None
         will_do = attempt.verified or not self._refined
@@ -72,7 +72,7 @@ class Record:
             -np.inf if will_do else attempt.verification.worst_ratio - 1.0
         ), attempt.t_end
 
-    def note_lattice(
+    def report_dead_end(
         self, decomposition: Decomposition | None, dead_end: DeadEnd | None
     ) -> None:
         """Put down that a lattice has no joint path, or that there was no time for it; None: that of all postures."""
@@ -83,13 +83,13 @@ class Record:
             return
         self.dead_ends[name] = dead_end
         names = () if decomposition is None else decomposition.match.redundant_joints
-        self.attempts.append(Attempt(names, "", "lattice", "", np.inf, str(dead_end)))
+        self.attempts.append(Candidate(names, "", "lattice", "", np.inf, str(dead_end)))
 
     def begin(self, starts: int) -> None:
         """Put down that so many starts are about to be solved."""
         self._unsolved += starts
 
-    def add(self, attempt: Attempt) -> None:
+    def add(self, attempt: Candidate) -> None:
         """Put a solved attempt down."""
         if attempt.status == NOT_TRIED:
             self.interrupted = True
@@ -104,7 +104,7 @@ class Record:
         known = [] if again else self._known
         self._waiting = []
         for number, attempt in sorted(
-            solved, key=lambda item: (rounded(item[1].coarse), item[0])
+            solved, key=lambda item: (round_end_time(item[1].coarse), item[0])
         ):
             if any(_agree(attempt, other) for other in known):
                 self.attempts[number] = dataclasses.replace(attempt, status=SAME_MOTION)
@@ -113,7 +113,7 @@ class Record:
                 self._waiting.append((number, attempt))
         return list(self._waiting)
 
-    def may_win(self, attempt: Attempt) -> bool:
+    def may_win(self, attempt: Candidate) -> bool:
         """Tell whether an attempt may be faster than the best motion."""
         if self.best is None or not self.content:
             return True
@@ -133,7 +133,7 @@ class Record:
         dropped = {number for number, _ in solved}
         self._waiting = [item for item in self._waiting if item[0] not in dropped]
 
-    def finish(self, number: int, attempt: Attempt) -> None:
+    def finish(self, number: int, attempt: Candidate) -> None:
         """Put down what became of an attempt, and keep the best one."""
         self.drop([(number, attempt)])
         self.attempts[number] = attempt
@@ -162,9 +162,13 @@ class Record:
         over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)
         return f"the best motion so far takes {self.best.t_end:.4f} s, and exceeds a limit by {over:.2g} % (unverified)"
 
-    def undone(self) -> tuple[str, ...]:
+    def not_completed(self) -> tuple[str, ...]:
         """Say in plain words what was left undone."""
-        parts = [self.best.undone] if self.best is not None and self.best.undone else []
+        parts = (
+            [self.best.not_completed]
+            if self.best is not None and self.best.not_completed
+            else []
+        )
         if not self.interrupted:
             return tuple(parts)
         if self._left_out:
@@ -187,13 +191,13 @@ class Record:
             )
         return (*parts, "what search.effort asks for was not tried to its end")
 
-    def in_order(self) -> tuple[Attempt, ...]:
+    def in_order(self) -> tuple[Candidate, ...]:
         """All attempts, the fastest verified one first, without their programs."""
 
-        def rank(attempt: Attempt) -> tuple[float, ...]:
+        def rank(attempt: Candidate) -> tuple[float, ...]:
             return (
                 not attempt.verified,
-                *map(rounded, (attempt.t_end, attempt.coarse, attempt.estimate)),
+                *map(round_end_time, (attempt.t_end, attempt.coarse, attempt.estimate)),
             )
 
         return tuple(
@@ -201,12 +205,12 @@ class Record:
         )
 
 
-def rounded(time: float) -> float:
+def round_end_time(time: float) -> float:
     """Leave out the digits in which processes differ, so that these do not choose."""
     return float(f"{time:.6g}")
 
 
-def _agree(first: Attempt, second: Attempt) -> bool:
+def _agree(first: Candidate, second: Candidate) -> bool:
     """Tell whether an attempt is the same motion as another, and not faster."""
     same = (first.redundant_joints, first.branch) == (
         second.redundant_joints,

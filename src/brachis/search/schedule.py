@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.backends import solver_named
-from brachis.optimise.candidate import Start
+from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.chart_starts import chart_starts
@@ -44,13 +44,13 @@ class Batch:
         With the solvers that plan from them.
     refined : int
         How many of them are refined and verified at most once a motion is verified.
-    last_resort : bool
+    fallback : bool
         Whether it is tried only while no motion is verified.
     """
 
-    starts: tuple[Start, ...]
+    starts: tuple[InitialGuess, ...]
     refined: int
-    last_resort: bool = False
+    fallback: bool = False
 
 
 def batches(
@@ -88,7 +88,7 @@ def batches(
         yield from _in_charts(
             problem, decompositions, solvers, deadline, listener, note
         )
-        levels = tuple(dataclasses.replace(level, last_resort=True) for level in levels)
+        levels = tuple(dataclasses.replace(level, fallback=True) for level in levels)
     if decompositions:
         yield from _in_closed_forms(
             decompositions, levels, solvers, deadline, listener, note
@@ -101,7 +101,7 @@ def _timings(problem: Problem, solvers: Sequence[str]) -> Iterator[Batch]:
     check_holding([start])
     refuse_hopeless_speeds([start])
     for solver in solvers:
-        yield Batch((start.with_solver(solver),), 1, last_resort=solver != solvers[0])
+        yield Batch((start.with_solver(solver),), 1, fallback=solver != solvers[0])
 
 
 def _in_closed_forms(
@@ -114,13 +114,13 @@ def _in_closed_forms(
 ) -> Iterator[Batch]:
     """Yield batches of starts on the branches of closed forms."""
     task = decompositions[0].problem.task
-    known: list[Start] = []
+    known: list[InitialGuess] = []
     for level in levels:
-        if level.last_resort:
+        if level.fallback:
             yield Batch(
-                (), 0, last_resort=True
+                (), 0, fallback=True
             )  # the search may end here, before lattices are looked at
-        starts: list[Start] = []
+        starts: list[InitialGuess] = []
         rest = list(decompositions)
         while (
             rest and not starts
@@ -147,28 +147,28 @@ def _in_closed_forms(
                     for start in starts[first : first + _SIZE]
                 ),
                 level.refined,
-                level.last_resort,
+                level.fallback,
             )
     many = len(known) + len(STRATEGIES)
     tried = {(start.joint_map.redundant_joints, start.origin) for start in known}
     again = tuple(
         start.with_solver(solver) for start in known[:_SIZE] for solver in solvers[1:2]
     )
-    yield Batch(again, many, last_resort=True)
+    yield Batch(again, many, fallback=True)
     for decomposition in decompositions[: level.decompositions]:
         for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
             if (start.joint_map.redundant_joints, start.origin) not in tried:
                 yield Batch(
                     tuple(start.with_solver(solver) for solver in solvers[:2]),
                     many,
-                    last_resort=True,
+                    fallback=True,
                 )
     yield Batch(
         tuple(
             start.with_solver(solver) for solver in solvers[2:] for start in known[:2]
         ),
         many,
-        last_resort=True,
+        fallback=True,
     )
 
 
@@ -192,10 +192,10 @@ def _in_charts(
     note: Note,
 ) -> Iterator[Batch]:
     """Yield batches of starts in charts: level by level with the first solver, then with the others."""
-    known: list[Start] = []
+    known: list[InitialGuess] = []
     for level in SEARCH_LEVELS[problem.task.search.effort]:
-        if level.last_resort:
-            yield Batch((), 0, last_resort=True)
+        if level.fallback:
+            yield Batch((), 0, fallback=True)
         listener("looking for joint paths on the lattice of all postures")
         starts = chart_starts(
             problem, decompositions, level, deadline.part(_LATTICE_SHARE), listener
@@ -209,13 +209,13 @@ def _in_charts(
         yield Batch(
             tuple(start.with_solver(solvers[0]) for start in starts),
             level.refined,
-            level.last_resort,
+            level.fallback,
         )
     for solver in solvers[1:]:
         yield Batch(
             tuple(start.with_solver(solver) for start in known[:_SIZE]),
             len(known),
-            last_resort=True,
+            fallback=True,
         )
 
 
@@ -225,11 +225,11 @@ def _from_lattices(
     deadline: Deadline,
     listener: Listener,
     note: Note,
-) -> list[Start]:
+) -> list[InitialGuess]:
     """Take one start of every choice after the other, of each those with the least estimated times first."""
     search = decompositions[0].problem.task.search
     redundancy = max(1, len(decompositions[0].redundant))
-    ranked: list[tuple[int, float, int, Start]] = []
+    ranked: list[tuple[int, float, int, InitialGuess]] = []
     number = itertools.count()
     deadline = deadline.part(_LATTICE_SHARE)
     jobs = processes(search.jobs, deadline)
@@ -275,7 +275,7 @@ def _starts_of(
     seed: int,
     deadline: Deadline,
     listener: Listener,
-) -> list[Start] | DeadEnd:
+) -> list[InitialGuess] | DeadEnd:
     if deadline.passed:
         return []
     listener(f"looking for joint paths on the lattice of {decomposition.name}")

@@ -18,14 +18,14 @@ from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
 from brachis.optimise.backends import SolverOptions, solver_named
-from brachis.optimise.candidate import Start
+from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.program import Program
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem
-from brachis.search.phase_plane import first_point
+from brachis.search.phase_plane import initial_guess
 from brachis.search.processes import each, processes
-from brachis.search.solving import solved_in_chart
+from brachis.search.solving import solve_in_chart
 
 _INTERVALS = 12
 _DEGREE = 2
@@ -51,8 +51,8 @@ _SLOWER = 1.03
 
 
 def screened(
-    starts: Sequence[Start], most: int, deadline: Deadline, listener: Listener
-) -> list[Start]:
+    starts: Sequence[InitialGuess], most: int, deadline: Deadline, listener: Listener
+) -> list[InitialGuess]:
     """Choose the most promising of starts in charts.
 
     Parameters
@@ -73,7 +73,7 @@ def screened(
         return list(starts)
     jobs = processes(starts[0].problem.task.search.jobs, deadline)
     listener(f"solving quickly from {len(starts)} joint paths")
-    looked_at: list[Start] = []
+    looked_at: list[InitialGuess] = []
     with closing(
         each(_quickly, starts, deadline, jobs=jobs, listener=listener)
     ) as solved:
@@ -81,7 +81,7 @@ def screened(
             looked_at.append(start)
             if _met_again(looked_at, max(_OFTEN, most)):
                 break
-    kept: list[Start] = []
+    kept: list[InitialGuess] = []
     for start in sorted(looked_at, key=lambda start: start.estimate):
         ratio = start.estimate / kept[0].estimate if kept else 1.0
         alike = ratio <= _SAME_LEAST and len(kept) >= max(_ALIKE, most // 2)
@@ -95,7 +95,7 @@ def screened(
     return kept
 
 
-def _met_again(looked_at: Sequence[Start], often: int) -> bool:
+def _met_again(looked_at: Sequence[InitialGuess], often: int) -> bool:
     """Tell whether so many quick solves ended at the least end time that others are unlikely to end below it."""
     times = np.array(
         [start.estimate for start in looked_at if np.isfinite(start.estimate)]
@@ -103,7 +103,9 @@ def _met_again(looked_at: Sequence[Start], often: int) -> bool:
     return bool(np.sum(times <= _SAME_LEAST * times.min(initial=np.inf)) >= often)
 
 
-def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
+def _quickly(
+    start: InitialGuess, deadline: Deadline, _listener: Listener
+) -> InitialGuess:
     """Solve from a start over few knots; where that fails the start stays as it is, with an infinite estimate."""
     hopeless = dataclasses.replace(start, estimate=np.inf)
     if deadline.passed:
@@ -112,13 +114,11 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
     program = program_of(
         problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1)
     )
-    x = first_point(program, start)
+    x = initial_guess(program, start)
     if x is None:
         return hopeless
     try:
-        program, reports = solved_in_chart(
-            problem, program, x, _solver(start, deadline)
-        )
+        program, reports = solve_in_chart(problem, program, x, _solver(start, deadline))
     except ImportError:  # the backend is not installed: the plan says so
         return hopeless
     last = reports[-1]
@@ -149,7 +149,7 @@ def _roughly(problem: Problem) -> Problem:
     )
 
 
-def _solver(start: Start, deadline: Deadline) -> SolverSession:
+def _solver(start: InitialGuess, deadline: Deadline) -> SolverSession:
     """Make a session that solves roughly: an answer that nearly holds the limits will do."""
     curved = any(limit.guarantee.is_mean for limit in start.problem.limits)
     backend = solver_named(start.problem.task.solver.name, curved=curved)[0]
@@ -166,7 +166,7 @@ def _curves(program: Program, x: np.ndarray) -> np.ndarray:
     return motion.at(np.linspace(0.0, motion.t_end, _PLACES))[0]
 
 
-def _same(first: Start, second: Start) -> bool:
+def _same(first: InitialGuess, second: InitialGuess) -> bool:
     """Tell whether two starts that were solved are the same joint path, nearly."""
     if not np.isfinite([first.estimate, second.estimate]).all():
         return False

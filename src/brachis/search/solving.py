@@ -28,7 +28,7 @@ from brachis.kinematics import (
 )
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends import SolverReport, SolveStatus
-from brachis.optimise.guess import fitted, shortest_time
+from brachis.optimise.guess import fit_curves, shortest_time
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Solve
 from brachis.optimise.transcription import phase_in
@@ -153,7 +153,7 @@ _OUT_OF_TIME = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
 Solved = tuple[Program, tuple[SolverReport, ...]]
 
 
-def solved_in_chart(
+def solve_in_chart(
     problem: Problem, program: Program, x: np.ndarray, solve: Solve
 ) -> Solved:
     """Solve in a chart, and go on in one around the motion where that is needed.
@@ -273,7 +273,9 @@ def move_to_chart(
         s = state.y[:, 0]
         chart = chart_around(problem.task_map, problem.path, s, state.q, rows)
         other = Program([phase_in(problem, chart, phase.grid)])
-        fit = fitted(other.phases[0], motion.t_end, t_norm, chart.curves(s, state.q))
+        fit = fit_curves(
+            other.phases[0], motion.t_end, t_norm, chart.curves(s, state.q)
+        )
         return other, shortest_time(other, fit)
     except UnreachableError:
         return None
@@ -285,7 +287,7 @@ def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
     (phase,) = program.phases
     chart = phase.joint_map
     assert isinstance(chart, ChartMap)
-    return null_spaces(Newton(chart.task_map).placed(state.q)[1])
+    return null_spaces(Newton(chart.task_map).task_coordinates(state.q)[1])
 
 
 def _follows(program: Program, x: np.ndarray) -> bool:

@@ -21,7 +21,7 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import PathError
 from brachis.kinematics import ClosedFormMap, JointSpaceMap
 from brachis.limits import Limit
-from brachis.optimise.candidate import Start
+from brachis.optimise.candidate import InitialGuess
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
@@ -44,7 +44,7 @@ def lattice_starts(
     level: SearchLevel,
     seed: int,
     deadline: Deadline = NEVER,
-) -> list[Start] | DeadEnd:
+) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
 
     Parameters
@@ -89,14 +89,14 @@ def lattice_starts(
 
 def _start_along(
     decomposition: Decomposition, joint_path: JointPath, origin: str
-) -> Start:
+) -> InitialGuess:
     """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
     s = joint_path.s
     redundant = joint_path.q[:, list(decomposition.redundant)]
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
     places = fine_places(s)
     for pieces in PIECES:
-        stations = np.column_stack([places, smoothed(s, redundant, places, pieces)])
+        stations = np.column_stack([places, smooth(s, redundant, places, pieces)])
         q = joint_map.postures(stations)
         if np.isfinite(q).all() and _clear(joint_map, q):
             break
@@ -105,7 +105,7 @@ def _start_along(
         stations = np.column_stack([s, redundant])
         q = joint_path.q
     estimate = least_time(decomposition.problem.limits, places, q)
-    return Start(
+    return InitialGuess(
         decomposition.problem,
         joint_map,
         stations,
@@ -120,7 +120,7 @@ def fine_places(s: np.ndarray) -> np.ndarray:
     return np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
 
 
-def smoothed(
+def smooth(
     s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int
 ) -> np.ndarray:
     """Least-squares cubic splines through values (S, r), nearly exact at both ends, at the places `fine`."""
@@ -145,7 +145,7 @@ def _clear(joint_map: ClosedFormMap, q: np.ndarray) -> bool:
 
 def numeric_starts(
     decomposition: Decomposition, most: int, deadline: Deadline
-) -> list[Start]:
+) -> list[InitialGuess]:
     """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
 
     Parameters
@@ -165,7 +165,7 @@ def numeric_starts(
     joint_map = decomposition.joint_map(start, decomposition.branches[0])
     joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
     return [
-        Start(
+        InitialGuess(
             decomposition.problem,
             joint_map,
             joint_path,
@@ -182,7 +182,7 @@ _SIZES = 4
 """Standard deviation of the largest waves, in turns, and how many sizes there are, each half the one before."""
 
 
-def varied(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[JointPath]:
+def perturb(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[JointPath]:
     """Displace joint paths, one after the other and over again, by waves at random.
 
     Parameters
@@ -235,7 +235,7 @@ FAMILY = "path of joints"
 _STATIONS = 401
 
 
-def joint_space_start(problem: Problem) -> Start:
+def joint_space_start(problem: Problem) -> InitialGuess:
     """Time the path in the phase plane, and start from there.
 
     Parameters
@@ -265,10 +265,10 @@ def joint_space_start(problem: Problem) -> Start:
             )
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if times is None:
-        return Start(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
+        return InitialGuess(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
     estimate = float(times[-1])
     timed = np.interp(s * estimate, times, s)[:, None]
-    return Start(problem, joint_map, timed, estimate, FAMILY, FAMILY, timed=True)
+    return InitialGuess(problem, joint_map, timed, estimate, FAMILY, FAMILY, timed=True)
 
 
 def _refuse_beyond(

@@ -24,7 +24,7 @@ import numpy as np
 from brachis.errors import PlanningError, Remedy, UnreachableError
 from brachis.limits import JointMotion, Limit, Moments
 from brachis.limits.tool import ToolSpeed
-from brachis.optimise.candidate import Attempt, Start
+from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.feasibility import in_figures
 from brachis.problem.problem import Problem
 from brachis.search.phase_plane import along, fastest, graded
@@ -60,7 +60,7 @@ class TooFast:
     error: PlanningError
 
 
-def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
+def refuse_hopeless_speeds(starts: Sequence[InitialGuess]) -> None:
     """Refuse speeds that are far out of reach along the joint paths of all starts.
 
     Raises
@@ -79,7 +79,7 @@ def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
         raise found.error
 
 
-def _is_bound(start: Start) -> bool:
+def _is_bound(start: InitialGuess) -> bool:
     """Tell whether the phase plane bounds the speed: no other joint path is there, and no friction helps to brake."""
     robot = start.problem.robot
     rubs = (robot.friction.viscous + robot.friction.coulomb > 0.0) & np.isfinite(
@@ -89,7 +89,7 @@ def _is_bound(start: Start) -> bool:
 
 
 def out_of_reach(
-    attempts: Sequence[Attempt], solve: Callable[[Start], Attempt]
+    attempts: Sequence[Candidate], solve: Callable[[InitialGuess], Candidate]
 ) -> TooFast | None:
     """Tell which least speed no attempt could hold, by a plan without it from the start of the most promising one.
 
@@ -142,7 +142,7 @@ def _others(problem: Problem) -> Iterator[Limit]:
     return (limit for limit in problem.limits if limit.longer_time != "violates")
 
 
-def _in_phase_plane(start: Start) -> TooFast | None:
+def _in_phase_plane(start: InitialGuess) -> TooFast | None:
     """Tell which speed no motion along the start's joint path has; None where all are possible, or none is asked."""
     problem = start.problem
     rates = start.problem.end_rates
@@ -224,7 +224,7 @@ def _ends_too_fast(
 
 
 def _falling_short(
-    start: Start, motion: JointMotion, how: str, s: np.ndarray, q: np.ndarray
+    start: InitialGuess, motion: JointMotion, how: str, s: np.ndarray, q: np.ndarray
 ) -> TooFast | None:
     """Tell where a motion, whose places ascend, falls short of a least speed most; None where it does not.
 

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, TypeVar
 
 from pydantic import ValidationError
 
-from brachis.common.arguments import named
+from brachis.common.arguments import check_keywords
 from brachis.task.fields import Model, plain
 from brachis.task.fitted import Wanted, segments_along
 from brachis.task.limit_models import Array
@@ -44,7 +44,7 @@ Point = float | Array | Sequence[float]
 Orientation = OrientationMode | dict[str, Any]
 
 
-@named
+@check_keywords
 def Line(  # noqa: N802
     *,
     to: Point | Transform | None = None,
@@ -99,7 +99,7 @@ def Line(  # noqa: N802
     )
 
 
-@named
+@check_keywords
 def Arc(  # noqa: N802
     *,
     center: Point | None = None,
@@ -150,7 +150,7 @@ def Arc(  # noqa: N802
     return _segment(ArcSegment, "arc", blend, orientation, **shape)
 
 
-@named
+@check_keywords
 def Circle(  # noqa: N802
     center: Point,
     *,
@@ -194,7 +194,7 @@ def Circle(  # noqa: N802
     )
 
 
-@named
+@check_keywords
 def Helix(  # noqa: N802
     center: Point,
     *,
@@ -242,7 +242,7 @@ def Helix(  # noqa: N802
     )
 
 
-@named
+@check_keywords
 def Spline(  # noqa: N802
     through: Array | Sequence[Point | Transform],
     *,

@@ -23,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from brachis.common.summary import shown
+from brachis.common.summary import show_value
 from brachis.errors import MissingAttributeError
 
 REFUSED = "brachis_refused"
@@ -83,7 +83,7 @@ class _Shown:
         return (
             repr(self._value)
             if isinstance(self._value, str | Model)
-            else shown(self._value)
+            else show_value(self._value)
         )
 
 

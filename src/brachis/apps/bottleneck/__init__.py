@@ -23,9 +23,9 @@ from brachis.apps.bottleneck.report import BottleneckReport, report, solved_agai
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
     THRESHOLD,
+    ActiveInterval,
     LimitRatios,
     Saturation,
-    Stretch,
     limit_ratios,
     saturations,
 )
@@ -39,6 +39,7 @@ from brachis.apps.bottleneck.sensitivities import (
 __all__ = [
     "RIPPLE",
     "THRESHOLD",
+    "ActiveInterval",
     "BottleneckReport",
     "BranchBoundary",
     "CheckedSensitivity",
@@ -49,7 +50,6 @@ __all__ = [
     "Sensitivities",
     "Sensitivity",
     "SensitivityCheck",
-    "Stretch",
     "check_sensitivities",
     "find_reference",
     "knot_cost",

@@ -207,7 +207,7 @@ def _check_limits(
         if abs(entry.change(step)) <= _NO_CHANGE * t_end(base):
             checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
         else:
-            raised = program.relaxed(entry.limit, entry.bound, step * entry.bound.whole)
+            raised = program.relax(entry.limit, entry.bound, step * entry.bound.whole)
             checked.append(_compare(entry, entry.change(step), program, raised, base))
     return SensitivityCheck(
         step, t_end(base), tuple(checked), time.perf_counter() - began

@@ -34,7 +34,7 @@ from brachis.optimise.backends import (
 )
 from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
-from brachis.optimise.guess import fitted, shortest_time, worst_time_scaling_ratio
+from brachis.optimise.guess import fit_curves, shortest_time, worst_time_scaling_ratio
 from brachis.optimise.phase import Motion, Phase
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Refined, RefinementOptions, Solve, refine
@@ -196,7 +196,7 @@ def _plan_on_mesh(
     program = Program([phase])
     t_norm = np.linspace(0.0, 1.0, 4 * len(phase.knots))
     try:
-        x = fitted(phase, motion.t_end, t_norm, motion.at(t_norm * motion.t_end)[0])
+        x = fit_curves(phase, motion.t_end, t_norm, motion.at(t_norm * motion.t_end)[0])
         if worst_time_scaling_ratio(program, x) > _AS_GOOD:
             x = shortest_time(program, x)
     except UnreachableError:

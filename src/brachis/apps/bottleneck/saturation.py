@@ -108,7 +108,7 @@ RIPPLE = 0.95
 
 
 @dataclass(frozen=True)
-class Stretch:
+class ActiveInterval:
     """A stretch of time on which a limit is active, ripple included.
 
     Attributes
@@ -143,7 +143,7 @@ class Saturation(Summary):
     label: Label
     share: float
     peak: float
-    active: tuple[Stretch, ...]
+    active: tuple[ActiveInterval, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -195,7 +195,7 @@ def saturations_of(
     found = []
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [
-            Stretch(begin, end, side)
+            ActiveInterval(begin, end, side)
             for side, sign in (("lower", -1.0), ("upper", 1.0))
             for begin, end in _stretches(ratios.t, sign * column, threshold, ripple)
         ]

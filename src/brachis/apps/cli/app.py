@@ -98,7 +98,7 @@ class _Commands(TyperGroup):
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
         """Run a command, its imports included; however it ends, a press that nobody heard ends it."""
         try:
-            with interrupts.heard():
+            with interrupts.interruptible():
                 return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
             message = "; ".join(filter(None, ("interrupted", str(interrupt))))

@@ -79,7 +79,7 @@ def inspect(
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis import ik
         from brachis.apps.cli.settings import task_space_of, urdf_of
         from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
@@ -99,7 +99,7 @@ def inspect(
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
     if space is None:
-        space = ik.natural_space(robot)
+        space = ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
     robot, task_map = bind(robot, space)

@@ -49,7 +49,7 @@ def verify(
     json: Json = False,
 ) -> None:
     """Check a saved motion again: path, limits, ends."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.cli.settings import motion_file
         from brachis.robot.from_task import robot_from_settings
         from brachis.trajectory import Trajectory
@@ -110,7 +110,7 @@ def export(
     ] = 1.0,
 ) -> None:
     """Sample a saved motion for a controller, or animate it."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps import export as formats
     result, trajectory = _load(result)
     settings = formats.format_of(out, form)
@@ -142,7 +142,7 @@ def plot(
     ] = "overview",
 ) -> None:
     """Draw a saved motion."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.plots import PLOTS, SUFFIXES, check_suffix, save_figure
     if kind not in PLOTS:
         raise UnknownNameError("figure", kind, PLOTS, where="--kind")
@@ -174,7 +174,7 @@ def report(
     degrees: Degrees = False,
 ) -> None:
     """Write a saved motion as one HTML page to judge it by."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.report import make_report
     result, trajectory = _load(result)
     out = result.with_suffix(".html") if out is None else out
@@ -192,7 +192,7 @@ def report(
 
 def _load(result: Path) -> tuple[Path, Trajectory]:
     """Load a motion from its file or folder; returns the file too."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.cli.settings import motion_file
         from brachis.trajectory import Trajectory
     result = motion_file(result)
@@ -246,7 +246,7 @@ def view(
 
     Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
     """
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.verify import verify_trajectory
     path, trajectory = _load(result)
     show(
@@ -276,7 +276,7 @@ def show(
     viewer = Viewer(
         trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port
     )
-    with viewer, interrupts.expected():
+    with viewer, interrupts.end_on_interrupt():
         if not viewer.local:
             print_error(
                 f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone"
@@ -311,7 +311,7 @@ def schema(
     ] = "task",
 ) -> None:
     """Print the JSON schema of tasks, or of exported JSON."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.export import samples_schema
         from brachis.task import json_schema
     schemas = {"task": json_schema, "trajectory": samples_schema}

@@ -81,7 +81,7 @@ def plan(
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis import planner
         from brachis.apps.cli.motions import show
         from brachis.apps.cli.settings import changed_task, urdf_of
@@ -106,7 +106,7 @@ def plan(
         print_json(data)
     else:
         _print_plan(result, data, degrees=degrees)
-    print_what_was_left(result.undone, interrupted=result.interrupted)
+    print_what_was_left(result.not_completed, interrupted=result.interrupted)
     if not result.verified:
         print_error(
             "the motion found did not pass the verification; it is marked unverified"
@@ -247,7 +247,7 @@ def bottleneck(
 
     How much each of them costs, and when it is active, of a task that is planned for it or of a saved motion.
     """
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis import planner
         from brachis.apps import bottleneck as bottlenecks
         from brachis.apps.cli.settings import changed_task, motion_file, urdf_of
@@ -293,7 +293,7 @@ def bottleneck(
         for name in written.files:
             console.print(f"wrote {name}")
     if result is not None:
-        print_what_was_left(result.undone, interrupted=result.interrupted)
+        print_what_was_left(result.not_completed, interrupted=result.interrupted)
     if not verified:
         print_error(
             "the motion found did not pass the verification; what is said of it may not hold"

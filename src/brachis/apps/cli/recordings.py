@@ -121,7 +121,7 @@ def import_(
     json: Json = False,
 ) -> None:
     """Make a result of a motion that runs today."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.comparison import bound_ratios
         from brachis.verify import verify_trajectory
     trajectory = _load(csv, robot, task_space, angle, length, time, tolerance, noise)
@@ -178,7 +178,7 @@ def compare(
     json: Json = False,
 ) -> None:
     """Show a motion of today beside a plan along its path."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps import comparison
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (csv, robot))
@@ -196,7 +196,9 @@ def compare(
         print_json(data)
     else:
         _print_comparison(found, written.files)
-    print_what_was_left(found.result.undone, interrupted=found.result.interrupted)
+    print_what_was_left(
+        found.result.not_completed, interrupted=found.result.interrupted
+    )
     if not found.result.verified:
         print_error(
             "the motion found did not pass the verification; it is marked unverified"
@@ -215,7 +217,7 @@ def _load(
     noise: float | None,
 ) -> Trajectory:
     """Import a recorded motion."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.cli.settings import task_space_of
         from brachis.apps.recording import import_motion
     units = {"angle": angle, "length": length, "time": time}

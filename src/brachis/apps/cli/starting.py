@@ -28,7 +28,7 @@ from brachis.errors import InputError
 
 def list_robots(json: Json = False) -> None:
     """List the robots that come with brachis."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis import robots
     listed = [
         {
@@ -85,7 +85,7 @@ def new(
     It has a posture away from limits and singularities and a short line that can be reached from it, and it has been
     planned and verified.
     """
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.cli.settings import urdf_of
         from brachis.apps.starter import starter_task
     with writing_errors(out):
@@ -211,7 +211,7 @@ def compose(
 
     No figure of the axis is guessed.
     """
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps.cli.settings import urdf_of
         from brachis.apps.compose import Rail, on_rail
     rail = Rail(

@@ -58,7 +58,7 @@ def sweep(
     json: Json = False,
 ) -> None:
     """Plan a task many times, with its keys varied."""
-    with interrupts.postponed():
+    with interrupts.defer():
         from brachis.apps import sweeps
         from brachis.apps.plots import save_figure
         from brachis.apps.sweeps.pools import VERIFIED

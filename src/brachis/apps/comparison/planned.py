@@ -16,7 +16,7 @@ from brachis.apps.comparison.comparison import Comparison, bound_ratios
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import dense_samples
 from brachis.apps.recording import import_motion
-from brachis.common.arguments import check_callable, file_name, named
+from brachis.common.arguments import check_callable, check_keywords, file_name
 from brachis.common.progress import Listener
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
@@ -34,7 +34,7 @@ _FINER, _MOST = 3, 10_000
 """Times as many knot intervals, where a plan is slower than the motion given."""
 
 
-@named
+@check_keywords
 def compare(
     today: str | os.PathLike[str] | Trajectory,
     robot: str | os.PathLike[str] | Robot | Task | None = None,

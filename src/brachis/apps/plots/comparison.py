@@ -10,7 +10,7 @@ import numpy as np
 
 from brachis.apps.plots import style
 from brachis.errors import InputError
-from brachis.optimise.candidate import Attempt, coordinates
+from brachis.optimise.candidate import Candidate, coordinates
 from brachis.search.record import SAME_MOTION
 from brachis.trajectory import Trajectory, of_motion
 
@@ -215,7 +215,7 @@ _MARKS: dict[str, dict[str, Any]] = {
 }
 
 
-def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
+def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     """Plot the end times of candidates, one row for each choice of redundant joints and branch.
 
     Parameters
@@ -236,7 +236,7 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
         `candidates` is empty, or has other entries than candidates.
     """
     if not isinstance(candidates, Sequence) or not all(
-        isinstance(each, Attempt) for each in candidates
+        isinstance(each, Candidate) for each in candidates
     ):
         allowed = "the candidates of a result: result.candidates"
         raise InputError(
@@ -286,7 +286,7 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     return figure
 
 
-def _row(candidate: Attempt) -> str:
+def _row(candidate: Candidate) -> str:
     found = coordinates(candidate.redundant_joints, candidate.branch)
     joints = "no redundant joint" if found == "none" else found
     return (
@@ -296,13 +296,13 @@ def _row(candidate: Attempt) -> str:
     )
 
 
-def _time(candidate: Attempt, refining: float, edge: float) -> float:
+def _time(candidate: Candidate, refining: float, edge: float) -> float:
     """Return the refined end time, else what refining would make of the planned one, else the right edge."""
     times = (candidate.t_end, refining * candidate.coarse)
     return next((time for time in times if math.isfinite(time)), edge)
 
 
-def _kind(candidate: Attempt, *, first: bool) -> str:
+def _kind(candidate: Candidate, *, first: bool) -> str:
     if candidate.verified:
         return "fastest" if first else "refined"
     return (

@@ -18,7 +18,7 @@ import numpy as np
 from brachis import ik
 from brachis.apps.recording.nodes import Nodes, nodes_of
 from brachis.apps.recording.recording import Recording, Units, read_recording
-from brachis.common.arguments import file_name, named, numbers
+from brachis.common.arguments import check_keywords, file_name, numbers
 from brachis.common.arrays import freeze, with_like_signs
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
 from brachis.errors import InputError, PathError, TaskError
@@ -26,7 +26,7 @@ from brachis.path import Path, build_path
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace, Pose
-from brachis.robots import located
+from brachis.robots import locate
 from brachis.task import FitTolerance, Segment, Task, load_task
 from brachis.task.fitted import Wanted, segments_along
 from brachis.task.points.points import Points
@@ -64,7 +64,7 @@ class Followed:
         freeze(self, "s")
 
 
-def path_followed(
+def recover_path(
     task_map: TaskMap, q: np.ndarray, qdot: np.ndarray, t: np.ndarray, tolerance: float
 ) -> Followed:
     """Recover the path that a motion prescribes in a task space.
@@ -205,7 +205,7 @@ _BETWEEN = 4
 """Places at which every piece of the motion is looked at."""
 
 
-@named
+@check_keywords
 def import_motion(
     path: str | os.PathLike[str],
     robot: str | os.PathLike[str] | Robot | Task | None = None,
@@ -278,8 +278,10 @@ def import_motion(
             "a URDF file, the name of a robot (brachis.robots), a Robot, or a task file"
         )
         raise InputError("the robot is missing", where="robot", allowed=allowed)
-    made = robot_for(located(robot), (settings or load_task(_BLANK)).robot)  # type: ignore[arg-type]
-    space = task_space or (settings.task_space if settings else ik.natural_space(made))
+    made = robot_for(locate(robot), (settings or load_task(_BLANK)).robot)  # type: ignore[arg-type]
+    space = task_space or (
+        settings.task_space if settings else ik.default_task_space(made)
+    )
     recording = read_recording(path, made, _units(units))
     bound, task_map = bind(made, space)
     rolling = bound.n - made.n
@@ -292,7 +294,7 @@ def import_motion(
             @ deviation
         )
         tolerance = float(np.clip(_DIGITS * moved.max(), _TOLERANCE, LARGEST))
-    followed = path_followed(task_map, q, qdot, t, tolerance)
+    followed = recover_path(task_map, q, qdot, t, tolerance)
     if followed.miss > tolerance:
         found, allowed = f"{followed.miss:.3g} m or rad off", f"{tolerance:.3g}"
         hint = "Raise the tolerance"
@@ -355,7 +357,7 @@ def _units(given: Mapping[str, str] | None) -> Units:
         raise InputError(
             "wrong type", where="units", found=repr(given), allowed=allowed
         )
-    return named(Units, "units")(**dict(given or {}))
+    return check_keywords(Units, "units")(**dict(given or {}))
 
 
 def _deviation(
@@ -488,4 +490,4 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
     _, task_map = bind(trajectory.robot, JOINTS)
     nodes = Nodes(trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot, ())
     t, q, qdot = _densely(nodes)
-    return path_followed(task_map, q, qdot, t, trajectory.recovered.tolerance).segments
+    return recover_path(task_map, q, qdot, t, trajectory.recovered.tolerance).segments

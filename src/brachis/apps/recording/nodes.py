@@ -60,7 +60,7 @@ class Smoothed:
         return self.off <= _EXPLAINED
 
 
-def smoothed(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> Smoothed:
+def fit_rows(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> Smoothed:
     """Return a least-squares spline of the fewest intervals that explain the rows.
 
     Of its ends it takes the calmest ones that the rows allow: in motion, at rest, at rest without acceleration. Those
@@ -382,7 +382,7 @@ def _smoothed(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray
     for least in (_ROUNDED, _NOISY):
         rough = doubt > least
         if rough.any():
-            spline = smoothed(t, q[:, rough], deviation[rough])
+            spline = fit_rows(t, q[:, rough], deviation[rough])
             if spline.explains or least == _NOISY:
                 parts[:, :, rough] = spline.derivatives
                 break

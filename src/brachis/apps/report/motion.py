@@ -12,7 +12,7 @@ from brachis.apps.bottleneck.text import active_in_words
 from brachis.apps.plots.motion import dense_samples
 from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
-from brachis.optimise.candidate import Attempt
+from brachis.optimise.candidate import Candidate
 from brachis.problem.plausibility import of_robot, of_task
 from brachis.robot.plausibility import Remark
 from brachis.trajectory import Samples, Trajectory
@@ -39,7 +39,7 @@ class ReportedMotion:
         What holds the motion back, a sentence each.
     remarks : tuple of Remark
         What is implausible in robot and task.
-    left_undone : tuple of str
+    not_completed : tuple of str
         What the search did not complete.
     candidates : tuple of Attempt
         What the search looked at; none for a saved motion.
@@ -56,8 +56,8 @@ class ReportedMotion:
     saturations: tuple[Saturation, ...]
     held_back: tuple[str, ...]
     remarks: tuple[Remark, ...]
-    left_undone: tuple[str, ...]
-    candidates: tuple[Attempt, ...]
+    not_completed: tuple[str, ...]
+    candidates: tuple[Candidate, ...]
     planned: dict[str, str]
     degrees: bool
 
@@ -72,7 +72,7 @@ def reported_motion(
         trajectory = motion
         verification = verify_trajectory(motion)
         remarks = of_robot(motion.robot) + of_task(motion.task)
-        candidates: tuple[Attempt, ...] = ()
+        candidates: tuple[Candidate, ...] = ()
         planned = {}
     else:
         trajectory = motion.trajectory
@@ -90,7 +90,7 @@ def reported_motion(
             not_completed.append(
                 "the search was ended early: a faster motion may have been missed"
             )
-        not_completed += motion.undone
+        not_completed += motion.not_completed
     ratios = limit_ratios(trajectory, limits)
     saturations = saturations_of(ratios)
     return ReportedMotion(
@@ -101,7 +101,7 @@ def reported_motion(
         saturations=saturations,
         held_back=_held_back(motion, saturations, degrees=degrees),
         remarks=remarks,
-        left_undone=tuple(not_completed),
+        not_completed=tuple(not_completed),
         candidates=candidates,
         planned=planned,
         degrees=degrees,

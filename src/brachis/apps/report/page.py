@@ -123,7 +123,7 @@ def make_report(
         joints=tables.joint_rows(reported),
         held_back=reported.held_back,
         remarks=reported.remarks,
-        left_undone=reported.left_undone,
+        not_completed=reported.not_completed,
         identity=tables.identity(reported),
         kinds=kinds_of(reported.trajectory),
         pictures=list(_pictures(reported)),

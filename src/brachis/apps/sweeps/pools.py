@@ -102,7 +102,7 @@ def planned(plan: Plan) -> Outcome:
 def _facts(result: Result, wall_time: float) -> dict[str, Any]:
     remarks = [
         *map(str, result.warnings),
-        *(f"left undone: {each}" for each in result.undone),
+        *(f"left undone: {each}" for each in result.not_completed),
     ]
     return {
         "status": VERIFIED if result.verified else UNVERIFIED,
@@ -339,7 +339,7 @@ def in_processes(
     def submit(plan: Plan) -> Future[Outcome]:
         nonlocal processes
         with (
-            interrupts.blocked()
+            interrupts.block_in_children()
         ):  # processes are started here, which are not to hear Ctrl-C
             try:
                 return processes.submit(planned, plan)
@@ -350,7 +350,7 @@ def in_processes(
     try:
         yield from as_completed(plans, submit, lambda: AHEAD * jobs)
     finally:
-        with interrupts.postponed():
+        with interrupts.defer():
             processes.shutdown(wait=True, kill_workers=True)
 
 

@@ -138,7 +138,7 @@ def _sweep(
                 found[plan.digest] = store.write(plan.digest, outcome)
                 progress.tell()
     except KeyboardInterrupt as interrupt:
-        interrupts.forget()
+        interrupts.clear()
         told = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"
         raise KeyboardInterrupt(told) from interrupt
     return _result(planned, store, found)

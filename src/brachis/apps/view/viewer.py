@@ -125,7 +125,7 @@ class Viewer:
 
     def wait(self) -> None:
         """Wait until Ctrl-C, then stop."""
-        with interrupts.expected():
+        with interrupts.end_on_interrupt():
             while not self._stopped.wait(0.5):
                 interrupts.check()
         self.stop()

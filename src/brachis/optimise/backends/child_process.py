@@ -87,7 +87,7 @@ def _solve_apart(
     )
     try:
         with (
-            interrupts.blocked(),
+            interrupts.block_in_children(),
             warnings.catch_warnings(),
         ):  # the fork touches nothing that threads may hold
             warnings.filterwarnings(

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from brachis.common.interrupts import Presses
+from brachis.common.interrupts import SigintHandler
 from brachis.errors import UnreachableError
 from brachis.optimise.backends.protocol import (
     Problem,
@@ -68,7 +68,7 @@ class Watch:
             self._during = signal.SIG_IGN if ignored else self._keep_interrupt
             self._handler = signal.signal(signal.SIGINT, self._during)
             if (
-                isinstance(self._handler, Presses) and self._handler.pending
+                isinstance(self._handler, SigintHandler) and self._handler.pending
             ):  # it went unheard until now
                 self.interrupt = KeyboardInterrupt()
         return self
@@ -80,7 +80,7 @@ class Watch:
 
     def _keep_interrupt(self, _signal: int, _frame: object) -> None:
         self.interrupt = KeyboardInterrupt()
-        if isinstance(self._handler, Presses):
+        if isinstance(self._handler, SigintHandler):
             self._handler.remember()
 
     @property
