@@ -43,7 +43,13 @@ def save(
         arguments.remove("--save")
         write(
             Path(script).stem,
-            " ".join(["python", f"benchmarks/{Path(script).name}", *arguments]),
+            " ".join(
+                [
+                    "python",
+                    f"{Path(script).resolve().parent.name}/{Path(script).name}",
+                    *arguments,
+                ]
+            ),
             title,
             columns,
             rows,

@@ -307,7 +307,7 @@ def test_example_12(tmp_path):
 
 
 def test_published_figure_lies_between_16_and_17_intervals():
-    benchmark = load(ROOT / "benchmarks/published_figure.py")
+    benchmark = load(ROOT / "studies/published_figure.py")
     assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)
 
 

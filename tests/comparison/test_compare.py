@@ -28,7 +28,7 @@ def today_benchmark():
 
 
 def _load():
-    spec = importlib.util.spec_from_file_location("today", ROOT / "benchmarks/today.py")
+    spec = importlib.util.spec_from_file_location("today", ROOT / "studies/today.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules["today"] = module  # dataclasses look their module up
     spec.loader.exec_module(module)

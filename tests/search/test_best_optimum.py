@@ -1,6 +1,6 @@
 """Two of the paper's lines with everything left open: at the best optimum that random restarts find.
 
-All lines, with three times as many restarts: `benchmarks/scara_restarts.py`.
+All lines, with three times as many restarts: `studies/scara_restarts.py`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ RESTARTS = 4
 LINES_DEG = (180, 270)
 """One with two optima, and the one whose plans with different redundant joints differ most."""
 spec = importlib.util.spec_from_file_location(
-    "scara_restarts", ROOT / "benchmarks/scara_restarts.py"
+    "scara_restarts", ROOT / "studies/scara_restarts.py"
 )
 bench = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(bench)

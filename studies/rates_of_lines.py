@@ -7,14 +7,18 @@ understate the larger jerk at their ends, as a part of the limit: on average, an
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 
 import brachis
-from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+
+from committed import processor_time, save  # noqa: E402
+
 JERK, TORQUE_RATE = 12.0, 20.0
 """rad/s^3 and Nm/s, all joints."""
 

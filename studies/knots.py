@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
 from brachis import LimitSpec, Robot, plan
-from committed import save
 
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+
+from committed import save  # noqa: E402
+
 JOINTS = ("j1", "j2", "j3")
 SPLINES: dict[str, dict[str, Any]] = {
     **{f"{n} even intervals": {"intervals": n} for n in (8, 12, 16, 50, 100, 200)},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
 from brachis import LimitSpec, Robot, plan
@@ -33,6 +34,7 @@ def end_time(intervals: int) -> float:
 
 def main() -> None:
     """Print one line for every number of intervals."""
+    sys.path.append(str(ROOT / "benchmarks"))
     from committed import save
 
     rows = [

@@ -1,6 +1,6 @@
 """Seeded seams as CAM gives them, on the TX90L and its rail: read, fitted, planned and verified.
 
-Usage: python benchmarks/cam_seams.py [FIRST_SEED] [COUNT] [CORNER] [--save]
+Usage: python studies/cam_seams.py [FIRST_SEED] [COUNT] [CORNER] [--save]
 
 A seam has 1,000 to 50,000 points in mm along 0.6 to 1.4 m, which scatter by 0.005 to 0.05 mm, one to three corners of
 20 to 60 degrees, and orientations that turn by up to 20 degrees. The tolerance of positions is six times the scatter,
@@ -22,9 +22,12 @@ from scipy.spatial.transform import Rotation
 import brachis
 from brachis.path import path_of
 from brachis.robot import bind
-from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+
+from committed import processor_time, save  # noqa: E402
+
 ROBOT = ROOT / "robots/tx90l_rail/robot.urdf"
 MIDDLE = np.array([800.0, 0.0, 600.0])  # mm
 DOWN = Rotation.from_euler("xyz", [np.pi, 0.0, 0.0])

@@ -1,6 +1,6 @@
 """Seeded motions as they run today: pseudo-inverse joint paths, timed by toppra, beside plans along the same path.
 
-Usage: python benchmarks/today.py [--count 10] [--first 0] [--dt 0.002] [--write FILE]
+Usage: python studies/today.py [--count 10] [--first 0] [--dt 0.002] [--write FILE]
 
 Even seeds are planar arms of three joints, odd ones the KUKA iiwa 14. The tool goes along a line or an arc, carried by
 the pseudo-inverse of the Jacobian from a drawn posture; a quintic spline through its joint positions is timed by toppra
@@ -12,6 +12,7 @@ URDF's limits: examples/12_today.csv is that of --first 4 --dt 0.004.
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,9 +26,12 @@ import brachis
 from brachis.path import path_of
 from brachis.robot import TaskMap, bind, dynamics
 from brachis.robot.from_task import robot_from_settings
-from committed import processor_time
 
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+
+from committed import processor_time  # noqa: E402
+
 STATIONS, GRID, CORRECTIONS, BETWEEN, INSTANTS = 400, 1000, 4, 7, 20_001
 REACH, HELD, WELL = 0.8, 0.6, 0.15
 """Parts of the joint ranges and of the torques that gravity takes; least singular value of the Jacobian."""

@@ -1,4 +1,4 @@
-"""Time that a plan takes from a known motion and from scratch, with ``python benchmarks/known_motions.py``.
+"""Time that a plan takes from a known motion and from scratch, with ``python studies/known_motions.py``.
 
 Processor time, so that it matters little what else the machine does. The motion known is that of the task itself; what
 is planned has the changes that the rows name.
@@ -6,13 +6,17 @@ is planned has the changes that the rows name.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import brachis
-from committed import processor_time
 
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+
+from committed import processor_time  # noqa: E402
+
 TASKS = {
     "planar arm": "01_scara_line.yaml",
     "TX90L on its rail": "03_tx90l_rail_line.yaml",

@@ -1,6 +1,6 @@
 """The paper's lines with everything left open, beside random restarts of every choice of the redundant joint.
 
-Usage: python benchmarks/scara_restarts.py [--restarts 12]
+Usage: python studies/scara_restarts.py [--restarts 12]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A constant process speed on the gantry against the analytic optimum.
 
-Usage: python benchmarks/process_speeds.py [--intervals auto] [--speeds 1.0 0.3 0.1]
+Usage: python studies/process_speeds.py [--intervals auto] [--speeds 1.0 0.3 0.1]
 
 The gantry's tool goes 1.2 m along x from rest to rest, by at most 200 N on 25 kg; between a quarter and three quarters
 of the way its speed stays within 1 % of a given one. At the optimum full force accelerates and brakes on the way to
@@ -10,12 +10,16 @@ that part and from it, and the highest speed allowed is kept in between.
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import brachis
-from committed import processor_time
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+
+from committed import processor_time  # noqa: E402
+
 LENGTH, BEGIN, END, ACCELERATION = 1.2, 0.25, 0.75, 200.0 / 25.0
 TOLERANCE = 0.01
 
