@@ -7,6 +7,7 @@
     python3 tasks.py docs        build the documentation into out/site, run its cells, check its links
     python3 tasks.py check       test, lint, types and docs
     python3 tasks.py bench       timings (minutes)
+    python3 tasks.py size        how large and how dense the package is
 
 Arguments after the task's name go to the command. Only the standard library is needed to run this file.
 """
@@ -31,6 +32,7 @@ INSTALL = {
     "types": ".[lint]",
     "bench": ".[benchmark]",
     "docs": ".[docs]",
+    "size": ".[all]",
 }
 COMMANDS = {
     "demo": [["brachis", "plan", "examples/01_scara_line.yaml", "--out", "out"]],
@@ -41,6 +43,7 @@ COMMANDS = {
         ["python", "-m", "pytest", "benchmarks", "-p", "no:xdist"],
         ["python", "benchmarks/growth.py"],
     ],
+    "size": [["python", "benchmarks/size.py"]],
     "docs": [
         [
             "python",
