@@ -29,8 +29,8 @@ from brachis.kinematics import (
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.guess import fit_curves, shortest_time
+from brachis.optimise.improve import Solve
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Solve
 from brachis.optimise.transcription import phase_in
 from brachis.problem.problem import Problem
 
