@@ -85,7 +85,7 @@ def with_points_at_violations(attempt: Candidate) -> Program | None:
     t_norm = np.array([check.time for check in failed]) / trajectory.t_end
     near = t_norm[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
     (phase,) = refined.program.phases
-    return refined.program.with_grid(
+    return refined.program.with_points(
         [np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))]
     )
 

@@ -123,7 +123,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     if deadline.passed:
         return _kept(fastest, "no time was left")
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
-    program = before.program.minimising(objective)
+    program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
     name = _FOR_MANY if program.variables > 150 else start.solver
     solve = _session(name, soon, listener, patience=5)
@@ -212,7 +212,7 @@ def least_acceleration(
         if speeds[own].any():
             weights[own] = 1.0 / speeds[own].max()
     longest = np.array([part[0] for _, part in program.split(x)]) * (1.0 + slower)
-    size = program.minimising(LeastAcceleration(weights, longest)).objective(x)
+    size = program.with_objective(LeastAcceleration(weights, longest)).objective(x)
     return LeastAcceleration(
         weights / np.sqrt(size) if size > 0.0 else weights, longest
     )

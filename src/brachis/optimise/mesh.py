@@ -94,7 +94,7 @@ def _over_level(solved: SolvedProgram, level: Program) -> tuple[Program, np.ndar
     finer = solved.program.with_phases(
         own.with_knots(fine.knots, fine.t_norm) for (own, _), fine in pairs
     )
-    motions = [own.motion(part).over(fine.knots) for (own, part), fine in pairs]
+    motions = [own.motion(part).with_knots(fine.knots) for (own, part), fine in pairs]
     return finer, finer.variables_from(motions)
 
 
@@ -233,7 +233,7 @@ def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.nd
 def _lost(phase: Phase, x: np.ndarray) -> np.ndarray:
     """Part of the duration that each interval loses, (N,): how far as many limits as there are curves swing."""
     breaks = phase.breaks
-    ratios = np.abs(phase.with_grid(spread(breaks, _SAMPLES)).time_scaling_ratios(x))
+    ratios = np.abs(phase.with_points(spread(breaks, _SAMPLES)).time_scaling_ratios(x))
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :].clip(max=1.0)
     within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[
         ::_SAMPLES
@@ -255,7 +255,7 @@ def _halved(
     )
     motions = zip(program.motions(x), finer.phases, strict=True)
     return finer, finer.variables_from(
-        [motion.over(phase.knots) for motion, phase in motions]
+        [motion.with_knots(phase.knots) for motion, phase in motions]
     )
 
 
@@ -318,7 +318,7 @@ def optimise_knots(
 
     def move_fix_and_refine(free: Program, x: np.ndarray) -> SolvedProgram:
         moved = solve(free, x)
-        fixed, start = free.frozen(moved.x)
+        fixed, start = free.fix_knots(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
         report = with_early_end_accepted(solve(fixed, start), free.end_time(x))
         refined = refine(fixed, report, solve, refinement)

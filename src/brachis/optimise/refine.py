@@ -24,7 +24,7 @@ from brachis.kinematics import JointState
 from brachis.optimise.backends import SolverReport
 from brachis.optimise.bspline import spread
 from brachis.optimise.improve import Solve, SolvedProgram
-from brachis.optimise.phase import Phase
+from brachis.optimise.phase import Phase, bisect
 from brachis.optimise.program import Program
 from brachis.robot import Friction
 
@@ -32,7 +32,6 @@ _LEVELS = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
 """Velocities, in widths of the friction, that are looked for: at 7 all but 2e-6 of it is there."""
 _NEAR_REVERSALS = 10.0
 """A velocity that turns within so many widths of zero is looked at as well."""
-_BISECTIONS = 40
 
 
 def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.ndarray:
@@ -72,29 +71,26 @@ def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.nd
     first = cubic[0, :, None] - _LEVELS
     last = cubic[-1, :, None] - _LEVELS
     which, level = np.nonzero(first * last < 0.0)
-    crossing = _place(cubic[:, which] - _LEVELS[level])
+    crossing = _root(cubic[:, which] - _LEVELS[level])
     slopes = np.diff(cubic, axis=0)
     turns = np.flatnonzero(
         (slopes[0] * slopes[-1] < 0.0) & (np.abs(cubic).min(axis=0) < _NEAR_REVERSALS)
     )
     which = np.append(which, turns)
-    u = np.append(crossing, _place(slopes[:, turns]))
+    u = np.append(crossing, _root(slopes[:, turns]))
     return np.unique(times[step[which]] + u * h[step[which], 0])
 
 
-def _place(c: np.ndarray) -> np.ndarray:
-    """Place in [0, 1] at which polynomials in Bernstein form, (m + 1, F), whose ends differ in sign are zero."""
-    low = np.zeros(c.shape[1])
-    high = np.ones(c.shape[1])
-    for _ in range(_BISECTIONS if c.size else 0):
-        middle = 0.5 * (low + high)
+def _root(c: np.ndarray) -> np.ndarray:
+    """Find where polynomials in Bernstein form on [0, 1], (m + 1, F), whose ends differ in sign are zero, (F,)."""
+
+    def is_before(u: np.ndarray) -> np.ndarray:
         value = c
         while len(value) > 1:  # de Casteljau
-            value = value[:-1] * (1.0 - middle) + value[1:] * middle
-        same = value[0] * c[0] > 0.0
-        low = np.where(same, middle, low)
-        high = np.where(same, high, middle)
-    return np.asarray(0.5 * (low + high))
+            value = value[:-1] * (1.0 - u) + value[1:] * u
+        return value[0] * c[0] > 0.0
+
+    return bisect(is_before, np.ones(c.shape[1]))
 
 
 _NEAR = 0.005
@@ -360,7 +356,7 @@ def refine(
     """
     if not first.status.usable:
         return SolvedProgram(program, (first,), violation=np.inf)
-    dense = program.with_grid(
+    dense = program.with_points(
         [dense_grid(phase, options.density) for phase in program.phases]
     )
     goal = options.tolerance * _GOAL
@@ -376,7 +372,7 @@ def refine(
                 program, tuple(reports), violation=remaining, time_scaled=factor
             )
         pairs = zip(program.phases, missing, strict=True)
-        finer = program.with_grid([merged(phase, extra) for phase, extra in pairs])
+        finer = program.with_points([merged(phase, extra) for phase, extra in pairs])
         is_same = finer.collocation_points == program.collocation_points
         if is_same or options.deadline.passed:
             break

@@ -128,7 +128,7 @@ def solve_without_third_order_limits(
     reports : tuple of SolverReport
         Of the solve without them.
     """
-    easier = program.up_to(_EASY)
+    easier = program.without_orders_above(_EASY)
     if len(easier.limits) == len(program.limits):
         return x, ()
     report = solve(easier.with_margin(margin), x)
