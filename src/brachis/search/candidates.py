@@ -13,8 +13,11 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.backends import SolveStatus, solver_named
-from brachis.optimise.candidate import Candidate, InitialGuess
-from brachis.optimise.completion import refine_and_verify
+from brachis.optimise.candidate import (
+    Candidate,
+    InitialGuess,
+    refine_and_verify,
+)
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.refine import RefinementOptions
