@@ -75,14 +75,11 @@ def starting_point(
 
 def _fast_enough(program: Program, x: np.ndarray) -> bool:
     """Tell whether no least speed is missed by much."""
-    of_phases = ((phase, phase.state(part)) for phase, part in program.split(x))
     missed = [
-        limit.violation(limit.values(state)).max()
-        for phase, state in of_phases
-        for limit in phase.limits
-        if limit.longer_time == "violates"
+        phase.evaluate(part).violation(lambda limit: limit.longer_time == "violates")
+        for phase, part in program.split(x)
     ]
-    return max(missed, default=0.0) <= _MISSED
+    return bool(max(own.max(initial=0.0) for own in missed) <= _MISSED)
 
 
 def _smoothed(

@@ -8,7 +8,7 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.boundary import Boundary
 from brachis.optimise.bspline import clamped_knots, spread
-from brachis.optimise.grid import FixedGrid, Grid
+from brachis.optimise.grid import FixedGrid
 from brachis.optimise.mesh import COARSE_INTERVALS
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
@@ -40,7 +40,7 @@ def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Pro
     return Program([phase_in(problem, joint_map, grid)])
 
 
-def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
+def phase_in(problem: Problem, joint_map: JointMap, grid: FixedGrid) -> Phase:
     """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid.
 
     Raises

@@ -13,8 +13,12 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.backends import SolveStatus, solver_named
-from brachis.optimise.candidate import Candidate, InitialGuess
-from brachis.optimise.completion import refine_and_verify
+from brachis.optimise.candidate import (
+    Candidate,
+    InitialGuess,
+    refine_and_verify,
+)
+from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.session import SolverSession
@@ -122,7 +126,8 @@ def finish_candidate(
         program, further = best_of_joints(start.problem, program, reports[-1], session)
         reports = (*reports[:-1], *further)
         target = program
-    adapted = adapt_mesh(program, reports, session, task.spline, options, target=target)
+    solved = SolvedProgram(program, reports)
+    adapted = adapt_mesh(solved, session, task.spline, options, target=target)
     attempt = dataclasses.replace(attempt, not_completed=adapted.not_completed)
     options = dataclasses.replace(options, deadline=deadline)
     session = dataclasses.replace(session, deadline=deadline)

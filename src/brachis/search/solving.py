@@ -29,8 +29,8 @@ from brachis.kinematics import (
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.guess import fit_curves, shortest_time
+from brachis.optimise.improve import Solve
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Solve
 from brachis.optimise.transcription import phase_in
 from brachis.problem.problem import Problem
 
@@ -128,7 +128,7 @@ def solve_without_third_order_limits(
     reports : tuple of SolverReport
         Of the solve without them.
     """
-    easier = program.up_to(_EASY)
+    easier = program.without_orders_above(_EASY)
     if len(easier.limits) == len(program.limits):
         return x, ()
     report = solve(easier.with_margin(margin), x)
