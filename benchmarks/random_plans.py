@@ -491,7 +491,7 @@ def _random_path(
 
 
 @functools.cache
-def _closed_forms(name: str) -> list[ik.Candidate]:
+def _closed_forms(name: str) -> list[ik.TriedDecomposition]:
     """Choices of redundant joints of a robot that have a closed form, whatever its limits."""
     robot = Robot.from_urdf(urdf_of(name), tool_frame=TOOLS.get(name))
     found = ik.find_all(robot, task_map_of(robot, SPACES.get(name, "pose")))

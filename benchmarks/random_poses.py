@@ -50,13 +50,13 @@ def robots() -> dict[str, Robot]:
     }
 
 
-def closed_forms(robot: Robot) -> list[ik.Candidate]:
+def closed_forms(robot: Robot) -> list[ik.TriedDecomposition]:
     """Choices of redundant joints that have a closed form for poses."""
     found = ik.find_all(robot, task_map_of(robot, "pose"))
     return [c for c in found if c.solver is not None]
 
 
-def room(joint_path: np.ndarray, candidate: ik.Candidate) -> float:
+def room(joint_path: np.ndarray, candidate: ik.TriedDecomposition) -> float:
     """Least branch margin along a joint path of postures (K, n), on the branch where it is largest."""
     solver = candidate.solver
     return max(
@@ -69,7 +69,7 @@ def random_tasks(
     robot: Robot,
     seed: int,
     count: int,
-    choices: Sequence[ik.Candidate],
+    choices: Sequence[ik.TriedDecomposition],
     *,
     in_turn: bool = False,
 ) -> Iterator[dict[str, object]]:

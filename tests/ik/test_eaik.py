@@ -19,7 +19,7 @@ from brachis.ik import (
     margin_gradient,
 )
 from brachis.ik.eaik import eaik, exact_axes
-from brachis.ik.idealised import PolishedSolver
+from brachis.ik.snapping import PolishedSolver
 from brachis.robot import task_map_of
 from support.closed_forms import wrapped
 from support.pose_arms import (
@@ -393,7 +393,7 @@ def test_only_the_compiled_part_of_eaik_is_loaded_and_that_when_needed():
 import sys
 import brachis.ik.eaik as answers
 assert not [name for name in sys.modules if name.startswith("eaik")]
-assert answers.installed()
+assert answers.is_installed()
 assert "eaik.pybindings.EAIK" in sys.modules
 print(sorted({"urchin", "trimesh", "pyglet", "eaik.IK_Robot"} & set(sys.modules)))
 """

@@ -11,8 +11,8 @@ import pytest
 
 import brachis
 from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
-from brachis.ik.factored_solver import RECIPES
-from brachis.ik.positioning import positioning
+from brachis.ik.point_recipes import RECIPES
+from brachis.ik.position_family import positioning
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndYaw
 from support.chains import Joint, chain_urdf
@@ -95,12 +95,12 @@ def test_every_recipe(name, arrangement):
 
 def test_every_recipe_is_tried():
     used = {
-        RECIPES.index(bench(screw_robot(base), (), 1).solver._structure.recipe)
+        RECIPES.index(bench(screw_robot(base), (), 1).solver.recipe)
         for base in BASES.values()
     }
     assert used == set(range(len(RECIPES)))
-    backwards = bench(screw_robot(BASES["cylinder"][::-1]), (), 1).solver._structure
-    assert backwards.joints.mirrored
+    backwards = bench(screw_robot(BASES["cylinder"][::-1]), (), 1).solver
+    assert backwards._joints.mirrored
 
 
 ARMS = {

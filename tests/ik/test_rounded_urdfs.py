@@ -17,8 +17,8 @@ import brachis
 from brachis.apps.cli.inspection import inspect
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, Family, check_answers, find, find_all
-from brachis.ik.idealised import PolishedSolver, snap_axes
-from brachis.ik.polish import Poses, polished
+from brachis.ik.newton import Newton
+from brachis.ik.snapping import PolishedSolver, snap_axes
 from brachis.robot import Robot, bind, task_map_of
 from support.arms import Arm, PoseBench, Y, tx90l
 from support.chains import Joint, chain_urdf
@@ -203,7 +203,7 @@ def test_ideal_arm(name):
     assert snap_axes(ideal.geometry, space) is None, "nothing is left to do"
     assert snap_axes(ChainGeometry.of(by_angles(ARMS[name], EXACT)), space) is None
     q = np.random.default_rng(2).uniform(-np.pi, np.pi, (200, robot.n))
-    given, made = geometry.posed(q), ideal.geometry.posed(q)
+    given, made = geometry.screws_at(q), ideal.geometry.screws_at(q)
     assert np.abs(given.tool_position - made.tool_position).max() < 2e-4
     assert np.abs(given.tool_rotation - made.tool_rotation).max() < 1e-4
     np.testing.assert_allclose(
@@ -338,19 +338,18 @@ def test_newton_goes_nowhere_but_to_the_answer_beside_its_start():
     robot = by_angles(ARMS["UR10"], EXACT)
     geometry, rng = ChainGeometry.of(robot), np.random.default_rng(6)
     q = rng.uniform(-2.0, 2.0, (100, 6))
-    goal = Poses.of_tool(geometry.posed(q))
-    near = polished(geometry, range(6), q + rng.uniform(-1e-4, 1e-4, q.shape), goal)
+    task_map = task_map_of(robot, "pose")
+    newton, goal = Newton(task_map), task_map.values(q)
+    near = newton.polish(goal, q + rng.uniform(-1e-4, 1e-4, q.shape), [])
     found = np.isfinite(near).all(axis=1)
     assert np.mean(found) > 0.9
     assert np.array_equal(found, np.isfinite(near).any(axis=1))
     assert np.abs(near - q)[found].max() < 1e-7
-    far = polished(geometry, range(6), q + rng.uniform(-1.0, 1.0, q.shape), goal)
+    far = newton.polish(goal, q + rng.uniform(-1.0, 1.0, q.shape), [])
     assert np.isnan(far).all(axis=1).mean() > 0.9
     straight = np.zeros((2, 6))
     straight[1] = q[0]
-    assert np.isnan(
-        polished(geometry, range(6), straight, goal[np.array([1, 0])])[0]
-    ).all(), "J is singular"
+    assert np.isnan(newton.polish(goal[[1, 0]], straight, [])[0]).all(), "J is singular"
 
 
 def xarm():

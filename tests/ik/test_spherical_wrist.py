@@ -55,7 +55,9 @@ def ortho_parallel(rng):
         Axis("R", axis, np.array(place, dtype=float))
         for axis, place in zip(directions, places, strict=True)
     ]
-    posed = ChainGeometry.of(screw_robot(axes)).posed(rng.uniform(-2.0, 2.0, (1, 7)))
+    posed = ChainGeometry.of(screw_robot(axes)).screws_at(
+        rng.uniform(-2.0, 2.0, (1, 7))
+    )
     moved = [
         Axis(
             a.letter,

@@ -203,7 +203,7 @@ def test_advice_names_what_was_kept_low():
 
 def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     """With another redundant joint the motion might go on."""
-    monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
+    monkeypatch.setattr("brachis.ik.eaik.is_installed", lambda: False)
     task = {
         "start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]},
         "task_space": "pose",

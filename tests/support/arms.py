@@ -210,7 +210,7 @@ class PoseBench:
 
     def poses(self, q: np.ndarray) -> np.ndarray:
         """Task coordinates (K, 12) by the product of exponentials."""
-        posed = self.geometry.posed(q)
+        posed = self.geometry.screws_at(q)
         return np.concatenate(
             [
                 posed.tool_position.T,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from brachis.ik import Candidate, Family, find, margin_gradient
+from brachis.ik import Family, TriedDecomposition, find, margin_gradient
 from brachis.robot import Robot, task_map_of
 
 
@@ -46,7 +46,7 @@ class Bench:
 
     def find(
         self, redundant: Sequence[int], families: Sequence[Family] = ()
-    ) -> Candidate:
+    ) -> TriedDecomposition:
         return find(
             self.robot,
             self.space,
@@ -66,7 +66,7 @@ class Bench:
         families: Sequence[Family] = (),
         *,
         distinct_roots: int,
-    ) -> Candidate:
+    ) -> TriedDecomposition:
         """Hold a closed form to its promises; `distinct_roots` is how many answers geometry allows."""
         candidate = self.find(redundant, families)
         solver, rest, q = candidate.solver, self.rest(redundant), self.q
@@ -113,7 +113,7 @@ class Bench:
         )
         return candidate
 
-    def check_margin_gradient(self, candidate: Candidate) -> None:
+    def check_margin_gradient(self, candidate: TriedDecomposition) -> None:
         """Compare the margins' derivatives by complex steps with central differences."""
         solver, q, h = candidate.solver, self.q[:40], 1e-6
         assert solver is not None

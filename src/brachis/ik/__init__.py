@@ -9,7 +9,6 @@ Examples
 ('planar', ('elbow_positive', 'elbow_negative'))
 """
 
-from brachis.ik.check import check_answers
 from brachis.ik.protocol import (
     Family,
     IKSolver,
@@ -20,8 +19,9 @@ from brachis.ik.protocol import (
 from brachis.ik.registry import (
     BUILTIN,
     NO_CLOSED_FORM,
-    Candidate,
     Match,
+    TriedDecomposition,
+    check_answers,
     default_task_space,
     find,
     find_all,
@@ -32,13 +32,13 @@ from brachis.ik.screws import ChainGeometry, PosedScrews
 __all__ = [
     "BUILTIN",
     "NO_CLOSED_FORM",
-    "Candidate",
     "ChainGeometry",
     "Family",
     "IKSolver",
     "Match",
     "NotApplicableError",
     "PosedScrews",
+    "TriedDecomposition",
     "check_answers",
     "default_task_space",
     "find",

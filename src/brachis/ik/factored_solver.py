@@ -1,51 +1,29 @@
 """What closed forms have in common that solve for one joint after the other, so that factors of det J_nr appear.
 
-Factors of det J_nr, whose signs tell the branches of a closed form apart.
-
-A closed form that solves for one joint after the other brings a component or a distance of a position to a given value
-in each step. The derivatives of these conditions, each with respect to its step's joint, are the factors of det J_nr,
-up to its sign: a step's two answers differ by the sign of its factor, and meet where it vanishes. Divided by their
-largest size the factors are the branch margins, so that a branch ends exactly where J_nr is singular.
+Each step brings a component or a distance of a position to a given value. The derivatives of these conditions, each
+with respect to its step's joint, are the factors of det J_nr, up to its sign: a step's two answers differ by the sign
+of its factor, and meet where it vanishes. Divided by their largest size the factors are the branch margins, so that a
+branch ends exactly where J_nr is singular.
 
 A step in which all joints slide has one answer; if its factor changes sign with the redundant joints, ``left`` and
 ``right`` are two branches of which one exists at a time.
-
-Which recipe of `placing` fits three joints, what its branches are called, and what it means if none fits.
-
-Words follow the senses of the joint axes. On an industrial arm whose axes 1, 2, 3 are z, y, y, and with these three
-joints left over to place a point (the wrist's centre, or the tool): ``front`` where it is on the side to which joint 1
-faces, ``up`` where joint 3 bends forwards.
 """
 
 from __future__ import annotations
 
 import itertools
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from brachis.ik import placing
-from brachis.ik.arm import (
-    Anchor,
-    Arm,
-    RemainingJoints,
-    aligned,
-    largest_determinant,
-    meeting,
-    perpendicular,
-    random_postures,
-)
+from brachis.ik.arm import Arm, RemainingJoints
+from brachis.ik.determinant_branches import largest_size
 from brachis.ik.protocol import IKSolver, NotApplicableError
-from brachis.ik.screws import ChainGeometry, PosedScrews
-from brachis.ik.vectors import wrap
-
-_VANISHES = 1e-9
-_LEFT = ("left", "right")
-_ALONE = "slides"
+from brachis.ik.screws import ChainGeometry, PosedScrews, Poses, Screw
+from brachis.ik.vectors import EXACT, wrap
 
 
 @dataclass(frozen=True)
@@ -58,443 +36,180 @@ class Factor:
         The factor (...), from the screws at postures; analytic in complex postures.
     vanishes : str
         What it means if the factor is zero everywhere, with letters in braces for the joints, and a point's name.
-    words : tuple of str
-        Of the branches with a positive and a negative factor.
+    labels : tuple of str
+        Parts of the labels of the branches with a positive and a negative factor.
     slides : tuple of int
         If all of these joints are prismatic, the step has one answer, and the redundant joints alone set the factor.
     """
 
     value: Callable[[Arm], np.ndarray]
     vanishes: str
-    words: tuple[str, str]
+    labels: tuple[str, str]
     slides: tuple[int, ...] = ()
 
-    def linear(self, joints: RemainingJoints) -> bool:
-        """Whether the step has one answer."""
-        return bool(self.slides) and not joints.revolute[list(self.slides)].any()
 
-
-def vanishing(factors: Iterable[Factor], postures: Arm) -> Factor | None:
-    """Return a factor that is zero at all postures, if there is one."""
-    return next(
-        (
-            factor
-            for factor in factors
-            if np.abs(factor.value(postures)).max() < _VANISHES
-        ),
-        None,
-    )
-
-
-class FactoredBranches:
-    """The branches that the signs of some factors make; each factor has a slot, one axis of the steps' answers.
-
-    Parameters
-    ----------
-    factors : sequence of Factor
-    joints : RemainingJoints
-    postures : Arm
-        Random ones, by which the factors' sizes and signs are told.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        A word for each factor that has both signs.
-    """
-
-    def __init__(
-        self, factors: Sequence[Factor], joints: RemainingJoints, postures: Arm
-    ) -> None:
-        self._factors = factors
-        self._joints = joints
-        values = [factor.value(postures) for factor in factors]
-        self._scales = [float(np.abs(value).max()) for value in values]
-        self._bounds = [
-            slot
-            for slot, value in enumerate(values)
-            if np.ptp(value) > _VANISHES * self._scales[slot]
-        ]
-        linear = [factor.linear(joints) for factor in factors]
-        self._signs = [
-            _signs(value, one_answer=one)
-            for value, one in zip(values, linear, strict=True)
-        ]
-        self._choices = list(itertools.product(*self._signs))
-        words = [
-            _LEFT if one else factor.words
-            for factor, one in zip(factors, linear, strict=True)
-        ]
-        named = [slot for slot in range(len(factors)) if len(self._signs[slot]) > 1]
-        # Linear steps of which either side exists, but not for the same redundant joints.
-        self._sided = [slot for slot in named if linear[slot]]
-        self.labels: tuple[str, ...] = tuple(
-            "_".join(words[slot][int(signs[slot] < 0.0)] for slot in named) or _ALONE
-            for signs in self._choices
-        )
-
-    def answers(self, values: Sequence[np.ndarray], held: Arm) -> np.ndarray:
-        """Arrange the steps' answers.
-
-        Parameters
-        ----------
-        values : sequence of (..., K) ndarray
-            Positions of the joints, in the order of `RemainingJoints`; the alternatives are axes before the samples.
-        held : Arm
-            While the joints are at zero.
-
-        Returns
-        -------
-        (K, B, J) ndarray
-            Chain order; NaN all through where one of an answer's joints is; angles in (-pi, pi].
-        """
-        joints = np.empty(
-            (len(values), *(len(signs) for signs in self._signs), values[-1].shape[-1])
-        )
-        for place, value in enumerate(values):
-            joints[place] = value
-        revolute = self._joints.revolute
-        turning = slice(None) if revolute.all() else revolute
-        joints[turning] = wrap(joints[turning])
-        joints += 0.0 * joints.sum(axis=0)
-        alternatives = range(len(self._factors) + 1)
-        for slot in self._sided:
-            side = np.expand_dims(
-                self._signs[slot], [axis for axis in alternatives if axis != slot]
-            )
-            joints = np.where(
-                side * self._factors[slot].value(held) > 0.0, joints, np.nan
-            )
-        ordered = joints[::-1] if self._joints.mirrored else joints
-        return ordered.reshape(len(values), len(self.labels), -1).T
-
-    def margins(self, postures: Arm, branch: int) -> np.ndarray:
-        """Compute the factors that are not constant, (K, k): positive within a branch; analytic."""
-        signs = self._choices[branch]
-        margins = [
-            self._factors[slot].value(postures) * (signs[slot] / self._scales[slot])
-            for slot in self._bounds
-        ]
-        return (
-            np.stack(margins, axis=1)
-            if margins
-            else np.zeros((postures.centre.shape[-1], 0), postures.centre.dtype)
-        )
-
-
-def _signs(values: np.ndarray, *, one_answer: bool) -> np.ndarray:
-    """Signs of a factor by which the branches of its step differ; its only one where nothing is to be told apart."""
-    if one_answer and np.all(values[0] * values > 0.0):
-        return np.sign(values[:1])
-    return np.array([1.0, -1.0])
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """A way to solve for three joints.
-
-    Attributes
-    ----------
-    fits : callable
-        Whether it applies to joints.
-    meets : tuple of int or None
-        Two joints whose axes meet in `Arm.meeting`.
-    solve : callable
-        Positions of a, b, c, with one or two answers along the alternatives `FRONT` and `UP`, from the screws while the
-        joints are at zero and the target of their centre; NaN where there is none.
-    factors : tuple of Factor
-        Of these two alternatives.
-    """
-
-    fits: Callable[[RemainingJoints], bool]
-    meets: tuple[int, int] | None
-    solve: Callable[[Arm, np.ndarray], placing.Values]
-    factors: tuple[Factor, Factor]
-
-
-def coplanar(joints: RemainingJoints, i: int, j: int) -> bool:
-    """Whether two joints move positions in planes of one and the same direction."""
-    if joints.revolute[i] and joints.revolute[j]:
-        return aligned(joints, i, j)
-    if joints.revolute[i] or joints.revolute[j]:
-        return perpendicular(joints, i, j)
-    return not aligned(joints, i, j)
-
-
-def meet(joints: RemainingJoints, i: int, j: int) -> bool:
-    """Whether the axes of two joints meet in a fixed point of one of them."""
-    return meeting(joints, i, j) is not None
-
-
-def on_cylinder(joints: RemainingJoints) -> bool:
-    """Whether the first joint slides along the second's axis, and the third's is perpendicular to it."""
-    return (
-        joints.revolute[:3].tolist() == [False, True, True]
-        and aligned(joints, 0, 1)
-        and perpendicular(joints, 1, 2)
-    )
-
-
-_FRONT = ("front", "back")
-_UP = ("up", "down")
-_OUT = "does not move {point} out of the plane in which"
-_AWAY = "does not change the distance between {point} and the point where the axes of"
-
-RECIPES = (
-    Recipe(
-        partial(coplanar, i=1, j=2),
-        None,
-        placing.plane_of_last,
-        (
-            Factor(
-                placing.out_of_last_factor,
-                f"{{a}} {_OUT} {{b}} and {{c}} do",
-                _FRONT,
-                (0,),
-            ),
-            Factor(
-                placing.within_last_factor,
-                "{b} and {c} move {point} along one line",
-                _UP,
-                (1, 2),
-            ),
-        ),
-    ),
-    Recipe(
-        partial(coplanar, i=0, j=1),
-        None,
-        placing.plane_of_first,
-        (
-            Factor(
-                placing.within_first_factor,
-                "{a} and {b} move {point} along one line",
-                _FRONT,
-                (0, 1),
-            ),
-            Factor(
-                placing.out_of_first_factor,
-                f"{{c}} {_OUT} {{a}} and {{b}} do",
-                _UP,
-                (2,),
-            ),
-        ),
-    ),
-    Recipe(
-        partial(meet, i=0, j=1),
-        (0, 1),
-        placing.meeting_of_first,
-        (
-            Factor(
-                placing.along_first_factor,
-                "{b} does not move {point} along the axis of {a}",
-                _FRONT,
-            ),
-            Factor(
-                placing.approach_of_last_factor,
-                f"{{c}} {_AWAY} {{a}} and {{b}} meet",
-                _UP,
-            ),
-        ),
-    ),
-    Recipe(
-        partial(meet, i=1, j=2),
-        (1, 2),
-        placing.meeting_of_last,
-        (
-            Factor(
-                placing.along_second_factor,
-                "{c} does not move {point} along the axis of {b}",
-                _FRONT,
-            ),
-            Factor(
-                placing.approach_of_first_factor,
-                f"{{a}} {_AWAY} {{b}} and {{c}} meet",
-                _UP,
-            ),
-        ),
-    ),
-    Recipe(
-        on_cylinder,
-        None,
-        placing.cylinder,
-        (
-            Factor(
-                placing.in_front_factor,
-                "{a} and {b} do not move {point} along the axis of {c}",
-                _FRONT,
-            ),
-            Factor(placing.to_front_factor, f"{{c}} {_OUT} {{a}} and {{b}} do", _UP),
-        ),
-    ),
-)
-
-
-def recipe_for(joints: RemainingJoints, point: str) -> tuple[Recipe, Anchor | None]:
-    """Find the recipe by which the first three joints place a point, and where two of their axes meet if it matters.
-
-    Raises
-    ------
-    NotApplicableError
-        None fits; says how the three lie to each other.
-    """
-    for recipe in RECIPES:
-        if recipe.fits(joints):
-            return recipe, meeting(joints, *recipe.meets) if recipe.meets else None
-    relations = f"{_relation(joints, 0, 1)}, and {_relation(joints, 1, 2)}"
-    raise NotApplicableError(
-        f"no closed form moves {point} by {', '.join(joints.names[:3])}: {relations}"
-    )
-
-
-def _relation(joints: RemainingJoints, i: int, j: int) -> str:
-    """How two neighbours lie to each other."""
-    first = joints.names[i]
-    second = joints.names[j]
-    if joints.revolute[i] and joints.revolute[j]:
-        if aligned(joints, i, j):
-            return f"the axes of {first} and {second} are parallel"
-        apart = "are not parallel and do not meet in a fixed point of one of them"
-        return f"the axes of {first} and {second} {'meet' if meet(joints, i, j) else apart}"
-    manner = (
-        "along"
-        if aligned(joints, i, j)
-        else "across"
-        if perpendicular(joints, i, j)
-        else "at an angle to"
-    )
-    if joints.revolute[i]:
-        first, second = second, first
-    return f"{first} slides {manner} the {'axis' if joints.revolute[[i, j]].any() else 'direction'} of {second}"
-
-
-@dataclass(frozen=True)
-class Structure(ABC):
-    """Joints, in one order or the other, and what they are to each other.
-
-    Attributes
-    ----------
-    joints : RemainingJoints
-    """
-
-    joints: RemainingJoints
-
-    @property
-    @abstractmethod
-    def factors(self) -> tuple[Factor, ...]:
-        """Factors of det J_nr, of the alternatives of the steps."""
-
-    @abstractmethod
-    def posed(self, posed: PosedScrews) -> Arm:
-        """Screws at postures, (3, K)."""
-
-    @abstractmethod
-    def words(self) -> dict[str, str]:
-        """Names of the joints, by their letters, and of the ``point`` that a, b, c place."""
-
-
-@dataclass(frozen=True)
-class PlacingStructure(Structure):
-    """Joints of which the first three place a point by a recipe.
-
-    Attributes
-    ----------
-    joints
-        See `Structure`.
-    recipe : Recipe
-    meeting : Anchor or None
-        See `Arm`.
-    """
-
-    recipe: Recipe
-    meeting: Anchor | None
-
-    @property
-    def factors(self) -> tuple[Factor, ...]:
-        """See `Structure.factors`."""
-        return self.recipe.factors
-
-
-J = TypeVar("J", bound=RemainingJoints)
-S = TypeVar("S", bound=Structure)
-
-
-class FactoredSolver(IKSolver, Generic[S]):
-    """Closed form that solves for one joint after the other, with branches told apart by factors of det J_nr.
+class FactoredSolver(IKSolver):
+    """Closed form that solves for one joint after the other; each step has an axis of the answers, its slot.
 
     Parameters
     ----------
     geometry : ChainGeometry
     redundant : tuple of int
-    structure : Structure
+    joints : RemainingJoints
+        In the order in which they are solved for.
+    factors : tuple of Factor
+        Of the steps.
     """
 
     def __init__(
-        self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: S
+        self,
+        geometry: ChainGeometry,
+        redundant: tuple[int, ...],
+        joints: RemainingJoints,
+        factors: tuple[Factor, ...],
     ) -> None:
         self._geometry = geometry
         self._redundant = redundant
-        self._structure = structure
-        postures = structure.posed(random_postures(geometry))
-        self._branches = FactoredBranches(structure.factors, structure.joints, postures)
-        self.branches: tuple[str, ...] = self._branches.labels
-
-    @abstractmethod
-    def steps(
-        self, targets: np.ndarray, q_r: np.ndarray
-    ) -> tuple[Arm, Sequence[np.ndarray]]:
-        """Return the arm while its joints are at zero, and their positions, with the alternatives before the samples.
-
-        A slide whose direction, beside a plane, depends on joints that are solved for before it has that direction.
-        """
-
-    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """See `IKSolver.solve`."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            held, values = self.steps(targets, q_r)
-            return self._branches.answers(values, held)[:, :, None]
-
-    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """See `IKSolver.branch_margins`: the factors of det J_nr that are not constant."""
-        return self._branches.margins(
-            self._structure.posed(self._geometry.posed(q)), branch
+        self._joints = joints
+        self._factors = factors
+        postures = self._arm_at(geometry.random_screws)
+        values = [factor.value(postures) for factor in factors]
+        self._scales = [float(np.abs(value).max()) for value in values]
+        self._varying = [
+            slot
+            for slot, value in enumerate(values)
+            if np.ptp(value) > EXACT * self._scales[slot]
+        ]
+        self._signs = []
+        self._sided = []
+        labels = []
+        for slot, (factor, value) in enumerate(zip(factors, values, strict=True)):
+            linear = bool(factor.slides) and not joints.revolute[[*factor.slides]].any()
+            if linear and np.all(value[0] * value > 0.0):
+                self._signs.append(np.sign(value[:1]))
+                labels.append([""])
+                continue
+            self._signs.append(np.array([1.0, -1.0]))
+            labels.append(["left", "right"] if linear else list(factor.labels))
+            if linear:
+                self._sided.append(slot)
+        self._choices = list(itertools.product(*self._signs))
+        self.branches: tuple[str, ...] = tuple(
+            "_".join(filter(None, parts)) or "slides"
+            for parts in itertools.product(*labels)
         )
 
+    @abstractmethod
+    def _arm(self, screws: tuple[Screw, ...], tool: np.ndarray) -> Arm:
+        """Put in the points that the joints' screws and the tool's position (3, ...) give."""
 
-def fitted(geometry: ChainGeometry, joints: J, fits: Sequence[Callable[[J], S]]) -> S:
-    """Fit a structure to joints.
+    @abstractmethod
+    def _names(self) -> dict[str, str]:
+        """Names of the joints, by the letters in `Factor.vanishes`, and of the ``point`` that a, b, c place."""
+
+    @abstractmethod
+    def _steps(
+        self, targets: np.ndarray, q_r: np.ndarray
+    ) -> tuple[Arm, Sequence[np.ndarray]]:
+        """Return the arm while its joints are at zero, and their positions, with the slots before the samples.
+
+        A slide whose direction depends on joints that are solved for before it has that direction.
+        """
+
+    def _arm_at(self, screws: PosedScrews) -> Arm:
+        return self._arm(self._joints.screws(screws), screws.tool_position)
+
+    def _displacement(
+        self, targets: np.ndarray, q_r: np.ndarray
+    ) -> tuple[tuple[Screw, ...], Poses]:
+        """State E_1 ... E_6 = D for poses, with the joints in the order in which they are solved for.
+
+        With redundant joints held at q_r and all others zero the tool is at M(q_r), and D = T M(q_r)^-1 for the target
+        T. E_i turns about, or slides along, the screw of the i-th joint as the held joints have placed it. In the
+        reverse order the equations are E_6^-1 ... E_1^-1 = D^-1. Redundant joints may stand anywhere in the chain.
+        """
+        screws = self._geometry.screws_with(self._redundant, q_r)
+        motion = Poses.of_targets(targets) @ Poses.of_tool(screws).inverse()
+        if self._joints.mirrored:
+            motion = motion.inverse()
+        spread = (..., None, None, None, slice(None))
+        return self._joints.screws(screws, 3), Poses(
+            motion.position[spread], motion.rotation[spread]
+        )
+
+    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """Arrange the steps' answers; angles in (-pi, pi]."""
+        revolute = self._joints.revolute
+        with np.errstate(invalid="ignore", divide="ignore"):
+            held, values = self._steps(targets, q_r)
+            slots = [len(signs) for signs in self._signs]
+            answers = np.empty((len(values), *slots, len(q_r)))
+            for place, value in enumerate(values):
+                answers[place] = value
+            turning = slice(None) if revolute.all() else revolute
+            answers[turning] = wrap(answers[turning])
+            answers += 0.0 * answers.sum(axis=0)
+            for slot in self._sided:
+                side = np.moveaxis(
+                    self._signs[slot].reshape(-1, *[1] * len(slots)), 0, slot
+                )
+                exists = side * self._factors[slot].value(held) > 0.0
+                answers = np.where(exists, answers, np.nan)
+        ordered = answers[::-1] if self._joints.mirrored else answers
+        return ordered.reshape(len(values), len(self.branches), -1).T[:, :, None]
+
+    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """Return the factors of det J_nr that are not constant, with the signs of the branch."""
+        arm = self._arm_at(self._geometry.screws_at(q))
+        margins = np.empty((len(q), len(self._varying)), arm.centre.dtype)
+        for column, slot in enumerate(self._varying):
+            size = self._choices[branch][slot] / self._scales[slot]
+            margins[:, column] = self._factors[slot].value(arm) * size
+        return margins
+
+    def reason_if_singular(self) -> str:
+        """Say which factor of det J_nr vanishes at all postures; empty if there is none."""
+        for factor, size in zip(self._factors, self._scales, strict=True):
+            if size < EXACT:
+                return f": {factor.vanishes.format(**self._names())}"
+        return ""
+
+
+S = TypeVar("S", bound=FactoredSolver)
+
+
+def fit(
+    geometry: ChainGeometry,
+    joints: RemainingJoints,
+    orders: Sequence[Callable[[], S]],
+) -> S:
+    """Return the first solver that fits.
 
     Parameters
     ----------
     geometry : ChainGeometry
     joints : RemainingJoints
-        From the base to the tool.
-    fits : sequence of callable
-        Each returns a structure of the joints, or raises `NotApplicableError`; the first that does is taken.
+    orders : sequence of callable
+        Each returns a solver, or raises `NotApplicableError`.
 
     Raises
     ------
     NotApplicableError
-        J_nr is singular everywhere, or no structure fits; says why.
+        J_nr is singular everywhere, or no solver fits; says why.
     """
-    structure = None
+    solver = None
     reasons = []
-    for fit in fits:
+    for order in orders:
         try:
-            structure = fit(joints)
+            solver = order()
+            break
         except NotApplicableError as reason:
             reasons.append(str(reason))
-        else:
-            break
-    posed = random_postures(geometry)
     try:
-        largest_determinant(posed, joints.joints)
+        largest_size(geometry.random_screws.determinant(joints.joints))
     except NotApplicableError as singular:
-        factor = structure and vanishing(structure.factors, structure.posed(posed))
-        meaning = (
-            f": {factor.vanishes.format(**structure.words())}"
-            if structure and factor
-            else ""
-        )
-        raise NotApplicableError(f"{singular}{meaning}") from None
-    if structure is None:
+        more = solver.reason_if_singular() if solver else ""
+        raise NotApplicableError(f"{singular}{more}") from None
+    if solver is None:
         raise NotApplicableError("; ".join(reasons))
-    return structure
+    return solver

@@ -1,6 +1,6 @@
 """Six joints of which three in succession have parallel axes: UR arms and their like, also on a rail.
 
-The joints are E_1 ... E_6 = D (`displacement`), the parallel axes b, c, d run along n, and what is left of D between
+The joints are E_1 ... E_6 = D (`FactoredSolver`), the parallel axes b, c, d run along n, and what is left of D between
 the joints before and after them is a planar motion G about n: it keeps n, and distances along n,
 
     G = E_pre^-1 D E_post^-1 = E_b E_c E_d,    R_pre n = R_D R_post^T n,    n . (G x - x) = 0.
@@ -36,24 +36,20 @@ the equation that has two solutions, so that the rising and the falling solution
 The case without a rail is in K. P. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms",
 2013, and in A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022,
 without an order of the solutions; the cases with a rail are ours.
-
-What the six joints around three parallel axes are to each other; see `parallel_axes` for the formulas.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.common.arrays import cross
-from brachis.ik.arm import Arm, PoseJoints
-from brachis.ik.displacement import Displacement
-from brachis.ik.factored_solver import Factor, FactoredSolver, Structure, fitted
-from brachis.ik.placing import within_plane
+from brachis.ik.arm import Arm, RemainingJoints
+from brachis.ik.factored_solver import Factor, FactoredSolver, fit
+from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
-from brachis.ik.screws import ChainGeometry, Circle, PosedScrews, Screw
+from brachis.ik.screws import ChainGeometry, Circle, Poses, Screw
 from brachis.ik.vectors import (
     angle_about,
     apply,
@@ -64,235 +60,184 @@ from brachis.ik.vectors import (
 )
 from brachis.robot import TaskMap
 
-_LAST_FIRST = {1: 4, 2: 5}
-"""Joints before the parallel ones, and the place of the first joint after them."""
+_SHOULDER = 0
+"""Slot of the shoulder's two answers, where there is a shoulder; then follow elbow and wrist."""
 
 
-@dataclass(frozen=True)
-class ParallelStructure(Structure):
-    """Roles of six joints, as places in their order.
+class ParallelAxesSolver(FactoredSolver):
+    """Closed form around three parallel axes; see the module's formulas.
 
-    Attributes
+    Parameters
     ----------
-    joints
-        See `Structure`.
-    first : int
-        Place of the first parallel joint, b; c and d follow it.
-    turn, slide : int or None
-        The revolute and the prismatic joint before them, a and p.
+    geometry : ChainGeometry
+    redundant : tuple of int
+    six : RemainingJoints
+        From the base to the tool.
+
+    Raises
+    ------
+    NotApplicableError
+        The joints have not this structure; says what is missing.
     """
 
-    first: int
-    turn: int | None
-    slide: int | None
-
-    @classmethod
-    def of(cls, six: PoseJoints) -> ParallelStructure:
-        """Find the roles, from the base to the tool or the other way round.
-
-        Raises
-        ------
-        NotApplicableError
-            The joints have not this structure; says what is missing.
-        """
-        triples = [
-            first for first in range(4) if six.parallel(first, first + 1, first + 2)
-        ]
+    def __init__(
+        self, geometry: ChainGeometry, redundant: tuple[int, ...], six: RemainingJoints
+    ) -> None:
+        triples = [i for i in range(4) if _are_parallel(six, i)]
         if not triples:
             raise NotApplicableError("no three successive joints have parallel axes")
-        found = [
-            structure
-            for order in (six, six.reversed())
-            for structure in _arrangements(order)
+        choices = [
+            (joints, first)
+            for joints in (six, six.reverse())
+            for first in (1, 2)
+            if _fits(joints, first)
         ]
-        if found:
-            return found[0]
-        names = ", ".join(six.names[triples[0] : triples[0] + 3])
-        raise NotApplicableError(
-            f"{names} are parallel, but the others are neither one joint before and two after whose axes meet, "
-            "nor a slide and a revolute joint before and one after, in this or the reverse order"
-        )
+        if not choices:
+            names = ", ".join(six.names[triples[0] : triples[0] + 3])
+            raise NotApplicableError(
+                f"{names} are parallel, but the others are neither one joint before and two after whose axes meet, "
+                "nor a slide and a revolute joint before and one after, in this or the reverse order"
+            )
+        joints, self._first = choices[0]
+        before = range(self._first)
+        self._turn = next((i for i in before if joints.revolute[i]), None)
+        self._slide = next((i for i in before if not joints.revolute[i]), None)
+        self._parallel = (self._first, self._first + 1, self._first + 2)
+        # The joint that spans the wrist's factor with the last one: e, or a where there is none.
+        self._beside = self._turn if self._first == 2 and self._turn is not None else 4
+        self._elbow = 0 if self._slide is not None else 1
+        super().__init__(geometry, redundant, joints, self._factors_of_steps())
 
-    @property
-    def factors(self) -> tuple[Factor, ...]:
-        """See `Structure.factors`; of the alternatives shoulder, elbow, wrist, or of elbow, wrist, rail."""
+    def _factors_of_steps(self) -> tuple[Factor, ...]:
+        """Return the factors of shoulder, elbow, wrist, or of elbow, wrist, rail."""
         elbow = Factor(
-            self._elbow, "the axes of two of {b}, {c}, {d} coincide", ("up", "down")
+            self._elbow_factor,
+            "the axes of two of {b}, {c}, {d} coincide",
+            ("up", "down"),
         )
         wrist = Factor(
-            self._wrist,
+            self._wrist_factor,
             "the axes of {x}, {f}, {b} always are parallel to one plane",
             ("noflip", "flip"),
         )
-        if self.slide is None:
+        if self._slide is None:
             way = "{a} does not move the point where the axes of {x} and {f} meet along the parallel axes"
-            return Factor(self._shoulder, way, ("front", "back")), elbow, wrist
-        rail = Factor(
-            self._rail,
-            "{p} never moves the arm along the parallel axes",
-            ("left", "right"),
-            (self.slide,),
-        )
+            shoulder = Factor(self._shoulder_factor, way, ("front", "back"))
+            return shoulder, elbow, wrist
+        way = "{p} never moves the arm along the parallel axes"
+        rail = Factor(self._rail_factor, way, ("left", "right"), (self._slide,))
         return elbow, wrist, rail
 
-    @property
-    def parallel(self) -> tuple[int, int, int]:
-        """Places of b, c and d."""
-        return self.first, self.first + 1, self.first + 2
-
-    @property
-    def elbow(self) -> int:
-        """Slot of the elbow; that of the wrist follows."""
-        return int(self.slide is None)
-
-    @property
-    def beside(self) -> int:
-        """Place of the joint that spans the wrist's factor with the last one: e, or a where there is none."""
-        return 4 if self.first == 1 or self.turn is None else self.turn
-
-    def words(self) -> dict[str, str]:
-        """See `Structure.words`; x is e or a."""
-        places = {"a": self.turn, "p": self.slide, "f": 5, "x": self.beside}
-        places |= zip("bcd", self.parallel, strict=True)
+    def _names(self) -> dict[str, str]:
+        places = {"a": self._turn, "p": self._slide, "f": 5, "x": self._beside}
+        places |= zip("bcd", self._parallel, strict=True)
         return {
-            letter: self.joints.names[place]
+            letter: self._joints.names[place]
             for letter, place in places.items()
             if place is not None
         }
 
-    def posed(self, posed: PosedScrews) -> Arm:
-        """See `Structure.posed`."""
-        return self.arm(self.joints.screws(posed))
-
-    def arm(self, screws: tuple[Screw, ...]) -> Arm:
+    def _arm(self, screws: tuple[Screw, ...], _tool: np.ndarray | None = None) -> Arm:
         """Put in P, as the centre."""
         e, f = screws[4:]
-        centre = (
-            meeting_point(e.axis, e.point, f.axis, f.point)
-            if self.first == 1
-            else f.point
-        )
+        centre = f.point
+        if self._first == 1:
+            centre = meeting_point(e.axis, e.point, f.axis, f.point)
         return Arm(screws, centre, centre)
 
-    def _shoulder(self, arm: Arm) -> np.ndarray:
+    def _shoulder_factor(self, arm: Arm) -> np.ndarray:
         """Velocity that a gives P along the parallel axes."""
-        return dot(
-            arm.screws[self.first].axis, arm.screws[self.turn or 0].velocity(arm.centre)
-        )
+        velocity = arm.screws[self._turn or 0].velocity(arm.centre)
+        return dot(arm.screws[self._first].axis, velocity)
 
-    def _elbow(self, arm: Arm) -> np.ndarray:
+    def _elbow_factor(self, arm: Arm) -> np.ndarray:
         """Velocity that c gives the axis of d away from that of b, times its distance."""
-        b, c, d = (arm.screws[place] for place in self.parallel)
+        b, c, d = (arm.screws[place] for place in self._parallel)
         return dot(d.point - b.point, c.velocity(d.point))
 
-    def _wrist(self, arm: Arm) -> np.ndarray:
+    def _wrist_factor(self, arm: Arm) -> np.ndarray:
         """Volume spanned by two axes and n."""
-        return dot(
-            cross(arm.screws[self.beside].axis, arm.screws[5].axis),
-            arm.screws[self.first].axis,
-        )
+        normal = cross(arm.screws[self._beside].axis, arm.screws[5].axis)
+        return dot(normal, arm.screws[self._first].axis)
 
-    def _rail(self, arm: Arm) -> np.ndarray:
+    def _rail_factor(self, arm: Arm) -> np.ndarray:
         """Velocity that p gives the arm along the parallel axes."""
-        return dot(arm.screws[self.first].axis, arm.screws[self.slide or 0].axis)
+        return dot(arm.screws[self._first].axis, arm.screws[self._slide or 0].axis)
 
-
-def _arrangements(six: PoseJoints) -> list[ParallelStructure]:
-    """All ways to see the structure in one order of the joints."""
-    structures = []
-    for first, one_after in _LAST_FIRST.items():
-        before = range(first)
-        after = range(one_after, 6)
-        turns = [place for place in before if six.revolute[place]]
-        slides = [place for place in before if not six.revolute[place]]
-        if (
-            not six.parallel(first, first + 1, first + 2)
-            or not six.revolute[list(after)].all()
-        ):
-            continue
-        if first == 1 and not six.meet(4, 5):
-            continue
-        if first == 2 and len(turns) != 1:
-            continue
-        turn = turns[0] if turns else None
-        slide = slides[0] if slides else None
-        structures.append(ParallelStructure(six, first, turn, slide))
-    return structures
-
-
-_SHOULDER = 0
-
-
-class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
-    """Closed form around three parallel axes; see the module's formulas."""
-
-    def steps(
+    def _steps(
         self, targets: np.ndarray, q_r: np.ndarray
     ) -> tuple[Arm, Sequence[np.ndarray]]:
-        """See `FactoredSolver.steps`."""
-        structure = self._structure
-        mirrored = structure.joints.mirrored
-        equation = Displacement.of(
-            self._geometry, self._redundant, targets, q_r, mirrored=mirrored
-        )
-        arm = structure.arm(equation.screws())
-        rotation = equation.rotation[:, :, None, None, None]
-        place = apply(rotation, arm.centre) + equation.translation[:, None, None, None]
-        values, angle, image = self._outer(arm, rotation, place)
-        a, b, c, d = (arm.screws[i] for i in (structure.turn or 0, *structure.parallel))
+        screws, motion = self._displacement(targets, q_r)
+        arm = self._arm(screws)
+        place = motion.move(arm.centre)
+        values, angle, image = self._solve_outer(arm, motion, place)
+        a, b, c, d = (screws[i] for i in (self._turn or 0, *self._parallel))
         place = a.inverse.orbit(place).at(angle)
         n = b.axis
-        slide = structure.slide
-        theta = angle_about(
-            n, arm.screws[structure.first + 3].axis, rotate(a.axis, -angle, image)
-        )
-        if slide is not None:
-            s = arm.screws[slide].axis
-            if slide < (structure.turn or 0):  # a turns its direction as well
+        following = screws[self._first + 3].axis
+        theta = angle_about(n, following, rotate(a.axis, -angle, image))
+        if self._slide is not None:
+            s = screws[self._slide].axis
+            if self._slide < (self._turn or 0):  # a turns its direction as well
                 s = rotate(a.axis, -angle, s)
-                arm = arm.with_axis(slide, s)
-            values[slide] = dot(n, place - arm.centre) / dot(n, s)
-            place = place - s * values[slide]
+                turned = list(screws)
+                turned[self._slide] = Screw(
+                    s, screws[self._slide].point, revolute=False
+                )
+                arm = Arm(tuple(turned), arm.centre, arm.meeting)
+            values[self._slide] = dot(n, place - arm.centre) / dot(n, s)
+            place = place - s * values[self._slide]
         end = place + rotate(n, theta, d.point - arm.centre)
-        around = within_plane(b, c, d.point, end, structure.elbow)
-        outer, elbow = (np.flip(answers, axis=structure.elbow) for answers in around)
-        last = np.sign(dot(n, d.axis)) * (
-            theta - outer - np.sign(dot(n, c.axis)) * elbow
-        )
-        values |= zip(structure.parallel, (outer, elbow, last), strict=True)
+        around = move_within_plane(b, c, d.point, end, self._elbow)
+        outer, elbow = (np.flip(answers, axis=self._elbow) for answers in around)
+        rest = theta - outer - np.sign(dot(n, c.axis)) * elbow
+        last = np.sign(dot(n, d.axis)) * rest
+        values |= zip(self._parallel, (outer, elbow, last), strict=True)
         return arm, [values[i] for i in range(6)]
 
-    def _outer(
-        self, arm: Arm, rotation: np.ndarray, place: np.ndarray
+    def _solve_outer(
+        self, arm: Arm, motion: Poses, place: np.ndarray
     ) -> tuple[dict[int, np.ndarray], np.ndarray, np.ndarray]:
         """Solve for the turning joints beside the parallel ones; return them, the angle of a, and R_D R_post^T e."""
-        structure = self._structure
+        n = arm.screws[self._first].axis
+        wrist = self._elbow + 1
+        a = arm.screws[self._turn or 0]
+        e, f = arm.screws[4:]
         angle = np.zeros(1)
-        n = arm.screws[structure.first].axis
-        turn = structure.turn
-        wrist = structure.elbow + 1
-        a = arm.screws[turn or 0]
-        e = arm.screws[4]
-        f = arm.screws[5]
-        if structure.first == 1:
-            if turn is not None:
-                angle = a.inverse.orbit(place).component(
-                    -n, -dot(n, arm.centre), _SHOULDER
-                )
-            y = apply_inverse(rotation, rotate(a.axis, angle, n))
+        if self._first == 1:
+            if self._turn is not None:
+                level = -dot(n, arm.centre)
+                angle = a.inverse.orbit(place).component(-n, level, _SHOULDER)
+            y = apply_inverse(motion.rotation, rotate(a.axis, angle, n))
             last = Circle.of(f.axis, y).component(e.axis, dot(e.axis, n), wrist)
             values = {4: angle_about(e.axis, rotate(f.axis, last, y), n), 5: last}
             image = rotate(f.axis, -last, e.axis)
         else:
-            last = Circle.of(-f.axis, n).component(
-                -apply_inverse(rotation, a.axis), -dot(a.axis, n), wrist
-            )
-            angle = angle_about(a.axis, n, apply(rotation, rotate(f.axis, -last, n)))
+            direction = -apply_inverse(motion.rotation, a.axis)
+            orbit = Circle.of(-f.axis, n)
+            last = orbit.component(direction, -dot(a.axis, n), wrist)
+            y = apply(motion.rotation, rotate(f.axis, -last, n))
+            angle = angle_about(a.axis, n, y)
             values = {5: last}
             image = f.axis
-        if turn is not None:
-            values[turn] = angle
-        return values, angle, apply(rotation, image)
+        if self._turn is not None:
+            values[self._turn] = angle
+        return values, angle, apply(motion.rotation, image)
+
+
+def _are_parallel(six: RemainingJoints, first: int) -> bool:
+    """Whether three successive joints are revolute and their axes parallel."""
+    places = (first, first + 1, first + 2)
+    return bool(six.revolute[[*places]].all()) and six.are_parallel(*places)
+
+
+def _fits(six: RemainingJoints, first: int) -> bool:
+    """Whether three joints from the place `first` on are parallel, and the others around them as they should be."""
+    if not _are_parallel(six, first) or not six.revolute[first + 3 :].all():
+        return False
+    if first == 1:
+        return six.meeting(4, 5) is not None and not six.are_parallel(4, 5)
+    return int(six.revolute[:2].sum()) == 1
 
 
 @ik_family(
@@ -303,7 +248,5 @@ def parallel_axes(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> ParallelAxesSolver:
     """Fit the family: a pose, six joints left over, and three parallel axes in succession among them."""
-    six = PoseJoints.of(geometry, task_map, redundant)
-    return ParallelAxesSolver(
-        geometry, redundant, fitted(geometry, six, (ParallelStructure.of,))
-    )
+    six = RemainingJoints.of_pose(geometry, task_map, redundant)
+    return fit(geometry, six, [lambda: ParallelAxesSolver(geometry, redundant, six)])

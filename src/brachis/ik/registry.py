@@ -2,38 +2,33 @@
 
 The families are listed in `BUILTIN`; other packages add theirs through the entry-point group ``brachis.ik``, whose
 entries are `Family` objects (see `ik_family`). No answer is believed: a solver is returned only after its answers have
-been put into the chain's forward kinematics (`check`).
+been put into the chain's forward kinematics (`check_answers`).
 
 Where no family fits the chain as it is, the ideal one is tried that it almost is (`snap_axes`); answers are polished.
-
-What is said of closed forms that a robot lacks.
-
-The most that a robot can prescribe for its tool.
 """
 
 from __future__ import annotations
 
-import contextlib
 import importlib.metadata
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
 from brachis.errors import DecompositionError, UnknownNameError, write_count
-from brachis.ik.check import check_answers
 from brachis.ik.eaik import NOT_INSTALLED, eaik
-from brachis.ik.idealised import TOLERANCE, PolishedSolver, SnappedChain, snap_axes
 from brachis.ik.parallel_axes import parallel_axes
-from brachis.ik.planar import planar
-from brachis.ik.positioning import positioning
-from brachis.ik.prismatic import prismatic
+from brachis.ik.planar import planar, prismatic
+from brachis.ik.position_family import positioning
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry
+from brachis.ik.snapping import TOLERANCE, PolishedSolver, SnappedChain, snap_axes
 from brachis.ik.spherical_wrist import spherical_wrist
+from brachis.ik.vectors import EXACT
 from brachis.robot import Robot, TaskMap
+from brachis.robot.joints import complement, difference
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES, POSE_ROWS
 
@@ -45,13 +40,16 @@ BUILTIN: tuple[Family, ...] = (
     parallel_axes,
     eaik,
 )
-
-_NEAR = 2e-3
-"""Axes this near (rad, m) to those of an ideal arm may be meant to be there."""
+"""In the order in which they are tried."""
+NO_CLOSED_FORM = (
+    "no choice of redundant joints has a closed form: "
+    "motions are planned from differential inverse kinematics"
+)
+"""What is said of a robot and a task space without any closed form."""
 
 
 @dataclass(frozen=True)
-class Candidate:
+class TriedDecomposition:
     """One choice of redundant joints and what is known of its closed form.
 
     Attributes
@@ -74,7 +72,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Match(Candidate):
+class Match(TriedDecomposition):
     """A choice of redundant joints that has a closed form."""
 
     family: str
@@ -85,11 +83,11 @@ class Match(Candidate):
 def plugin_families() -> tuple[Family, ...]:
     """Families of other packages, from the entry-point group ``brachis.ik``; a broken one says so when it is tried."""
     return tuple(
-        _loaded(entry) for entry in importlib.metadata.entry_points(group="brachis.ik")
+        _load(entry) for entry in importlib.metadata.entry_points(group="brachis.ik")
     )
 
 
-def _loaded(entry: importlib.metadata.EntryPoint) -> Family:
+def _load(entry: importlib.metadata.EntryPoint) -> Family:
     try:
         family = entry.load()
     except Exception as error:  # noqa: BLE001  (whatever another package's import raises)
@@ -97,7 +95,9 @@ def _loaded(entry: importlib.metadata.EntryPoint) -> Family:
     else:
         if isinstance(family, Family):
             return family
-        reason = f"the plug-in's entry point is no Family but {type(family).__name__}"
+        reason = (
+            f"the plug-in's entry point must be a Family, not {type(family).__name__}"
+        )
 
     def refuse(*_arguments: object) -> IKSolver:
         raise NotApplicableError(reason)
@@ -141,156 +141,232 @@ def find(
                 "joint", name, robot.joint_names, where="redundant_joints"
             )
     r = robot.n - task_map.m
+    if r < 0:
+        by = ", ".join(["0.5"] * robot.n)
+        raise DecompositionError(
+            "the robot has fewer joints than the task space has rows",
+            redundant_joints=names,
+            found=f"{robot.n} for {task_map.m} rows",
+            allowed=f"at most {robot.n} rows; or task_space: joints, with a path of the joints such as "
+            f"line: {{by: [{by}]}}",
+        )
     if len(set(names)) != len(names) or len(names) != r:
         joints = write_count(robot.n, "joint")
         rows = write_count(task_map.m, "row")
         raise DecompositionError(
-            "wrong number of redundant joints"
-            if r >= 0
-            else "the robot has fewer joints than the task space has rows",
+            "wrong number of redundant joints",
             redundant_joints=names,
-            found=f"{len(names)} ({', '.join(names) or 'none'})"
-            if r >= 0
-            else f"{robot.n} for {task_map.m} rows",
-            allowed=f"{r}: {joints} less {rows} ({', '.join(task_map.rows)})"
-            if r >= 0
-            else f"at most {robot.n} rows; or task_space: joints, with a path of the joints such as "
-            f"line: {{by: [{', '.join(['0.5'] * robot.n)}]}}",
+            found=f"{len(names)} ({', '.join(names) or 'none'})",
+            allowed=f"{r}: {joints} less {rows} ({', '.join(task_map.rows)})",
         )
-    candidate = _try(robot, task_map, names, families, _ideals(robot, task_map))
-    if not isinstance(candidate, Match):
-        available = [
-            c.redundant_joints
-            for c in find_all(robot, task_map, families=families)
-            if c.solver is not None
-        ]
-        raise DecompositionError(
-            f"no closed form for redundant joints [{', '.join(names)}]",
-            redundant_joints=names,
-            reasons=candidate.reasons,
-            available=available,
-        )
-    return candidate
+    tried = _Matcher(robot, task_map, families).match(names)
+    if isinstance(tried, Match):
+        return tried
+    raise DecompositionError(
+        f"no closed form for redundant joints [{', '.join(names)}]",
+        redundant_joints=names,
+        reasons=tried.reasons,
+        available=[
+            other.redundant_joints
+            for other in find_all(robot, task_map, families=families)
+            if other.solver is not None
+        ],
+    )
 
 
 def find_all(
     robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()
-) -> list[Candidate]:
+) -> list[TriedDecomposition]:
     """Try every choice of redundant joints; see `find`. Paths of joints need no closed form."""
     r = robot.n - task_map.m
     if r < 0 or isinstance(task_map, JointSpace):
         return []
-    ideals = _ideals(robot, task_map)
+    matcher = _Matcher(robot, task_map, families)
     return [
-        _try(robot, task_map, names, families, ideals)
-        for names in itertools.combinations(robot.joint_names, r)
+        matcher.match(names) for names in itertools.combinations(robot.joint_names, r)
     ]
 
 
-def _ideals(robot: Robot, task_map: TaskMap) -> Callable[[float], SnappedChain | None]:
-    """Return the ideal arm within a tolerance as a function of it; the redundant joints have no part in it."""
-    geometry = ChainGeometry.of(robot)
-    return cache(lambda tolerance: snap_axes(geometry, task_map, tolerance))
+class _Matcher:
+    """The families to try on a robot, and the ideal arms that it almost is.
 
+    Parameters
+    ----------
+    robot, task_map, families
+        See `find`.
+    """
 
-def _try(
-    robot: Robot,
-    task_map: TaskMap,
-    names: tuple[str, ...],
-    families: Sequence[Family],
-    ideals: Callable[[float], SnappedChain | None],
-) -> Candidate:
-    """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
-    redundant = tuple(sorted(robot.joint_names.index(name) for name in names))
-    reasons: dict[str, str] = {}
-    tried = (*families, *BUILTIN, *plugin_families())
-    match = _fitting(robot, task_map, redundant, tried, reasons, None)
-    if match is None and (ideal := ideals(TOLERANCE)):
-        match = _fitting(robot, task_map, redundant, tried, reasons, ideal)
-    if match is None and (rough := ideals(_NEAR)):
-        _name_rounding(task_map, redundant, tried, reasons, rough)
-    return match or Candidate(
-        tuple(robot.joint_names[i] for i in redundant), None, None, reasons
-    )
+    def __init__(
+        self, robot: Robot, task_map: TaskMap, families: Sequence[Family]
+    ) -> None:
+        self._robot = robot
+        self._task_map = task_map
+        self._families = (*families, *BUILTIN, *plugin_families())
+        self._geometry = ChainGeometry.of(robot)
 
+    @cached_property
+    def _ideal(self) -> SnappedChain | None:
+        """The ideal arm within the tolerance; redundant joints have no part in it."""
+        return snap_axes(self._geometry, self._task_map)
 
-def _fitting(
-    robot: Robot,
-    task_map: TaskMap,
-    redundant: tuple[int, ...],
-    families: Sequence[Family],
-    reasons: dict[str, str],
-    ideal: SnappedChain | None,
-) -> Match | None:
-    """Find the first family that fits the robot or the ideal arm; put down the others' reasons."""
-    geometry = ChainGeometry.of(robot)
-    for family in families:
-        try:
-            solver = family.build(
-                ideal.geometry if ideal else geometry, task_map, redundant
-            )
-            if ideal:
-                solver = PolishedSolver(solver, geometry, task_map, redundant)
-            check_answers(robot, task_map, redundant, solver)
-        except NotApplicableError as reason:
-            reasons[family.name] = str(reason)
-        except Exception as error:
-            if family in BUILTIN:
-                raise
+    @cached_property
+    def _rough(self) -> SnappedChain | None:
+        """The ideal arm whose axes are so near (rad, m) that they may be meant to be there."""
+        return snap_axes(self._geometry, self._task_map, 2e-3)
+
+    def match(self, names: tuple[str, ...]) -> TriedDecomposition:
+        """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
+        redundant = tuple(sorted(self._robot.joint_names.index(name) for name in names))
+        reasons: dict[str, str] = {}
+        match = self._match(redundant, reasons, None)
+        if match is None and self._ideal:
+            match = self._match(redundant, reasons, self._ideal)
+        if match is None:
+            self._name_rounding(redundant, reasons)
+            chosen = tuple(self._robot.joint_names[i] for i in redundant)
+            return TriedDecomposition(chosen, None, None, reasons)
+        return match
+
+    def _match(
+        self,
+        redundant: tuple[int, ...],
+        reasons: dict[str, str],
+        ideal: SnappedChain | None,
+    ) -> Match | None:
+        """Find the first family that fits the robot or the ideal arm; put down the others' reasons."""
+        geometry = ideal.geometry if ideal else self._geometry
+        remark = ""
+        for family in self._families:
+            try:
+                solver = family.build(geometry, self._task_map, redundant)
+                if ideal:
+                    solver = PolishedSolver(
+                        solver, self._geometry, self._task_map, redundant
+                    )
+                    remark = f"axes within {ideal.miss} of an ideal arm's: answers are polished"
+                check_answers(self._robot, self._task_map, redundant, solver)
+            except NotApplicableError as reason:
+                reasons[family.name] = str(reason)
+            except Exception as error:
+                if family in BUILTIN:
+                    raise
+                # Another package's fault.
+                reasons[family.name] = (
+                    f"its code failed: {type(error).__name__}: {error}"
+                )
+            else:
+                reasons.pop(family.name, None)
+                chosen = tuple(self._robot.joint_names[i] for i in redundant)
+                return Match(chosen, family.name, solver, reasons, remark)
+        return None
+
+    def _name_rounding(
+        self, redundant: tuple[int, ...], reasons: dict[str, str]
+    ) -> None:
+        """Put down which families would fit if the axes were nearer to the ideal arm's."""
+        rough = self._rough
+        if rough is None or max(rough.turned, rough.shifted) < TOLERANCE:
+            return
+        for family in BUILTIN:
+            try:
+                family.build(rough.geometry, self._task_map, redundant)
+            except NotApplicableError:
+                continue
             reasons[family.name] = (
-                f"its code failed: {type(error).__name__}: {error}"  # another package's fault
-            )
-        else:
-            reasons.pop(family.name, None)
-            remark = (
-                f"axes within {ideal.miss} of an ideal arm's: answers are polished"
-                if ideal
-                else ""
-            )
-            return Match(
-                tuple(robot.joint_names[i] for i in redundant),
-                family.name,
-                solver,
-                reasons,
-                remark,
-            )
-    return None
-
-
-def _name_rounding(
-    task_map: TaskMap,
-    redundant: tuple[int, ...],
-    families: Sequence[Family],
-    reasons: dict[str, str],
-    ideal: SnappedChain,
-) -> None:
-    """Put down which families would fit if the axes were nearer to the ideal arm's."""
-    if max(ideal.turned, ideal.shifted) < TOLERANCE:
-        return
-    for family in (family for family in families if family in BUILTIN):
-        with contextlib.suppress(NotApplicableError):
-            family.build(ideal.geometry, task_map, redundant)
-            reasons[family.name] = (
-                f"fits an ideal arm only, and its axes are up to {ideal.miss} from there; at most {TOLERANCE:.0e} is "
+                f"fits an ideal arm only, and its axes are up to {rough.miss} from there; at most {TOLERANCE:.0e} is "
                 "taken for rounding. If the URDF rounds angles, as in 1.57, write them with more digits"
             )
 
 
-NO_CLOSED_FORM = (
-    "no choice of redundant joints has a closed form: "
-    "motions are planned from differential inverse kinematics"
-)
-"""Of a robot and a task space without any."""
-_INSTALLING = "installing it takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
-"""What installing EAIK may ask for; where it has wheels it comes with brachis."""
+def check_answers(
+    robot: Robot,
+    task_map: TaskMap,
+    redundant: tuple[int, ...],
+    solver: IKSolver,
+    *,
+    postures: int = 100,
+) -> None:
+    """Put a solver's answers for random postures into Pinocchio's forward kinematics.
+
+    Postures beside a branch's boundary are left out: there it is a matter of rounding whether there is an answer.
+
+    Parameters
+    ----------
+    robot, task_map : Robot, TaskMap
+    redundant : tuple of int
+        Indices of the redundant joints.
+    solver : IKSolver
+    postures : int, optional
+        How many.
+
+    Raises
+    ------
+    NotApplicableError
+        Two branches have one label, an answer misses its target by more than 1e-8 m or rad, or none of the answers is
+        the posture itself.
+    """
+    low, high = _ranges_to_check(robot)
+    q = np.random.default_rng(1).uniform(low, high, (postures, robot.n))
+    if len(set(solver.branches)) < len(solver.branches):
+        raise NotApplicableError(
+            f"its branches share labels: {', '.join(solver.branches)}"
+        )
+    margins = [
+        solver.branch_margins(q, b).min(axis=1, initial=np.inf)
+        for b in range(len(solver.branches))
+    ]
+    q = q[np.max(margins, axis=0) > 1e-2]
+    if not len(q):
+        raise NotApplicableError("no random posture is inside a branch")
+    rest = complement(robot.n, redundant)
+    targets = task_map.of_placements(*robot.tool_placements(q))
+    answers = solver.solve(targets, q[:, list(redundant)])
+    expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
+    if answers.shape != expected:
+        raise NotApplicableError(
+            f"its answers have the shape {answers.shape}, not {expected}"
+        )
+    turning = ChainGeometry.of(robot).revolute[rest]
+    own = np.abs(difference(answers, q[:, None, None, rest], turning)).max(axis=3)
+    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < 1e-6):
+        raise NotApplicableError("its answers leave out postures that reach the target")
+    exists = np.isfinite(answers).all(axis=3)
+    sample = np.nonzero(exists)[0]
+    reached = q[sample]
+    reached[:, rest] = answers[exists]
+    miss = np.abs(
+        task_map.difference(
+            task_map.of_placements(*robot.tool_placements(reached)), targets[sample]
+        )
+    ).max()
+    if not miss < 1e-8:
+        raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
 
 
-def missing_eaik(candidates: Sequence[Candidate]) -> str:
+def _ranges_to_check(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is.
+
+    Of far ranges what is within 20 m of zero: positions in kilometres are not precise to the tolerances.
+    """
+    lower = robot.limits.position_lower
+    upper = robot.limits.position_upper
+    ranged = (
+        (np.array(robot.position_units) == "m")
+        & np.isfinite(lower)
+        & np.isfinite(upper)
+    )
+    near = np.clip(0.0, lower, upper)
+    lower = np.maximum(lower, near - 20.0)
+    upper = np.minimum(upper, near + 20.0)
+    return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)
+
+
+def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:
     """Say which choices of redundant joints EAIK might add, and how to get it.
 
     Parameters
     ----------
-    candidates : sequence of Candidate
+    tried : sequence of TriedDecomposition
         All choices, as `find_all` returns them.
 
     Returns
@@ -299,18 +375,17 @@ def missing_eaik(candidates: Sequence[Candidate]) -> str:
         A sentence without its full stop; empty where EAIK is installed or would add nothing.
     """
     further = [
-        candidate.redundant_joints
-        for candidate in candidates
-        if candidate.solver is None
-        and candidate.reasons.get(eaik.name) == NOT_INSTALLED
+        choice.redundant_joints
+        for choice in tried
+        if choice.solver is None and choice.reasons.get(eaik.name) == NOT_INSTALLED
     ]
     if not further:
         return ""
     names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
-    return f"{NOT_INSTALLED}; it might add the redundant joints {names}; {_INSTALLING}"
-
-
-_PARALLEL = 1e-9
+    return (
+        f"{NOT_INSTALLED}; it might add the redundant joints {names}; "
+        "installing it takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
+    )
 
 
 def default_task_space(robot: Robot) -> str | list[str]:
@@ -323,7 +398,7 @@ def default_task_space(robot: Robot) -> str | list[str]:
             np.abs(geometry.axes),
         )
     )
-    normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
+    normals = np.flatnonzero(np.all(along < EXACT, axis=0))
     if len(normals):
         return [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
     return "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])

@@ -9,7 +9,8 @@ kinematics using subproblem decomposition", 2022, whose solutions are in no such
 Vectors have their components along the first axis, then come the alternatives (one axis for each step with
 two of them) and the samples; joint positions have alternatives and samples alone.
 
-Screw axes of a chain, taken from the Pinocchio model; the closed forms match and compute with these alone.
+`ChainGeometry` has the screw axes of a chain, taken from the Pinocchio model; the closed forms match and compute with
+these alone.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.common.arrays import cross
-from brachis.ik.vectors import cosine_roots, dot
+from brachis.ik.vectors import apply, apply_inverse, cosine_roots, determinants, dot
 from brachis.robot import Robot
 
 
@@ -76,9 +77,9 @@ class Circle:
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         """Position at an angle, (3, ...)."""
-        return self.turned(np.cos(angle), np.sin(angle))
+        return self.place(np.cos(angle), np.sin(angle))
 
-    def turned(self, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
+    def place(self, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
         """Position at an angle of which cosine and sine are known, (3, ...)."""
         return self.arm * cos + self.across * sin + self.middle
 
@@ -161,6 +162,58 @@ class PosedScrews:
             [np.where(turns, cross(axes, lever), axes), np.where(turns, axes, 0.0)]
         )
 
+    def determinant(self, joints: Sequence[int]) -> np.ndarray:
+        """Compute det J_nr (K,) of six joints for a pose, or of three for a position; real or complex, and analytic."""
+        return determinants(self.jacobian_columns(joints)[: len(joints)])
+
+
+@dataclass(frozen=True)
+class Poses:
+    """N poses, or the motions that bring the origin there; components along the first axis (see `vectors`).
+
+    Attributes
+    ----------
+    position : (3, ..., N) ndarray
+        m.
+    rotation : (3, 3, ..., N) ndarray
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+
+    @classmethod
+    def of_targets(cls, targets: np.ndarray) -> Poses:
+        """Return the poses that task coordinates, (N, 12), stand for."""
+        return cls(
+            targets[:, :3].T, np.moveaxis(targets[:, 3:].reshape(-1, 3, 3), 0, 2)
+        )
+
+    @classmethod
+    def of_tool(cls, screws: PosedScrews) -> Poses:
+        """Return the placements of the tool."""
+        return cls(screws.tool_position, screws.tool_rotation)
+
+    def targets(self) -> np.ndarray:
+        """Task coordinates, (N, 12)."""
+        rotations = np.moveaxis(self.rotation, 2, 0).reshape(-1, 9)
+        return np.concatenate([self.position.T, rotations], axis=1)
+
+    def move(self, point: np.ndarray) -> np.ndarray:
+        """Move points, (3, ...), as these poses move the origin's frame."""
+        return apply(self.rotation, point) + self.position
+
+    def __matmul__(self, other: Poses) -> Poses:
+        """Move other poses as these ones move the origin; N or 1 of each."""
+        columns = [apply(self.rotation, other.rotation[:, i]) for i in range(3)]
+        return Poses(self.move(other.position), np.stack(columns, axis=1))
+
+    def inverse(self) -> Poses:
+        """Return the motions that undo these."""
+        return Poses(
+            -apply_inverse(self.rotation, self.position),
+            np.swapaxes(self.rotation, 0, 1),
+        )
+
 
 @dataclass(frozen=True)
 class ChainGeometry:
@@ -224,7 +277,13 @@ class ChainGeometry:
         ]
         return [(skew, skew @ skew) for skew in skews]
 
-    def posed(self, q: np.ndarray) -> PosedScrews:
+    @cached_property
+    def random_screws(self) -> PosedScrews:
+        """Screws at random postures, which are the same every time: by them closed forms size up what varies."""
+        rng = np.random.default_rng(1)
+        return self.screws_at(rng.uniform(-np.pi, np.pi, (256, self.n)))
+
+    def screws_at(self, q: np.ndarray) -> PosedScrews:
         """Screw axes and tool placement at K postures, by the product of exponentials.
 
         Parameters
@@ -232,28 +291,29 @@ class ChainGeometry:
         q : (K, n) ndarray
             Real, or complex for complex-step derivatives.
         """
-        return self._moved(q.T, np.ones(self.n, dtype=bool))
+        return self._move(q.T, np.ones(self.n, dtype=bool))
 
-    def held(self, joints: Sequence[int], q_held: np.ndarray) -> PosedScrews:
+    def screws_with(self, joints: Sequence[int], positions: np.ndarray) -> PosedScrews:
         """Screw axes and tool placement where some joints are held at given positions and all others are zero.
 
         Parameters
         ----------
         joints : sequence of int
             The joints that are held, ascending.
-        q_held : (K, h) ndarray
-            Their positions, rad or m.
+        positions : (K, h) ndarray
+            Of these, rad or m.
         """
         moving = np.zeros(self.n, dtype=bool)
         moving[list(joints)] = True
-        q = np.zeros((self.n, len(q_held)))
-        q[moving] = q_held.T
-        return self._moved(q, moving)
+        q = np.zeros((self.n, len(positions)))
+        q[moving] = positions.T
+        return self._move(q, moving)
 
-    def _moved(self, q: np.ndarray, moving: np.ndarray) -> PosedScrews:
+    def _move(self, q: np.ndarray, moving: np.ndarray) -> PosedScrews:
         """Move joints one after the other; q is (n, K), and `moving` says which of them move at all."""
         count = q.shape[1]
-        axes, points = (np.empty((3, self.n, count), dtype=q.dtype) for _ in range(2))
+        axes = np.empty((3, self.n, count), dtype=q.dtype)
+        points = np.empty_like(axes)
         rotation = np.eye(3, dtype=q.dtype)[:, :, None]
         offset = np.zeros((3, 1), dtype=q.dtype)
         placed = 0

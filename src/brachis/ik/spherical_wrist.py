@@ -1,11 +1,11 @@
 """Six joints of which the last three, or the first three, have axes that meet in one point.
 
-Let W0 be this point while the six joints are at zero. Then E_1 ... E_6 = D (`displacement`) moves it to
+Let W0 be this point while the six joints are at zero. Then E_1 ... E_6 = D (`FactoredSolver`) moves it to
 
     W = E_a E_b E_c W0 = D W0,
 
-for the last three, u, v, w, turn about it: equations for the first three, a, b, c, alone (`placing`). What is left
-is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
+for the last three, u, v, w, turn about it: equations for the first three, a, b, c, alone (`point_recipes`). What is
+left is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
 
     v    u . R_v w = u . R w, two answers
     u    turns R_v w to R w
@@ -15,146 +15,105 @@ If the first three meet instead (an arm with a spherical shoulder), the reverse 
 the same form. Redundant joints may stand anywhere, even between axes that meet, if the point where they do stays at its
 place on one of them.
 
-Branches are told apart by the signs of the two factors of a recipe (`position_recipes`) and of u . (w x v); see
-`factors`.
+Branches are told apart by the signs of the two factors of a recipe and of u . (w x v).
 
 Source: D. L. Pieper, The kinematics of manipulators under computer control, PhD thesis, Stanford 1968; for the first
-three joints see `placing`.
+three joints see `point_recipes`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from brachis.common.arrays import cross
-from brachis.ik.arm import Anchor, Arm, PoseJoints, RemainingJoints, meeting, miss
-from brachis.ik.displacement import Displacement
-from brachis.ik.factored_solver import (
-    Factor,
-    FactoredSolver,
-    PlacingStructure,
-    fitted,
-    recipe_for,
-)
-from brachis.ik.placing import FLIP
+from brachis.ik.arm import Arm, RemainingJoints
+from brachis.ik.factored_solver import Factor, FactoredSolver, fit
+from brachis.ik.point_recipes import choose_recipe, refuse_recipes
 from brachis.ik.protocol import NotApplicableError, ik_family
-from brachis.ik.screws import ChainGeometry, Circle, PosedScrews, Screw
+from brachis.ik.screws import ChainGeometry, Circle, Screw
 from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
 from brachis.robot import TaskMap
 
-_WRIST = (3, 4, 5)
+_FLIP = 2
+"""Slot of the wrist's two answers, behind those of the recipe."""
 
 
-def wrist_factor(arm: Arm) -> np.ndarray:
+def _wrist_factor(arm: Arm) -> np.ndarray:
     """Volume spanned by the axes of u, w, v."""
-    u, v, w = arm.wrist
+    u, v, w = arm.screws[3:]
     return dot(u.axis, cross(w.axis, v.axis))
 
 
-WRIST = Factor(
-    wrist_factor,
+_WRIST = Factor(
+    _wrist_factor,
     "the axes of {u}, {v}, {w} always are parallel to one plane",
     ("noflip", "flip"),
 )
 
 
-@dataclass(frozen=True)
-class WristStructure(PlacingStructure):
-    """Six joints of which the last three have axes that meet.
+class SphericalWristSolver(FactoredSolver):
+    """Closed form of six joints with a spherical wrist or shoulder; see the module's formulas.
 
-    Attributes
+    Parameters
     ----------
-    joints, recipe, meeting
-        See `PlacingStructure`.
-    centre : Anchor
-        The point where they do.
+    geometry : ChainGeometry
+    redundant : tuple of int
+    six : RemainingJoints
+        The last three have axes that meet.
+
+    Raises
+    ------
+    NotApplicableError
+        The last three axes do not meet, or no recipe fits.
     """
 
-    centre: Anchor
-
-    @classmethod
-    def of(cls, six: RemainingJoints) -> WristStructure:
-        """Find the centre and the recipe.
-
-        Raises
-        ------
-        NotApplicableError
-            The last three axes do not meet, or no recipe fits.
-        """
-        centre = meeting(six, *_WRIST)
+    def __init__(
+        self, geometry: ChainGeometry, redundant: tuple[int, ...], six: RemainingJoints
+    ) -> None:
+        names = ", ".join(six.names[3:])
+        centre = six.meeting(3, 4, 5)
         if centre is None:
-            raise NotApplicableError(_reason_against_centre(six))
-        return cls(six, *recipe_for(six, _point(six)), centre)
+            sliding = [six.names[i] for i in (3, 4, 5) if not six.revolute[i]]
+            raise NotApplicableError(
+                f"{' and '.join(sliding)} among {names} slides"
+                if sliding
+                else f"the axes of {names} do not meet in a point (they miss it by {six.miss(3, 4, 5):.2g} m)"
+            )
+        self._centre = centre
+        self._point = f"the point where the axes of {names} meet"
+        choice = choose_recipe(six)
+        if choice is None:
+            raise refuse_recipes(six, self._point)
+        self.recipe, self._meeting = choice
+        super().__init__(geometry, redundant, six, (*self.recipe.factors, _WRIST))
 
-    @classmethod
-    def backwards(cls, six: RemainingJoints) -> WristStructure:
-        """See the joints from the tool: the axes of the first three have to meet."""
-        return cls.of(six.reversed())
+    def _names(self) -> dict[str, str]:
+        letters = dict(zip("abcuvw", self._joints.names, strict=True))
+        return {**letters, "point": self._point}
 
-    @property
-    def factors(self) -> tuple[Factor, ...]:
-        """See `Structure.factors`; of the alternatives `FRONT`, `UP`, `FLIP`."""
-        return *self.recipe.factors, WRIST
+    def _arm(self, screws: tuple[Screw, ...], _tool: np.ndarray | None = None) -> Arm:
+        centre = self._centre.at(screws)
+        return Arm(
+            screws, centre, self._meeting.at(screws) if self._meeting else centre
+        )
 
-    def words(self) -> dict[str, str]:
-        """See `Structure.words`."""
-        return {
-            **dict(zip("abcuvw", self.joints.names, strict=True)),
-            "point": _point(self.joints),
-        }
-
-    def posed(self, posed: PosedScrews) -> Arm:
-        """See `Structure.posed`."""
-        return self.arm(self.joints.screws(posed))
-
-    def arm(self, screws: tuple[Screw, ...]) -> Arm:
-        """Put in the points."""
-        centre = self.centre.at(screws)
-        return Arm(screws, centre, self.meeting.at(screws) if self.meeting else centre)
-
-
-def _point(six: RemainingJoints) -> str:
-    """Put the centre into words."""
-    return f"the point where the axes of {', '.join(six.names[3:])} meet"
-
-
-def _reason_against_centre(six: RemainingJoints) -> str:
-    """Say why the last three joints have no centre."""
-    names = ", ".join(six.names[3:])
-    sliding = [six.names[i] for i in _WRIST if not six.revolute[i]]
-    if sliding:
-        return f"{' and '.join(sliding)} among {names} slides"
-    return f"the axes of {names} do not meet in a point (they miss it by {miss(six, *_WRIST):.2g} m)"
-
-
-class SphericalWristSolver(FactoredSolver[WristStructure]):
-    """Closed form of six joints with a spherical wrist or shoulder; see the module's formulas."""
-
-    def steps(
+    def _steps(
         self, targets: np.ndarray, q_r: np.ndarray
     ) -> tuple[Arm, Sequence[np.ndarray]]:
-        """See `FactoredSolver.steps`."""
-        mirrored = self._structure.joints.mirrored
-        equation = Displacement.of(
-            self._geometry, self._redundant, targets, q_r, mirrored=mirrored
-        )
-        rotation = equation.rotation[:, :, None, None, None]
-        translation = equation.translation[:, None, None, None]
-        arm = self._structure.arm(equation.screws())
-        base = self._structure.recipe.solve(
-            arm, apply(rotation, arm.centre) + translation
-        )
-        return arm, (*base, *_wrist(arm, base, rotation))
+        screws, motion = self._displacement(targets, q_r)
+        arm = self._arm(screws)
+        base = self.recipe.solve(arm, motion.move(arm.centre))
+        return arm, (*base, *_solve_wrist(arm, base, motion.rotation))
 
 
-def _wrist(
-    arm: Arm, base: tuple[np.ndarray, ...], rotation: np.ndarray
-) -> tuple[np.ndarray, ...]:
+def _solve_wrist(
+    arm: Arm, base: Sequence[np.ndarray], rotation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Solve R_u R_v R_w = (R_a R_b R_c)^-1 R_D for the angles of u, v, w."""
-    u, v, w = arm.wrist
+    u, v, w = arm.screws[3:]
     turns = [
         (joint.axis, np.cos(q), np.sin(q))
         for joint, q in zip(arm.base, base, strict=True)
@@ -162,31 +121,28 @@ def _wrist(
     ]
     end = apply(rotation, w.axis)
     for axis, cos, sin in turns:
-        end = Circle.of(axis, end).turned(cos, -sin)
+        end = Circle.of(axis, end).place(cos, -sin)
     start = u.axis
     for axis, cos, sin in turns[::-1]:
-        start = Circle.of(axis, start).turned(cos, sin)
+        start = Circle.of(axis, start).place(cos, sin)
     start = apply_inverse(rotation, start)
     orbit = Circle.of(v.axis, w.axis)
-    bend = orbit.component(-u.axis, -dot(u.axis, end), FLIP)
+    bend = orbit.component(-u.axis, -dot(u.axis, end), _FLIP)
     cos = np.cos(bend)
     sin = np.sin(bend)
-    first = angle_about(u.axis, orbit.turned(cos, sin), end)
-    last = angle_about(w.axis, start, Circle.of(v.axis, u.axis).turned(cos, -sin))
+    first = angle_about(u.axis, orbit.place(cos, sin), end)
+    last = angle_about(w.axis, start, Circle.of(v.axis, u.axis).place(cos, -sin))
     return first, bend, last
 
 
 @ik_family(
     "spherical_wrist",
-    source="Pieper 1968; Paden 1985; Brandstoetter et al. 2014; IK-Geo 2022; `placing`",
+    source="Pieper 1968; Paden 1985; Brandstoetter et al. 2014; IK-Geo 2022; `point_recipes`",
 )
 def spherical_wrist(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> SphericalWristSolver:
     """Fit the family: a pose, and six joints left over of which the last or the first three axes meet in a point."""
-    six = PoseJoints.of(geometry, task_map, redundant)
-    return SphericalWristSolver(
-        geometry,
-        redundant,
-        fitted(geometry, six, (WristStructure.of, WristStructure.backwards)),
-    )
+    six = RemainingJoints.of_pose(geometry, task_map, redundant)
+    build = partial(SphericalWristSolver, geometry, redundant)
+    return fit(geometry, six, [lambda: build(six), lambda: build(six.reverse())])

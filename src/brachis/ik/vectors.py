@@ -13,6 +13,9 @@ import numpy as np
 
 from brachis.common.arrays import cross
 
+EXACT = 1e-9
+"""Sines, cosines, lengths (m) and determinants that are no larger are zero: rotations of a URDF err by about 1e-15."""
+
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar product, shape (...)."""
@@ -89,3 +92,12 @@ def meeting_point(
 def wrap(angle: np.ndarray) -> np.ndarray:
     """Return the same angles in (-pi, pi]."""
     return angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
+
+
+def determinants(matrices: np.ndarray) -> np.ndarray:
+    """Compute determinants (K,) of matrices (m, m, K); real or complex, and analytic."""
+    if len(matrices) == 1:
+        return matrices[0, 0]
+    if len(matrices) == 2:
+        return matrices[0, 0] * matrices[1, 1] - matrices[0, 1] * matrices[1, 0]
+    return np.linalg.det(np.moveaxis(matrices, 2, 0))

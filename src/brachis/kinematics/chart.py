@@ -34,8 +34,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import UnreachableError
+from brachis.ik.newton import Newton
 from brachis.kinematics.joint_map import JointDerivatives, PathState
-from brachis.kinematics.newton import Newton
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 

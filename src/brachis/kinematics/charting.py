@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import UnreachableError
+from brachis.ik.newton import Newton, null_spaces
 from brachis.kinematics.chart import DEGREE, ChartMap, ChartRows
-from brachis.kinematics.newton import Newton, null_spaces
 from brachis.path import Path
 from brachis.robot import TaskMap
 

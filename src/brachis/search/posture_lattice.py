@@ -20,7 +20,7 @@ from dataclasses import fields
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.kinematics import Newton, moving_most, null_spaces, solved_each
+from brachis.kinematics import Newton, moving_most, null_spaces, solve_each
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.joints import TURN, complement
 from brachis.search.closed_form_lattice import Cells, cell_sizes
@@ -253,7 +253,7 @@ class PostureLattice(Lattice):
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
         still = np.zeros((len(null), self._r))  # without self-motion
         square = np.concatenate([jacobian, np.swapaxes(null, 1, 2)], axis=1)
-        needed = solved_each(square, np.concatenate([wanted, still], axis=1))
+        needed = solve_each(square, np.concatenate([wanted, still], axis=1))
         if self._r <= 1:
             around = self._at_cells(before.q, jacobian, null, wanted, station)
             parent, q = self._pairs(before.q, around)
@@ -328,7 +328,7 @@ class PostureLattice(Lattice):
         cells, levels, right = (
             part.reshape(len(which), -1) for part in (cells, levels, right)
         )
-        begun = q[which] + solved_each(augmented[which], right)
+        begun = q[which] + solve_each(augmented[which], right)
         regular = np.isfinite(begun).all(axis=1)
         which, begun, cells, levels = (
             part[regular] for part in (which, begun, cells, levels)

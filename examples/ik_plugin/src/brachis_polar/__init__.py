@@ -36,7 +36,7 @@ class PolarSolver(IKSolver):
 
     def __init__(self, geometry: ChainGeometry) -> None:
         self._geometry = geometry
-        screws = geometry.posed(np.zeros((1, geometry.n)))
+        screws = geometry.screws_at(np.zeros((1, geometry.n)))
         turn, tilt, boom = axes(screws)
         self._lean = float(dot(boom, tilt)[0])
         self._flat = 1.0 - self._lean**2
@@ -46,7 +46,7 @@ class PolarSolver(IKSolver):
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Return (K, 2, 1, 3) for tool positions (K, 3) and redundant joints (K, r)."""
-        screws = self._geometry.held(
+        screws = self._geometry.screws_with(
             range(q_r.shape[1]), q_r
         )  # the arm at zero, moved by the joints before it
         turn_axis, tilt_axis, boom = axes(screws)
@@ -76,7 +76,7 @@ class PolarSolver(IKSolver):
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return (K, 2): the tool's distance from where the two answers meet, and the boom's length, m."""
-        screws = self._geometry.posed(q)
+        screws = self._geometry.screws_at(q)
         turn_axis, tilt_axis, _ = axes(screws)
         forward = (
             dot(cross(tilt_axis, turn_axis), screws.tool_position - shoulder(screws))
@@ -123,7 +123,7 @@ def polar(
         raise NotApplicableError(
             "the last three joints are not revolute, revolute, prismatic"
         )
-    screws = geometry.posed(np.zeros((1, geometry.n)))
+    screws = geometry.screws_at(np.zeros((1, geometry.n)))
     turn_axis, tilt_axis, boom = axes(screws)
     if abs(dot(turn_axis, tilt_axis)) > ROUNDING:
         raise NotApplicableError(

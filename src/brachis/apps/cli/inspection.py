@@ -356,7 +356,7 @@ def _locks(lock: list[str]) -> dict[str, float]:
     return locked
 
 
-def _decomposition(candidate: ik.Candidate) -> dict[str, Any]:
+def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
     """Describe one choice of redundant joints: its solver, or the reasons why there is none."""
     solver = candidate.solver
     row: dict[str, Any] = {

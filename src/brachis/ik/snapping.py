@@ -7,7 +7,7 @@ coincides with it, is moved there; where that one meets its own predecessor near
 turned or moved carries the rest of the chain and the tool along, so that errors do not add up along the chain, and what
 follows from neighbours, as that all of three axes are parallel or meet in one point, holds for the others too.
 
-Closed forms of the ideal chain miss the targets of the given one by little: Newton's method does the rest (`polish`).
+Closed forms of the ideal chain miss the targets of the given one by little: Newton's method does the rest.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from brachis.ik.polish import goal_of, polished
+from brachis.ik.newton import Newton
 from brachis.ik.protocol import IKSolver
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import meeting_point
@@ -28,6 +28,7 @@ from brachis.robot.task_map import Pose
 TOLERANCE = 1e-4
 """Axes this near to parallel or perpendicular (rad), or to meeting (m), are taken to be meant so."""
 _ROUNDING = 1e-12
+"""Changes that are no larger (rad, m) come from rounding alone."""
 _SKEW = 1e-2
 """Axes at a smaller angle (rad) have no point where they meet that could be trusted."""
 
@@ -74,30 +75,31 @@ def snap_axes(
 
     Returns
     -------
-    Ideal or None
+    SnappedChain or None
         None where the chain is ideal as it is.
     """
-    chain = _Chain([] if isinstance(task_map, Pose) else list(np.eye(3)), tolerance)
+    pose = isinstance(task_map, Pose)
+    chain = _Chain([] if pose else list(np.eye(3)), tolerance)
     axes = np.empty_like(geometry.axes)
     points = np.zeros_like(geometry.points)
     for i, revolute in enumerate(geometry.revolute):
-        axes[i] = chain.direction(
+        axes[i] = chain.snap_direction(
             geometry.axes[i], geometry.points[i], revolute=revolute
         )
         if revolute:
-            points[i] = chain.place(axes[i], geometry.points[i])
-    if not isinstance(task_map, Pose):
-        chain.place_tool(geometry.tool_position)
+            points[i] = chain.snap_point(axes[i], geometry.points[i])
+    if not pose:
+        chain.snap_tool(geometry.tool_position)
     if max(chain.turned, chain.shifted) < _ROUNDING:
         return None
-    moved = replace(
+    snapped = replace(
         geometry,
         axes=axes,
         points=points,
-        tool_position=chain.moved(geometry.tool_position),
+        tool_position=chain.carry(geometry.tool_position),
         tool_rotation=chain.rotation @ geometry.tool_rotation,
     )
-    return SnappedChain(moved, chain.turned, chain.shifted)
+    return SnappedChain(snapped, chain.turned, chain.shifted)
 
 
 class _Chain:
@@ -113,24 +115,25 @@ class _Chain:
     def __init__(self, fixed: list[np.ndarray], tolerance: float) -> None:
         self.rotation = np.eye(3)
         self.offset = np.zeros(3)
-        self.turned = self.shifted = 0.0
+        self.turned = 0.0
+        self.shifted = 0.0
         self._tolerance = tolerance
         self._fixed = fixed
         self._axis: np.ndarray | None = None
         self._point = np.zeros(3)
         self._meets = False
 
-    def moved(self, point: np.ndarray) -> np.ndarray:
+    def carry(self, point: np.ndarray) -> np.ndarray:
         """Carry a point of the given chain along."""
         return self.rotation @ point + self.offset
 
-    def direction(
+    def snap_direction(
         self, axis: np.ndarray, point: np.ndarray, *, revolute: bool
     ) -> np.ndarray:
         """Direction of the next joint; turns the rest of the chain about its axis' point that is nearest."""
         given = self.rotation @ axis
-        ideal = _snapped(given, self._fixed, self._tolerance)
-        pivot = self._nearest(given, self.moved(point))[1] if revolute else self._point
+        ideal = _nearest_ideal(given, self._fixed, self._tolerance)
+        pivot = self._nearest(given, self.carry(point))[1] if revolute else self._point
         turn = _least_rotation(given, ideal)
         self.turned = max(self.turned, float(np.linalg.norm(ideal - given)))
         self.rotation = turn @ self.rotation
@@ -138,9 +141,9 @@ class _Chain:
         self._fixed = [ideal] if revolute else [*self._fixed, ideal]
         return ideal
 
-    def place(self, axis: np.ndarray, point: np.ndarray) -> np.ndarray:
+    def snap_point(self, axis: np.ndarray, point: np.ndarray) -> np.ndarray:
         """Point on the axis of the next revolute joint; moves the rest of the chain to where the axis should be."""
-        before, here = self._nearest(axis, self.moved(point))
+        before, here = self._nearest(axis, self.carry(point))
         meets = False
         if self._axis is not None and np.linalg.norm(here - before) < self._tolerance:
             parallel = abs(self._axis @ axis) > 1.0 - _ROUNDING
@@ -155,10 +158,10 @@ class _Chain:
         self._meets = meets
         return here
 
-    def place_tool(self, position: np.ndarray) -> None:
+    def snap_tool(self, position: np.ndarray) -> None:
         """Move the tool onto the last axis of rotation if it is meant to be there."""
         if self._axis is not None:
-            gap = self.moved(position) - self._point
+            gap = self.carry(position) - self._point
             gap -= self._axis * (self._axis @ gap)
             if np.linalg.norm(gap) < self._tolerance:
                 self._shift(-gap)
@@ -179,7 +182,7 @@ class _Chain:
         return before, point + axis * (axis @ (before - point))
 
 
-def _snapped(
+def _nearest_ideal(
     axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float
 ) -> np.ndarray:
     """Direction exactly parallel to one of some others, else perpendicular to one or two of them, if it almost is."""
@@ -232,38 +235,35 @@ class PolishedSolver(IKSolver):
         self.branches = solver.branches
         self.alternatives = solver.alternatives
         self._solver = solver
-        self._geometry = geometry
-        self._task_map = task_map
+        self._newton = Newton(task_map, geometry)
         self._redundant = list(redundant)
         self._rest = complement(geometry.n, redundant)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """See `IKSolver.solve`."""
-        return self._exact(self._solver.solve(targets, q_r), targets, q_r)
+        """Polish the answers of the ideal chain."""
+        return self._polish(self._solver.solve(targets, q_r), targets, q_r)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
-        """See `IKSolver.solve_branch`."""
-        return self._exact(
-            self._solver.solve_branch(targets, q_r, branch), targets, q_r
-        )
+        """Polish the answers of one branch."""
+        answers = self._solver.solve_branch(targets, q_r, branch)
+        return self._polish(answers, targets, q_r)
 
-    def _exact(
+    def _polish(
         self, answers: np.ndarray, targets: np.ndarray, q_r: np.ndarray
     ) -> np.ndarray:
         """Polish answers (K, ..., m)."""
         exists = np.isfinite(answers).all(axis=-1)
         sample = np.nonzero(exists)[0]
-        q = np.empty((len(sample), self._geometry.n))
+        q = np.empty((len(sample), len(self._redundant) + len(self._rest)))
         q[:, self._redundant] = q_r[sample]
         q[:, self._rest] = answers[exists]
         exact = np.full_like(answers, np.nan)
-        exact[exists] = polished(
-            self._geometry, self._rest, q, goal_of(self._task_map, targets[sample])
-        )
+        polished = self._newton.polish(targets[sample], q, self._redundant)
+        exact[exists] = polished[:, self._rest]
         return exact
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """See `IKSolver.branch_margins`."""
+        """Return the margins of the ideal chain."""
         return self._solver.branch_margins(q, branch)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.ik.factored_solver import RECIPES
+from brachis.ik.point_recipes import RECIPES
 from support.factored_bench import Bench
 from support.screw_arms import BASES, extra, screw_robot, wrist
 
@@ -41,7 +41,7 @@ def test_every_recipe_is_tried_by_a_case_of_its_own():
         bench = Bench(
             screw_robot([*base, *wrist(np.random.default_rng(0))]), (), postures=1
         )
-        used.setdefault(RECIPES.index(bench.solver._structure.recipe), []).append(name)
+        used.setdefault(RECIPES.index(bench.solver.recipe), []).append(name)
     # Two slides behind a third joint move in one plane as well.
     assert set(used[0]) == {
         "R|RR",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.kinematics import Newton
+from brachis.ik.newton import Newton
 from brachis.robot import bind
 from support.chains import gantry_robot, planar_robot
 from support.charts import jacobian

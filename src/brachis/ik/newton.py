@@ -1,0 +1,159 @@
+"""Newton's method for postures that meet a target, with linear conditions on the joints that make them unique.
+
+    f(q) = z,  C q = c:        [J; C] dq = (z - f(q), c - C q)
+
+for a batch of K postures at once. Tool placement and Jacobian come from the screw axes of the chain, which move all
+postures of a batch together (`ChainGeometry.screws_at`).
+
+Where only an answer beside the given posture will do, steps have to shrink by half: then the method converges there.
+P. Deuflhard, Newton methods for nonlinear problems, Springer 2004 (natural monotonicity test).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.ik.screws import ChainGeometry
+from brachis.robot import TaskMap
+
+
+class Newton:
+    """Newton's method on the task coordinates of a robot.
+
+    Parameters
+    ----------
+    task_map : TaskMap
+    geometry : ChainGeometry, optional
+        Of another chain than the task map's robot.
+    """
+
+    def __init__(
+        self, task_map: TaskMap, geometry: ChainGeometry | None = None
+    ) -> None:
+        self._task_map = task_map
+        self._geometry = geometry or ChainGeometry.of(task_map.robot)
+
+    def task_coordinates(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Task coordinates (K, c) and task Jacobian (K, m, n) in postures (K, n)."""
+        screws = self._geometry.screws_at(q)
+        twists = screws.jacobian_columns(range(self._geometry.n))
+        if self._task_map.frame is pin.ReferenceFrame.LOCAL:
+            parts = np.split(twists, 2)
+            twists = np.concatenate(
+                [
+                    np.einsum("iak,ink->ank", screws.tool_rotation, part)
+                    for part in parts
+                ]
+            )
+        values = self._task_map.of_placements(
+            screws.tool_position.T, np.moveaxis(screws.tool_rotation, 2, 0)
+        )
+        return values, self._task_map.jacobian(np.swapaxes(twists, 1, 2))
+
+    def solve(
+        self,
+        targets: np.ndarray,
+        q: np.ndarray,
+        rows: np.ndarray,
+        levels: np.ndarray,
+        *,
+        steps: int = 15,
+        tolerance: float = 1e-10,
+        largest_step: float = 0.5,
+        beside: bool = False,
+    ) -> np.ndarray:
+        """Find postures near given ones.
+
+        Parameters
+        ----------
+        targets : (K, c) ndarray
+            Task coordinates z.
+        q : (K, n) ndarray
+            Postures from which the search begins.
+        rows : (K, r, n) ndarray
+            C; with r = n - m.
+        levels : (K, r) ndarray
+            c.
+        steps : int, optional
+            How many at most.
+        tolerance : float, optional
+            Miss, in m or rad, after which one more step meets the target to rounding: Newton's method squares it.
+        largest_step : float, optional
+            rad or m; longer steps are shortened, since the linear model says little about postures so far away.
+        beside : bool, optional
+            Give a posture up as soon as a step is too long, or does not halve. Tolerance and largest step are then in
+            proportion to the posture's size where that is above 1.
+
+        Returns
+        -------
+        (K, n) ndarray
+            Angles in the turns into which the search leads; NaN where it does not converge.
+        """
+        found = np.full(q.shape, np.nan)
+        left = np.flatnonzero(
+            np.isfinite(q).all(axis=1) & np.isfinite(levels).all(axis=1)
+        )
+        q = q[left]
+        scale = np.ones(len(q))
+        if beside:
+            scale += np.abs(q).max(axis=1, initial=0.0)
+        longest = largest_step * scale
+        for _ in range(steps):
+            if not len(left):
+                break
+            values, jacobian = self.task_coordinates(q)
+            own = rows[left]
+            gap = self._task_map.difference(targets[left], values)
+            aside = levels[left] - np.einsum("kij,kj->ki", own, q)
+            miss = np.concatenate([gap, aside], axis=1)
+            step = solve_each(np.concatenate([jacobian, own], axis=1), miss)
+            size = np.abs(step).max(axis=1, initial=0.0)
+            met = np.abs(miss).max(axis=1, initial=0.0) < tolerance * scale
+            q = q + step * np.minimum(1.0, longest / np.maximum(size, longest))[:, None]
+            good = np.isfinite(q).all(axis=1)
+            if beside:
+                good &= size < longest
+                longest = 0.5 * size
+            found[left[met & good]] = q[met & good]
+            kept = good & ~met
+            left = left[kept]
+            q = q[kept]
+            scale = scale[kept]
+            longest = longest[kept]
+        return found
+
+    def polish(
+        self, targets: np.ndarray, q: np.ndarray, held: Sequence[int]
+    ) -> np.ndarray:
+        """Make postures exact that almost meet targets, (K, c), with joints held; (K, n), NaN where none is near."""
+        rows = np.broadcast_to(
+            np.eye(q.shape[1])[held], (len(q), len(held), q.shape[1])
+        )
+        return self.solve(
+            targets, q, rows, q[:, held], steps=8, largest_step=0.2, beside=True
+        )
+
+    def nearest(self, targets: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Find the postures that meet targets, (K, c), without self-motion from given ones; (K, n), NaN where none."""
+        rows = np.swapaxes(null_spaces(self.task_coordinates(q)[1]), 1, 2)
+        return self.solve(targets, q, rows, np.einsum("kij,kj->ki", rows, q))
+
+
+def null_spaces(jacobian: np.ndarray) -> np.ndarray:
+    """Orthonormal bases (K, n, r) of the null spaces of Jacobians (K, m, n)."""
+    m = jacobian.shape[1]
+    return np.asarray(np.swapaxes(np.linalg.svd(jacobian)[2][:, m:], 1, 2))
+
+
+def solve_each(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve K linear systems, (K, n, n) and (K, n); those of singular matrices by NaN."""
+    try:
+        return np.asarray(np.linalg.solve(matrices, right[:, :, None])[:, :, 0])
+    except np.linalg.LinAlgError:
+        regular = np.abs(np.linalg.det(matrices)) > 0.0
+        answers = np.full(right.shape, np.nan)
+        answers[regular] = solve_each(matrices[regular], right[regular])
+        return answers

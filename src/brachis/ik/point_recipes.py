@@ -1,0 +1,359 @@
+"""Three joints a, b, c that bring a point W0 to a target W: E_a E_b E_c W0 = W.
+
+Each recipe solves for one joint after the other, and fits where something holds of a, b, c at all positions of the
+redundant joints. S is the point where two axes meet, n the normal of the plane in which two joints move; B is a point
+on the axis of b. Steps that have two answers are marked by *.
+
+    plane of b, c   * a: n . E_a^-1 W = n . W0 (one answer for a slide);  b and c within the plane
+    plane of a, b   * c: n . E_c W0 = n . W (one answer for a slide);  a and b within the plane
+    a, b meet       * c: |E_c W0 - S| = |W - S|;  * b: a . E_b E_c W0 = a . W;  a by the angle
+    b, c meet       * a: |E_a^-1 W - S| = |W0 - S|;  * c: b . E_c W0 = b . E_a^-1 W;  b by the angle
+    cylinder        * g = +-sqrt(|b x (W - B)|^2 - (c . (W0 - B))^2);  * c: (b x c) . (E_c W0 - B) = g;  b by the angle;
+                    then the slide a along the axis of b, to which that of c is perpendicular
+
+Within a plane two joints that turn, or one that turns and one that slides, meet at a distance (*); two that slide are
+a linear system. A step that brings a position to a component or a distance tells its answers apart by the sign of that
+condition's derivative (`screws`). The factors of a recipe are these derivatives, as functions of the posture: their
+product is the determinant of the centre's Jacobian, up to its sign.
+
+Labels follow the senses of the joint axes. On an industrial arm whose axes 1, 2, 3 are z, y, y, and with these three
+joints left over to place a point (the wrist's centre, or the tool): ``front`` where it is on the side to which joint 1
+faces, ``up`` where joint 3 bends forwards.
+
+Sources: D. L. Pieper, The kinematics of manipulators under computer control, PhD thesis, Stanford 1968 (the wrist's
+centre first); B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985 (subproblems);
+A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022 (axes that are
+parallel or meet, beside a spherical wrist); M. Brandstoetter, A. Angerer, M. Hofbaur, "An analytical solution of the
+inverse kinematics problem of industrial serial manipulators with an ortho-parallel basis and a spherical wrist", 2014.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from brachis.common.arrays import cross
+from brachis.ik.arm import Anchor, Arm, RemainingJoints
+from brachis.ik.factored_solver import Factor
+from brachis.ik.protocol import NotApplicableError
+from brachis.ik.screws import Screw
+from brachis.ik.vectors import across, angle_about, dot
+
+FRONT = 0
+"""Slot of a recipe's first step."""
+UP = 1
+"""Slot of a recipe's second step."""
+
+Values = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Positions of a, b, c, with one or two answers along the slots, NaN where there is none."""
+
+
+def solve_plane_of_last(arm: Arm, target: np.ndarray) -> Values:
+    """Solve for a, so that b and c have to act within their plane alone."""
+    a, b, c = arm.base
+    normal = plane_normal(b, c)
+    orbit = a.inverse.orbit(target)
+    first = orbit.component(-normal, -dot(normal, arm.centre), FRONT)
+    return first, *move_within_plane(b, c, arm.centre, orbit.at(first), UP)
+
+
+def solve_plane_of_first(arm: Arm, target: np.ndarray) -> Values:
+    """Solve for c, so that a and b have to act within their plane alone."""
+    a, b, c = arm.base
+    normal = plane_normal(a, b)
+    orbit = c.orbit(arm.centre)
+    third = orbit.component(normal, dot(normal, target), UP)
+    return *move_within_plane(a, b, orbit.at(third), target, FRONT), third
+
+
+def solve_meeting_of_first(arm: Arm, target: np.ndarray) -> Values:
+    """Solve for c by the distance from the point where a and b meet."""
+    a, b, c = arm.base
+    outer = c.orbit(arm.centre)
+    away = target - arm.meeting
+    third = outer.distance(arm.meeting, dot(away, away), UP)
+    inner = b.orbit(outer.at(third))
+    second = inner.component(a.axis, dot(a.axis, target), FRONT)
+    return angle_about(a.axis, inner.at(second) - arm.meeting, away), second, third
+
+
+def solve_meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
+    """Solve for a by the distance from the point where b and c meet."""
+    a, b, c = arm.base
+    outer = a.inverse.orbit(target)
+    away = arm.centre - arm.meeting
+    first = outer.distance(arm.meeting, dot(away, away), UP)
+    end = outer.at(first)
+    inner = c.orbit(arm.centre)
+    third = inner.component(b.axis, dot(b.axis, end), FRONT)
+    start = inner.at(third) - arm.meeting
+    return first, angle_about(b.axis, start, end - arm.meeting), third
+
+
+def solve_cylinder(arm: Arm, target: np.ndarray) -> Values:
+    """Solve for the centre's place in front of, or behind, the common direction of a and b; then for c."""
+    a, b, c = arm.base
+    front = cross(b.axis, c.axis)
+    away = target - b.point
+    radius = across(b.axis, away)
+    side = dot(c.axis, arm.centre - b.point)
+    reach = np.sqrt(dot(radius, radius) - side * side)
+    orbit = c.orbit(arm.centre)
+    level = np.concatenate([reach, -reach], axis=FRONT) + dot(front, b.point)
+    third = orbit.component(front, level, UP)
+    start = orbit.at(third)
+    second = angle_about(b.axis, start - b.point, away)
+    return dot(a.axis, target - start), second, third
+
+
+def plane_normal(first: Screw, second: Screw) -> np.ndarray:
+    """Return the normal of the plane in which two joints move positions."""
+    if first.revolute:
+        return first.axis
+    return second.axis if second.revolute else cross(first.axis, second.axis)
+
+
+def move_within_plane(
+    first: Screw, second: Screw, start: np.ndarray, end: np.ndarray, slot: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve for two joints that bring `start` to `end` within the plane in which both move.
+
+    The two answers follow each other along the axis `slot`; two slides have one.
+    """
+    if first.revolute:
+        orbit = second.orbit(start)
+        away = end - first.point
+        inner = orbit.distance(first.point, dot(away, away), slot)
+        return angle_about(first.axis, orbit.at(inner) - first.point, away), inner
+    if second.revolute:
+        orbit = first.inverse.orbit(end)
+        away = start - second.point
+        outer = orbit.distance(second.point, dot(away, away), slot)
+        return outer, angle_about(second.axis, away, orbit.at(outer) - second.point)
+    normal = cross(first.axis, second.axis)
+    way = end - start
+    size = dot(normal, normal)
+    outer = dot(cross(way, second.axis), normal) / size
+    return outer, dot(cross(first.axis, way), normal) / size
+
+
+def _across(arm: Arm, joint: int, plane: tuple[int, int]) -> np.ndarray:
+    """Velocity that a joint gives the centre across the plane of two others."""
+    normal = plane_normal(*(arm.screws[i] for i in plane))
+    return dot(normal, arm.screws[joint].velocity(arm.centre))
+
+
+def _area(arm: Arm, plane: tuple[int, int]) -> np.ndarray:
+    """Area spanned by the velocities that two joints which move in one plane give the centre, up to its sign.
+
+    For two slides it is the length of `plane_normal`, and counted there.
+    """
+    first, second = (arm.screws[i] for i in plane)
+    if first.revolute:
+        return dot(first.point - arm.centre, second.velocity(arm.centre))
+    if second.revolute:
+        return dot(arm.centre - second.point, first.axis)
+    return dot(first.axis, first.axis)
+
+
+def _along(arm: Arm, joint: int, axis: int) -> np.ndarray:
+    """Velocity that a joint gives the centre along the axis of another one."""
+    return dot(arm.screws[axis].axis, arm.screws[joint].velocity(arm.centre))
+
+
+def _approach(arm: Arm, joint: int, sign: float) -> np.ndarray:
+    """Velocity that a joint gives the centre towards, or away from, where two others meet, times its distance."""
+    way = sign * (arm.meeting - arm.centre)
+    return dot(way, arm.screws[joint].velocity(arm.centre))
+
+
+def _in_front(arm: Arm) -> np.ndarray:
+    """How far the centre is in front of the axis of b, as that of c sees it."""
+    _, b, c = arm.base
+    return dot(cross(b.axis, c.axis), arm.centre - b.point)
+
+
+def _to_front(arm: Arm) -> np.ndarray:
+    """Velocity that c gives the centre to the front."""
+    _, b, c = arm.base
+    return dot(cross(b.axis, c.axis), c.velocity(arm.centre))
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A way to solve for three joints.
+
+    Attributes
+    ----------
+    fits : callable
+        Whether it applies to joints.
+    meets : tuple of int
+        Two joints whose axes meet in `Arm.meeting`; empty where none have to.
+    solve : callable
+        Positions of a, b, c from the screws while the joints are at zero, and the target of their centre.
+    factors : tuple of Factor
+        Of the slots `FRONT` and `UP`.
+    """
+
+    fits: Callable[[RemainingJoints], bool]
+    meets: tuple[int, ...]
+    solve: Callable[[Arm, np.ndarray], Values]
+    factors: tuple[Factor, Factor]
+
+
+def _are_coplanar(joints: RemainingJoints, i: int, j: int) -> bool:
+    """Whether two joints move positions in planes of one and the same direction."""
+    if joints.revolute[i] and joints.revolute[j]:
+        return joints.are_parallel(i, j)
+    if joints.revolute[i] or joints.revolute[j]:
+        return joints.are_perpendicular(i, j)
+    return not joints.are_parallel(i, j)
+
+
+def _do_meet(joints: RemainingJoints, i: int, j: int) -> bool:
+    """Whether the axes of two joints meet in a fixed point of one of them."""
+    return joints.meeting(i, j) is not None
+
+
+def _are_cylindrical(joints: RemainingJoints) -> bool:
+    """Whether the first joint slides along the second's axis, and the third's is perpendicular to it."""
+    return (
+        joints.revolute[:3].tolist() == [False, True, True]
+        and joints.are_parallel(0, 1)
+        and joints.are_perpendicular(1, 2)
+    )
+
+
+def _front(value: Callable[[Arm], np.ndarray], vanishes: str, *slides: int) -> Factor:
+    return Factor(value, vanishes, ("front", "back"), slides)
+
+
+def _up(value: Callable[[Arm], np.ndarray], vanishes: str, *slides: int) -> Factor:
+    return Factor(value, vanishes, ("up", "down"), slides)
+
+
+_OUT = "does not move {point} out of the plane in which"
+_AWAY = "does not change the distance between {point} and the point where the axes of"
+
+RECIPES = (
+    Recipe(
+        partial(_are_coplanar, i=1, j=2),
+        (),
+        solve_plane_of_last,
+        (
+            _front(
+                partial(_across, joint=0, plane=(1, 2)),
+                f"{{a}} {_OUT} {{b}} and {{c}} do",
+                0,
+            ),
+            _up(
+                partial(_area, plane=(1, 2)),
+                "{b} and {c} move {point} along one line",
+                1,
+                2,
+            ),
+        ),
+    ),
+    Recipe(
+        partial(_are_coplanar, i=0, j=1),
+        (),
+        solve_plane_of_first,
+        (
+            _front(
+                partial(_area, plane=(0, 1)),
+                "{a} and {b} move {point} along one line",
+                0,
+                1,
+            ),
+            _up(
+                partial(_across, joint=2, plane=(0, 1)),
+                f"{{c}} {_OUT} {{a}} and {{b}} do",
+                2,
+            ),
+        ),
+    ),
+    Recipe(
+        partial(_do_meet, i=0, j=1),
+        (0, 1),
+        solve_meeting_of_first,
+        (
+            _front(
+                partial(_along, joint=1, axis=0),
+                "{b} does not move {point} along the axis of {a}",
+            ),
+            _up(
+                partial(_approach, joint=2, sign=1.0),
+                f"{{c}} {_AWAY} {{a}} and {{b}} meet",
+            ),
+        ),
+    ),
+    Recipe(
+        partial(_do_meet, i=1, j=2),
+        (1, 2),
+        solve_meeting_of_last,
+        (
+            _front(
+                partial(_along, joint=2, axis=1),
+                "{c} does not move {point} along the axis of {b}",
+            ),
+            _up(
+                partial(_approach, joint=0, sign=-1.0),
+                f"{{a}} {_AWAY} {{b}} and {{c}} meet",
+            ),
+        ),
+    ),
+    Recipe(
+        _are_cylindrical,
+        (),
+        solve_cylinder,
+        (
+            _front(_in_front, "{a} and {b} do not move {point} along the axis of {c}"),
+            _up(_to_front, f"{{c}} {_OUT} {{a}} and {{b}} do"),
+        ),
+    ),
+)
+"""The first one that fits is taken."""
+
+
+def choose_recipe(joints: RemainingJoints) -> tuple[Recipe, Anchor | None] | None:
+    """Return the recipe by which the first three joints place a point, and where two of their axes meet if it matters.
+
+    None where no recipe fits.
+    """
+    for recipe in RECIPES:
+        if recipe.fits(joints):
+            return recipe, joints.meeting(*recipe.meets) if recipe.meets else None
+    return None
+
+
+def refuse_recipes(joints: RemainingJoints, point: str) -> NotApplicableError:
+    """Return the reason against joints that no recipe fits: how the first three lie to each other."""
+    relations = f"{_relation(joints, 0, 1)}, and {_relation(joints, 1, 2)}"
+    names = ", ".join(joints.names[:3])
+    return NotApplicableError(f"no closed form moves {point} by {names}: {relations}")
+
+
+def _relation(joints: RemainingJoints, i: int, j: int) -> str:
+    """Say how two neighbours lie to each other."""
+    first = joints.names[i]
+    second = joints.names[j]
+    parallel = joints.are_parallel(i, j)
+    if joints.revolute[i] and joints.revolute[j]:
+        relation = "are not parallel and do not meet in a fixed point of one of them"
+        if parallel:
+            relation = "are parallel"
+        elif joints.meeting(i, j):
+            relation = "meet"
+        return f"the axes of {first} and {second} {relation}"
+    manner = "at an angle to"
+    if parallel:
+        manner = "along"
+    elif joints.are_perpendicular(i, j):
+        manner = "across"
+    if joints.revolute[i]:
+        return f"{second} slides {manner} the axis of {first}"
+    kind = "axis" if joints.revolute[j] else "direction"
+    return f"{first} slides {manner} the {kind} of {second}"
