@@ -126,31 +126,24 @@ def check_neighbours(
     """
     where, at = f"{join.blend_key}: {join.where}", (join.s, join.s)
     if stands_still(first, join.positions) or stands_still(second, join.positions):
-        problem = (
-            f"a blend needs motion of the position on both sides, and {still} on one"
-        )
-        hint = f"Turn {turning} along a line"
         raise PathError(
-            problem,
+            f"a blend needs motion of the position on both sides, and {still} on one",
             s_interval=at,
             found=f"{size:g} {join.unit}",
             allowed="no blend here",
             where=where,
-            hint=hint,
+            hint=f"Turn {turning} along a line",
         )
     longest = min(first.length, second.length) / 2
     if size > longest * (1 + _ROUNDING):
-        problem = "the blend is longer than half of a neighbouring segment"
         # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
-        allowed = f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}"
-        looks = position_hint(size, 0.0, longest, join.unit)
         raise PathError(
-            problem,
+            "the blend is longer than half of a neighbouring segment",
             s_interval=at,
             found=f"{size:g} {join.unit}",
-            allowed=allowed,
+            allowed=f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}",
             where=where,
-            hint=looks,
+            hint=position_hint(size, 0.0, longest, join.unit),
         )
 
 
@@ -186,11 +179,8 @@ def checked_septic(start: Array, end: Array, length: float, join: Join) -> Septi
         ).min()
     )
     if not speed > SLOWEST:
-        problem = (
-            "the corner is too sharp for a blend, which would all but stop and reverse"
-        )
         raise PathError(
-            problem,
+            "the corner is too sharp for a blend, which would all but stop and reverse",
             s_interval=(join.s, join.s),
             found=f"a smallest speed of {speed:.3g} relative to the segments",
             allowed=f"more than {SLOWEST}",
@@ -234,9 +224,8 @@ def blend_poses(
     curve = QuaternionPoseCurve(checked_septic(start, end, length, join))
     _, least = smallest(curve.quality, curve.knots)
     if least < LEAST_QUALITY:
-        problem = "the tool turns too much in the blend"
         raise PathError(
-            problem,
+            "the tool turns too much in the blend",
             s_interval=(join.s, join.s),
             found=f"quaternions interpolated with a quality of {least:.2g} out of 1",
             allowed=f"{LEAST_QUALITY} or more",

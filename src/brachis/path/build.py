@@ -126,8 +126,7 @@ def build_path(
     if frame is not None:
         point = frame.to_frame(point)
     if not segments:
-        problem = "a path needs at least one segment"
-        raise PathError(problem, where="path")
+        raise PathError("a path needs at least one segment", where="path")
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
         curves.append(coordinates.curve(segment, i, point))

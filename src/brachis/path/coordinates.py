@@ -104,9 +104,8 @@ class RowCoordinates:
                     where="task_space",
                 )
         if start.shape != (len(self.rows),) or not np.all(np.isfinite(start)):
-            problem = "the start of the path needs one finite coordinate for each row of the task space"
             raise PathError(
-                problem,
+                "the start of the path needs one finite coordinate for each row of the task space",
                 found=start.tolist(),
                 allowed=f"[{', '.join(self.rows)}]",
                 where="start",
@@ -124,9 +123,11 @@ class RowCoordinates:
                 problem, found=found, where=f"path[{index}].turn", hint=hint
             )
         if segment.orientation is not None:
-            problem = "an orientation along a segment is for task spaces of poses"
             raise PathError(
-                problem, found=found, where=f"path[{index}].orientation", hint=hint
+                "an orientation along a segment is for task spaces of poses",
+                found=found,
+                where=f"path[{index}].orientation",
+                hint=hint,
             )
         return curve_of(
             segment.shape, Site(f"path[{index}].{segment.kind}", start, self.rows)
@@ -227,16 +228,20 @@ class PoseCoordinates:
         """See `Coordinates.checked`."""
         allowed = "the position (3), then a rotation matrix row by row (9)"
         if start.shape != (POSE_COORDINATES,) or not np.all(np.isfinite(start)):
-            problem = "the start of a path of poses needs 12 finite coordinates"
             raise PathError(
-                problem, found=start.tolist(), allowed=allowed, where="start"
+                "the start of a path of poses needs 12 finite coordinates",
+                found=start.tolist(),
+                allowed=allowed,
+                where="start",
             )
         rotation = rotations(start)
         stretch = np.abs(rotation @ rotation.T - np.eye(3)).max()
         if stretch > 2.0 * _ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
-            problem = "the start of the path has no rotation matrix"
             raise PathError(
-                problem, found=rotation.tolist(), allowed=allowed, where="start"
+                "the start of the path has no rotation matrix",
+                found=rotation.tolist(),
+                allowed=allowed,
+                where="start",
             )
         nearest = matrices(quaternions_of(rotation_of(rotation))[None])[0]
         return np.concatenate([start[:POSITIONS], nearest.ravel()])

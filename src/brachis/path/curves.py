@@ -188,9 +188,8 @@ def arc_via(shape: ArcVia, site: Site) -> ArcCurve:
     sides = np.stack([to_via, to_end])
     gram = sides @ sides.T
     if np.linalg.det(gram) <= _COLLINEAR**2 * gram[0, 0] * gram[1, 1]:
-        problem = "start, via and end of the arc lie on a line"
         raise PathError(
-            problem,
+            "start, via and end of the arc lie on a line",
             found=f"start {site.position.tolist()}, via {list(shape.via)}, to {list(shape.to)}",
             allowed="three different points that are not collinear",
             where=f"{site.key}.via",
@@ -229,18 +228,16 @@ def about_center(
     center = site.coordinates(shape.center, "center", site.positions)
     outward = site.position - center
     if np.linalg.norm(outward) < ZERO_LENGTH:
-        problem = "the arc has zero length: its centre is its start, so that the radius is zero"
         raise PathError(
-            problem,
+            "the arc has zero length: its centre is its start, so that the radius is zero",
             found=list(shape.center),
             allowed="another point",
             where=f"{site.key}.center",
         )
     if center.size == _PLANE_ROWS:
         if shape.normal is not None:
-            problem = "a normal is for three position rows; here the plane is that of the task space"
             raise PathError(
-                problem,
+                "a normal is for three position rows; here the plane is that of the task space",
                 found=list(shape.normal),
                 allowed="no normal",
                 where=f"{site.key}.normal",
@@ -262,11 +259,8 @@ def _normal(
     """Return the unit normal of an arc in three rows."""
     where = f"{site.key}.normal"
     if normal is None:
-        problem = (
-            "with three position rows a centre does not determine the plane of the arc"
-        )
         raise PathError(
-            problem,
+            "with three position rows a centre does not determine the plane of the arc",
             found="no normal",
             allowed="the axis of rotation, [nx, ny, nz]",
             where=where,
@@ -274,16 +268,17 @@ def _normal(
         )
     size = float(np.linalg.norm(normal))
     if size < ZERO_LENGTH:
-        problem = "the normal has zero length"
         raise PathError(
-            problem, found=list(normal), allowed="any other vector", where=where
+            "the normal has zero length",
+            found=list(normal),
+            allowed="any other vector",
+            where=where,
         )
     unit = np.asarray(normal) / size
     slope = float(unit @ outward / np.linalg.norm(outward))
     if abs(slope) > _PERPENDICULAR:
-        problem = "the normal is not perpendicular to the radius from the centre to the segment's start"
         raise PathError(
-            problem,
+            "the normal is not perpendicular to the radius from the centre to the segment's start",
             found=f"{np.rad2deg(np.arccos(np.clip(slope, -1, 1))):.6g} degrees between them",
             allowed=f"90 degrees to within {np.rad2deg(_PERPENDICULAR):.2g}",
             where=where,
@@ -306,9 +301,8 @@ def _with_yaw(arc: ArcCurve, turning: str, site: Site) -> ArcCurve:
             ),
         )
     if turning == "tangent":
-        problem = "yaw is not a row of the task space"
         raise PathError(
-            problem,
+            "yaw is not a row of the task space",
             found="tangent",
             allowed="fixed",
             where=f"{site.key}.yaw",

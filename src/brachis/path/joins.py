@@ -154,9 +154,8 @@ def refuse_corners(corners: Sequence[Corner]) -> None:
         return
     corner, join = corners[0], corners[0].join
     others = ", ".join(other.join.blend_key for other in corners[1:])
-    problem = "the path must be smooth to the third derivative"
     raise PathError(
-        problem,
+        "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
         found=corner.found,
         allowed="segments that continue each other, or a blend",
@@ -185,10 +184,9 @@ def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
     """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
     on_the_spot = [stands_still(curve, POSITIONS) for curve in (first, second)]
     if on_the_spot[0] != on_the_spot[1]:
-        found = "a stop: the position moves on one side, and the tool turns on the spot on the other"
         return Corner(
             join,
-            found,
+            "a stop: the position moves on one side, and the tool turns on the spot on the other",
             "Turn the tool along a segment, by its orientation, or in a task of its own",
         )
     before, after, length = at_join(first, second)

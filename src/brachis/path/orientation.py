@@ -154,9 +154,8 @@ def turn_between(
 
 def half_turn(key: str) -> PathError:
     """Return the error that an orientation is half a turn away from the one before."""
-    problem = "the orientation is half a turn away from the one before, so that the way there is ambiguous"
     return PathError(
-        problem,
+        "the orientation is half a turn away from the one before, so that the way there is ambiguous",
         found="180 degrees",
         allowed="less than 180 degrees",
         where=key,
@@ -263,9 +262,12 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> WithTangen
         curve.knots,
     )
     if speed < _STOPS:
-        problem = "the curve all but stops, so that it has no tangent"
-        hint = "Use orientation: fixed, or other waypoints"
-        raise PathError(problem, found=_place(curve, sigma), where=key, hint=hint)
+        raise PathError(
+            "the curve all but stops, so that it has no tangent",
+            found=_place(curve, sigma),
+            where=key,
+            hint="Use orientation: fixed, or other waypoints",
+        )
 
     def sine(sigma: Array) -> Array:
         tangent = unit(curve.derivatives(sigma, 1)[1:])[0]
@@ -274,9 +276,8 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> WithTangen
 
     sigma, least = smallest(sine, curve.knots)
     if least < _PARALLEL:
-        problem = "the tangent becomes parallel to up, so that it does not say how the tool is turned about it"
         raise PathError(
-            problem,
+            "the tangent becomes parallel to up, so that it does not say how the tool is turned about it",
             found=f"{np.rad2deg(np.arcsin(least)):.2g} degrees between them at {_place(curve, sigma)}",
             allowed="1 degree or more",
             where=key,

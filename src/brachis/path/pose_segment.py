@@ -131,11 +131,10 @@ def _rotations(
         expected is not None
         and (angle := (start.inv() * expected).magnitude()) > START_TOLERANCE
     ):
-        hint = turn_hint(matrix, expected.as_matrix())
         raise starts_elsewhere(
             f"{site.key}.starts_oriented",
             f"an orientation that is {angle:.4g} rad off",
-            hint,
+            turn_hint(matrix, expected.as_matrix()),
         )
     return start.concatenate([start, *given])
 
@@ -144,9 +143,8 @@ def _check_quaternions(curve: QuaternionPoseCurve, site: Site) -> None:
     sigma, least = smallest(curve.quality, curve.knots)
     if least < LEAST_QUALITY:
         near = int(np.searchsorted(curve.knots, sigma)) - 1
-        problem = "the orientations differ too much, over too short a distance, for a smooth curve through them"
         raise PathError(
-            problem,
+            "the orientations differ too much, over too short a distance, for a smooth curve through them",
             found=f"quaternions interpolated with a quality of {least:.2g} out of 1",
             allowed=f"{LEAST_QUALITY} or more",
             where=f"{site.key}.orientations[{max(near, 0)}]",
@@ -182,9 +180,8 @@ def pose_curve(segment: Segment, index: int, start: Array) -> Curve:
     if isinstance(segment, TurnSegment):
         turn = turn_of(segment.turn, rotation, site.key)
         if abs(turn.angle) < ZERO_LENGTH:
-            problem = "the turn has zero length"
             raise PathError(
-                problem,
+                "the turn has zero length",
                 found="0 degrees",
                 allowed="another orientation than before",
                 where=site.key,

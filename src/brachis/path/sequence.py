@@ -149,12 +149,9 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
     worst = int(np.argmax(gap))
     allowed = f"an end where the path begins, to {_CLOSED:g} m and rad"
     if gap[worst] > _CLOSED:
-        found = (
-            f"{gap[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}"
-        )
         raise PathError(
             "the path does not close",
-            found=found,
+            found=f"{gap[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}",
             allowed=allowed,
             where="boundary.periodic",
         )

@@ -36,14 +36,12 @@ if TYPE_CHECKING:
 
 
 def _unread(shape: PointFile, site: Site) -> NoReturn:
-    problem = "the file has not been read"
-    hint = "brachis.load_task reads it and makes a curve of it"
     raise PathError(
-        problem,
+        "the file has not been read",
         found=shape.file,
         allowed="a curve",
         where=f"{site.key}.file",
-        hint=hint,
+        hint="brachis.load_task reads it and makes a curve of it",
     )
 
 

@@ -73,9 +73,8 @@ class Site:
             The number of values differs.
         """
         if len(values) != len(rows):
-            problem = "wrong number of coordinates"
             raise PathError(
-                problem,
+                "wrong number of coordinates",
                 found=f"{len(values)}: {list(values)}",
                 allowed=f"{len(rows)}: [{', '.join(rows)}]",
                 where=f"{self.key}.{key}",
@@ -91,9 +90,8 @@ class Site:
             The task space has another number of position rows than `counts`.
         """
         if len(self.positions) not in counts:
-            problem = f"{what} needs {' or '.join(map(str, counts))} position rows"
             raise PathError(
-                problem,
+                f"{what} needs {' or '.join(map(str, counts))} position rows",
                 found=f"the position rows [{', '.join(self.positions)}]",
                 where=self.key,
                 hint="Use line: {to: [...]}, line: {by: [...]} or a spline",
@@ -101,9 +99,8 @@ class Site:
 
     def zero_length(self, *, key: str, found: object) -> PathError:
         """Return the error that the segment has zero length."""
-        problem = "the segment has zero length"
         return PathError(
-            problem,
+            "the segment has zero length",
             found=found,
             allowed="a motion away from the segment's start",
             where=f"{self.key}{key}",

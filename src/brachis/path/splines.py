@@ -62,12 +62,10 @@ class SplineCurve:
 def spline_through(shape: SplineThrough, site: Site) -> SplineCurve | LineCurve:
     """Return the smooth curve from the segment's start through waypoints; a line where there is only one."""
     if shape.orientations is not None:
-        problem = "orientations are for task spaces of poses"
-        where = f"{site.key}.orientations"
         raise PathError(
-            problem,
+            "orientations are for task spaces of poses",
             found=f"task_space [{', '.join(site.rows)}]",
-            where=where,
+            where=f"{site.key}.orientations",
             hint="Set task_space: pose",
         )
     waypoints = waypoints_of(shape, site)
@@ -107,12 +105,11 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
         count = len(site.positions)
         distance = float(np.linalg.norm(off[:count]))
         if distance > START_TOLERANCE:
-            hint = place_hint(site.position, expected[:count], site.positions)
             unit = "rad or m" if joints_of(site.rows) else "m"
             raise starts_elsewhere(
                 f"{site.key}.starts_at",
                 f"{site.describe()}, {distance:.4g} {unit} off",
-                hint,
+                place_hint(site.position, expected[:count], site.positions),
             )
         if np.any(np.abs(off[count:]) > START_TOLERANCE):
             raise starts_elsewhere(
@@ -131,9 +128,8 @@ def repeats_start(steps: Array) -> bool:
 
 def starts_elsewhere(where: str, found: str, hint: str | None = None) -> PathError:
     """Return the error that a segment does not start where its waypoints expect; `hint` says what they look like."""
-    problem = "the segment starts elsewhere than its waypoints expect"
     return PathError(
-        problem,
+        "the segment starts elsewhere than its waypoints expect",
         found=found,
         allowed=f"at most {START_TOLERANCE:g} m and rad off",
         where=where,
@@ -286,9 +282,10 @@ def _check_start(off: Array, turned: Array, site: Site) -> None:
     for away, unit, hint in zip((off, turned), ("m", "rad"), hints, strict=True):
         distance = float(np.linalg.norm(away))
         if distance > START_TOLERANCE:
-            where = f"{site.key}.control_points[0]"
             raise starts_elsewhere(
-                where, f"{site.describe()}, {distance:.4g} {unit} off", hint
+                f"{site.key}.control_points[0]",
+                f"{site.describe()}, {distance:.4g} {unit} off",
+                hint,
             )
 
 

@@ -410,12 +410,19 @@ def fit_path(
 
     stated = _validate(FileUnits, units or {}, "units")
     given = points_from(points, orientations, speed, stated, _SOURCE)
-    allowed = (
-        None if tolerance is None else _validate(FitTolerance, tolerance, "tolerance")
-    )
     return tuple(
         segments_along(
-            given, Wanted(_SOURCE, _SOURCE, allowed, corner, relative, orientation)
+            given,
+            Wanted(
+                _SOURCE,
+                _SOURCE,
+                None
+                if tolerance is None
+                else _validate(FitTolerance, tolerance, "tolerance"),
+                corner,
+                relative,
+                orientation,
+            ),
         )
     )
 

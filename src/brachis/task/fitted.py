@@ -83,21 +83,20 @@ def segments_along(
     from brachis.task.points.least_squares import Tolerance
 
     if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
-        problem = "the points' orientations say already how the tool turns"
-        where = f"{wanted.where}.orientation"
         raise TaskError(
-            problem, found="orientations", allowed="no orientation", where=where
+            "the points' orientations say already how the tool turns",
+            found="orientations",
+            allowed="no orientation",
+            where=f"{wanted.where}.orientation",
         )
     if wanted.tolerance is None:
         if points.speed is not None:
-            problem = "feed rates are read along a fitted path alone"
-            hint = "Give a tolerance, or leave the feed rates out"
             raise TaskError(
-                problem,
+                "feed rates are read along a fitted path alone",
                 found="feed rates",
                 allowed="a tolerance beside them",
                 where=wanted.where,
-                hint=hint,
+                hint="Give a tolerance, or leave the feed rates out",
             )
         return [_spline_through(points, check_interpolation(points, told), wanted)]
     position, orientation, corner = (
@@ -174,23 +173,19 @@ def _check_corners(report: FitReport, wanted: Wanted) -> None:
         ]
     )
     if wanted.corner == "refuse":
-        hint = "Set corner: blend to round them within the tolerance"
-        where = f"{wanted.where}.corner"
         raise TaskError(
             f"the points have {write_count(len(found), 'corner')}",
             found=listed,
             allowed="none",
-            where=where,
-            hint=hint,
+            where=f"{wanted.where}.corner",
+            hint="Set corner: blend to round them within the tolerance",
         )
     if isinstance(wanted.orientation, Rotate | TurnTo):
-        hint = "Give an orientation for every point, or orientation: tangent"
-        where = f"{wanted.where}.orientation"
         raise TaskError(
             "the tool cannot turn at a constant rate over corners",
             found=listed,
-            where=where,
-            hint=hint,
+            where=f"{wanted.where}.orientation",
+            hint="Give an orientation for every point, or orientation: tangent",
         )
 
 
@@ -263,9 +258,8 @@ def _points_of(
     )
     if path.suffix.lower() in SUFFIXES:
         if settings.orientation is not None:
-            problem = "G-code has no orientations"
             raise TaskError(
-                problem,
+                "G-code has no orientations",
                 found=settings.orientation,
                 allowed="no csv.orientation",
                 where=where,
@@ -293,8 +287,11 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
     plain = PointFile(file=segment.csv.file)
     for key in ("orientation", "units", "tolerance", "corner"):
         if getattr(settings, key) != getattr(plain, key):
-            problem = "a path of joints passes all rows, which are in rad and m"
-            raise TaskError(problem, allowed=f"no {key}", where=f"{where}.csv.{key}")
+            raise TaskError(
+                "a path of joints passes all rows, which are in rad and m",
+                allowed=f"no {key}",
+                where=f"{where}.csv.{key}",
+            )
     path = folder / settings.file
     text = read_text(
         path,
@@ -324,9 +321,8 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
 
 def _check_count(rows: int, path: Path) -> None:
     if rows < 2:
-        problem = "a path needs its start and at least one waypoint"
         raise TaskError(
-            problem,
+            "a path needs its start and at least one waypoint",
             found=f"{write_count(rows, 'row')} of numbers",
             allowed="2 or more",
             where=str(path),

@@ -59,8 +59,11 @@ def _increasing(
     pair: tuple[float | None, float | None],
 ) -> tuple[float | None, float | None]:
     if None not in pair and not pair[0] < pair[1]:  # type: ignore[operator]
-        problem = "the lower limit must be below the upper one"
-        raise refuse(problem, found=list(pair), allowed="[low, high] with low < high")
+        raise refuse(
+            "the lower limit must be below the upper one",
+            found=list(pair),
+            allowed="[low, high] with low < high",
+        )
     return pair
 
 
@@ -69,9 +72,10 @@ Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increa
 
 def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < 0.0 < pair[1]:
-        problem = "a pair of limits lies around zero"
         raise refuse(
-            problem, found=list(pair), allowed="[lower, upper] with lower < 0 < upper"
+            "a pair of limits lies around zero",
+            found=list(pair),
+            allowed="[lower, upper] with lower < 0 < upper",
         )
     return pair
 
@@ -321,27 +325,24 @@ class SpeedTable(Model):
     @model_validator(mode="after")
     def _is_a_table(self) -> SpeedTable:
         if len(self.speed) != len(self.s):
-            problem = "there is not one speed for every path coordinate"
             raise refuse(
-                problem,
+                "there is not one speed for every path coordinate",
                 key=".speed",
                 found=write_count(len(self.speed), "speed"),
                 allowed=f"{len(self.s)}",
             )
         for row in range(1, len(self.s)):
             if self.s[row] < self.s[row - 1]:
-                problem = "the path coordinates do not ascend"
                 raise refuse(
-                    problem,
+                    "the path coordinates do not ascend",
                     key=f".s[{row}]",
                     found=self.s[row],
                     allowed=f">= {self.s[row - 1]:g}",
                 )
         for place, same in itertools.groupby(self.s):
             if len(list(same)) > 2:
-                problem = "a place has more than two speeds"
                 raise refuse(
-                    problem,
+                    "a place has more than two speeds",
                     key=".s",
                     found=place,
                     allowed="a place at most twice, which is a step",
@@ -424,14 +425,12 @@ class ToolLimits(Model):
     def _apart(cls, parts: tuple[ProcessSpeed, ...]) -> tuple[ProcessSpeed, ...]:
         for number in range(1, len(parts)):
             if parts[number].s[0] <= parts[number - 1].s[1]:
-                problem = "the parts of the path overlap, meet or are out of order"
                 end = parts[number - 1].s[1]
-                allowed = f"a begin above {end:g}; the part before ends there, and speeds change in a gap"
                 raise refuse(
-                    problem,
+                    "the parts of the path overlap, meet or are out of order",
                     key=f"[{number}].s",
                     found=list(parts[number].s),
-                    allowed=allowed,
+                    allowed=f"a begin above {end:g}; the part before ends there, and speeds change in a gap",
                 )
         return parts
 
@@ -441,13 +440,11 @@ class ToolLimits(Model):
             cap = _least_between(self.speed, part.s)
             slowest = part.speed * (1.0 - part.tolerance)
             if cap is not None and cap < slowest:
-                problem = "the tool's largest speed is below the process speed"
-                allowed = f"at most {cap:g} m/s there, or a higher tool_limits.speed"
                 raise refuse(
-                    problem,
+                    "the tool's largest speed is below the process speed",
                     key=f".process_speed[{number}].speed",
                     found=part.speed,
-                    allowed=allowed,
+                    allowed=f"at most {cap:g} m/s there, or a higher tool_limits.speed",
                 )
         return self
 

@@ -221,11 +221,10 @@ def _by_joint(
     text = read_text(path, where=where, folder=folder, found=found, largest=_LARGEST)
     content = read_yaml(text, str(path))
     if not isinstance(content, Mapping):
-        allowed = ", ".join(LimitsFile.model_fields)
         raise TaskError(
             "a limits file is a mapping",
             found=show(content),
-            allowed=allowed,
+            allowed=", ".join(LimitsFile.model_fields),
             where=str(path),
         )
     model = RosLimitsFile if "joint_limits" in content else LimitsFile
@@ -292,13 +291,11 @@ def _check_joints(
     )
     missing = [] if for_all else [name for name in moving if name not in stated]
     if missing:
-        hint = f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}"
-        problem = f"joint {missing[0]!r}, which moves the tool, has no entry"
         raise TaskError(
-            problem,
+            f"joint {missing[0]!r}, which moves the tool, has no entry",
             found=", ".join(sorted(limited)),
             where=f"{where}: joint_limits",
-            hint=hint,
+            hint=f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",
         )
 
 
@@ -349,12 +346,11 @@ def _spread(value: object, joints: tuple[str, ...], where: str) -> dict[str, Any
         return dict(value)
     if isinstance(value, tuple):
         if len(value) != len(joints):
-            allowed = f"{len(joints)}, one for each of {', '.join(joints)}"
             raise TaskError(
                 "has the wrong number of values",
                 where=where,
                 found=len(value),
-                allowed=allowed,
+                allowed=f"{len(joints)}, one for each of {', '.join(joints)}",
             )
         return dict(zip(joints, value, strict=True))
     return dict.fromkeys(joints, value)

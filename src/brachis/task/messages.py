@@ -72,12 +72,11 @@ def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
     describe = _DESCRIPTIONS.get(detail["type"], _unforeseen)
     complaint = describe(detail, model)
     key = _write_location(detail["loc"]) + complaint.key
-    where = f"{source}: {key}" if key else source
     return TaskError(
         complaint.problem,
         found=complaint.found,
         allowed=complaint.allowed,
-        where=where,
+        where=f"{source}: {key}" if key else source,
         hint=complaint.hint,
     )
 
@@ -188,18 +187,23 @@ def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     keys = _keys_at(detail["loc"][:-1], model)
     elsewhere = key_paths(name, model)
     near = nearest(name, keys)
-    hint = (
+    return _Complaint(
+        "unknown key",
+        name,
+        ", ".join(keys),
         f"It is a key of its own: {' or '.join(elsewhere)}"
         if elsewhere
-        else near and f"Did you mean {near!r}?"
+        else near and f"Did you mean {near!r}?",
     )
-    return _Complaint("unknown key", name, ", ".join(keys), hint)
 
 
 def _describe_refusal(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
     facts = detail["ctx"]
-    found = detail["input"] if facts["found"] is None else facts["found"]
-    shown = None if facts["absent"] else show(found)
+    shown = (
+        None
+        if facts["absent"]
+        else show(detail["input"] if facts["found"] is None else facts["found"])
+    )
     return _Complaint(
         facts["problem"], shown, facts["allowed"] or None, key=facts["key"]
     )
@@ -257,11 +261,12 @@ def _wrong_type(form: str) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
     def describe(detail: ErrorDetails, model: type[Model]) -> _Complaint:
         complaint = plainly(detail, model)
         keys = _keys_at(detail["loc"], model) if form == _MAPPING else []
-        allowed = (
-            f"{form} with keys out of {', '.join(keys)}" if keys else complaint.allowed
-        )
         return replace(
-            complaint, allowed=allowed, hint=_description_at(detail["loc"], model)
+            complaint,
+            allowed=f"{form} with keys out of {', '.join(keys)}"
+            if keys
+            else complaint.allowed,
+            hint=_description_at(detail["loc"], model),
         )
 
     return describe

@@ -64,11 +64,17 @@ def _expand_position(space: _Space) -> _Space:
 
 def _check_rows(rows: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(rows)) < len(rows):
-        problem = "a row occurs twice in the task space"
-        raise refuse(problem, found=list(rows), allowed="each row once")
+        raise refuse(
+            "a row occurs twice in the task space",
+            found=list(rows),
+            allowed="each row once",
+        )
     if "yaw" in rows and (len(rows) != len(POSITION_ROWS) or rows[-1] != "yaw"):
-        problem = "yaw needs exactly two position rows, and comes last"
-        raise refuse(problem, found=list(rows), allowed="for example [x, y, yaw]")
+        raise refuse(
+            "yaw needs exactly two position rows, and comes last",
+            found=list(rows),
+            allowed="for example [x, y, yaw]",
+        )
     return rows
 
 
@@ -247,8 +253,11 @@ class Task(Model):
     def _version_is_a_number(cls, version: object) -> object:
         # Python holds true == 1, so that the literal alone would accept `brachis: true`.
         if type(version) is not int:
-            problem = "the version of the task format must be a whole number"
-            raise refuse(problem, found=version, allowed="1")
+            raise refuse(
+                "the version of the task format must be a whole number",
+                found=version,
+                allowed="1",
+            )
         return version
 
     @model_validator(mode="before")
@@ -269,21 +278,19 @@ class Task(Model):
         ):
             return content
         if set(path) != {"frame", "segments"}:
-            problem = "a path in a frame is the frame's name and the segments"
             raise refuse(
-                problem,
+                "a path in a frame is the frame's name and the segments",
                 key="path",
                 found=path,
                 allowed="{frame: NAME, segments: [...]}",
             )
         other = content.get("path_frame")
         if other not in (None, path["frame"]):
-            allowed = f"{path['frame']}, or one of both keys"
             raise refuse(
                 "another frame than in path.frame",
                 key="path_frame",
                 found=other,
-                allowed=allowed,
+                allowed=f"{path['frame']}, or one of both keys",
             )
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
@@ -293,23 +300,29 @@ class Task(Model):
         if isinstance(path, SegmentModel | Mapping):
             return (path,)
         if callable(path):
-            problem = "a curve is not a segment"
-            allowed = "brachis.bspline_segment(curve, (first, last)), or the curve's points as an array"
-            raise refuse(problem, found=path, allowed=allowed)
+            raise refuse(
+                "a curve is not a segment",
+                found=path,
+                allowed="brachis.bspline_segment(curve, (first, last)), or the curve's points as an array",
+            )
         rows = plain(path)
         if not isinstance(rows, list) or any(
             isinstance(row, SegmentModel | Mapping) for row in rows
         ):
             return path
         if any(hasattr(row, "homogeneous") or _is_matrix(row) for row in rows):
-            allowed = "brachis.Spline(through=poses), or brachis.fit_path(poses)"
-            raise refuse("poses are not segments", found=rows, allowed=allowed)
+            raise refuse(
+                "poses are not segments",
+                found=rows,
+                allowed="brachis.Spline(through=poses), or brachis.fit_path(poses)",
+            )
         if len(rows) > 1 and all(isinstance(row, list) for row in rows):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
         if rows and all(isinstance(row, list | int | float) for row in rows):
-            allowed = "two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}"
             raise refuse(
-                "a path cannot be made of these numbers", found=rows, allowed=allowed
+                "a path cannot be made of these numbers",
+                found=rows,
+                allowed="two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}",
             )
         return path
 
@@ -317,9 +330,8 @@ class Task(Model):
     @classmethod
     def _no_blend_at_the_end(cls, path: tuple[Segment, ...]) -> tuple[Segment, ...]:
         if path[-1].blend is not None:
-            problem = "the last segment has no corner to blend"
             raise refuse(
-                problem,
+                "the last segment has no corner to blend",
                 key=f"[{len(path) - 1}].blend",
                 found=path[-1].blend,
                 allowed="no blend on the last segment",
@@ -338,33 +350,37 @@ class Task(Model):
         ):
             problem = "a free start posture leaves open where the path begins"
             if self.task_space == "joints":
-                problem = "a path of joints that does not begin with a waypoint needs a start posture"
                 raise refuse(
-                    problem, key="start", absent=True, allowed="{joints: [...]}"
+                    "a path of joints that does not begin with a waypoint needs a start posture",
+                    key="start",
+                    absent=True,
+                    allowed="{joints: [...]}",
                 )
             raise refuse(
                 problem, key="path_start", absent=True, allowed=self._start_forms
             )
         if self.start == "free" and self.search.guesses == "numeric":
-            problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(
-                problem, key="search.guesses", found="numeric", allowed="lattice"
+                "numeric inverse kinematics needs a posture to begin with, and start is free",
+                key="search.guesses",
+                found="numeric",
+                allowed="lattice",
             )
         return self
 
     @model_validator(mode="after")
     def _check_path_frame(self) -> Task:
         if self.path_frame is not None and self.path_frame not in self.frames:
-            problem = "this frame is not among frames"
             missing = f"frames: {{{self.path_frame}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
-            allowed = ", ".join(self.frames) or missing
             raise refuse(
-                problem, key="path_frame", found=self.path_frame, allowed=allowed
+                "this frame is not among frames",
+                key="path_frame",
+                found=self.path_frame,
+                allowed=", ".join(self.frames) or missing,
             )
         if self.path_frame is not None and self.task_space == "joints":
-            problem = "a path of joints is in no frame"
             raise refuse(
-                problem,
+                "a path of joints is in no frame",
                 key="path_frame",
                 found=self.path_frame,
                 allowed="null, with task_space: joints",
@@ -396,30 +412,31 @@ class Task(Model):
             problem = "a list does not say how an orientation is meant, as whether w of a quaternion is first or last"
             if not self.of_poses:
                 problem = "a position with an orientation is for task spaces of poses"
-            found = (
-                self.path_start.model_dump()
-                if isinstance(self.path_start, ToolPose)
-                else list(self.path_start)
-            )
             raise refuse(
-                problem, key="path_start", found=found, allowed=self._start_forms
+                problem,
+                key="path_start",
+                found=self.path_start.model_dump()
+                if isinstance(self.path_start, ToolPose)
+                else list(self.path_start),
+                allowed=self._start_forms,
             )
         return self
 
     @model_validator(mode="after")
     def _ends_in_motion(self) -> Task:
         if self.boundary.in_motion and self.spline.knots == "free":
-            problem = "ends in motion tie control points by the knots, which may not move then"
             raise refuse(
-                problem,
+                "ends in motion tie control points by the knots, which may not move then",
                 key="spline.knots",
                 found="free",
                 allowed="uniform, or a boundary at rest",
             )
         if self.boundary.periodic and self.end != "free":
-            problem = "the end posture of a periodic motion is its start posture"
             raise refuse(
-                problem, key="end", found=self.end.model_dump(), allowed="free"
+                "the end posture of a periodic motion is its start posture",
+                key="end",
+                found=self.end.model_dump(),
+                allowed="free",
             )
         return self
 
@@ -434,9 +451,8 @@ class Task(Model):
             and spline.intervals != "auto"
             and spline.intervals < least
         ):
-            problem = f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals"
             raise refuse(
-                problem,
+                f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals",
                 key="spline.intervals",
                 found=spline.intervals,
                 allowed=f">= {least}, or auto",
@@ -452,9 +468,8 @@ class Task(Model):
                 ("search.guesses", self.search.guesses, "lattice"),
             ):
                 if given != default:
-                    problem = "a path of joints leaves no choice of postures"
                     raise refuse(
-                        problem,
+                        "a path of joints leaves no choice of postures",
                         key=key,
                         found=given,
                         allowed=f"{default}, with task_space: joints",

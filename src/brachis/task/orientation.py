@@ -30,9 +30,8 @@ Vector3 = tuple[Number, Number, Number]
 
 def _check_direction(vector: Vector3) -> Vector3:
     if math.hypot(*vector) < 1e-9:
-        problem = "a direction cannot have zero length"
         raise refuse(
-            problem,
+            "a direction cannot have zero length",
             found=list(vector),
             allowed="any other vector; its length is of no importance",
         )
@@ -52,8 +51,11 @@ Profile = Annotated[
 def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | None:
     length = 1.0 if quaternion is None else math.hypot(*quaternion)
     if abs(length - 1.0) > 0.01:
-        problem = f"the quaternion's length is {length:.6g}"
-        raise refuse(problem, found=quaternion, allowed="a quaternion of length 1")
+        raise refuse(
+            f"the quaternion's length is {length:.6g}",
+            found=quaternion,
+            allowed="a quaternion of length 1",
+        )
     return quaternion
 
 
@@ -100,8 +102,11 @@ class Attitude(Model):
         given = value if isinstance(value, Mapping) else {}
         stated = [key for key in Attitude.model_fields if given.get(key) is not None]
         if not isinstance(value, Attitude) and len(stated) != 1:
-            problem = "an orientation needs exactly one convention"
-            raise refuse(problem, found=value, allowed=choices(suffix=_DEGREES))
+            raise refuse(
+                "an orientation needs exactly one convention",
+                found=value,
+                allowed=choices(suffix=_DEGREES),
+            )
         return value
 
     @model_serializer(mode="wrap")

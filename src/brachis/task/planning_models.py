@@ -73,17 +73,14 @@ class SplineSettings(Model):
         order = self.vanishing
         if order > 1 and self.degree <= order:
             last = {2: "acceleration", 3: "jerk"}[order]
-            problem = (
-                f"rest: {self.rest} asks for a continuous {last} that is zero at the ends: "
-                f"degree {self.degree} cannot give it"
-            )
             lower = " or ".join(
                 f"rest: {word}"
                 for word, level in _VANISHING.items()
                 if level < min(order, self.degree)
             )
             raise refuse(
-                problem,
+                f"rest: {self.rest} asks for a continuous {last} that is zero at the ends: "
+                f"degree {self.degree} cannot give it",
                 key=".degree",
                 found=self.degree,
                 allowed=f">= {order + 1}, or {lower}",
@@ -93,9 +90,8 @@ class SplineSettings(Model):
     @model_validator(mode="after")
     def _free_knots_need_a_number(self) -> SplineSettings:
         if self.knots == "free" and self.intervals == "auto":
-            problem = "knots: free needs a number of intervals; auto is the default"
             raise refuse(
-                problem,
+                "knots: free needs a number of intervals; auto is the default",
                 key=".intervals",
                 found="auto",
                 allowed="a number such as 12, or knots: uniform",
@@ -141,9 +137,8 @@ class SearchSettings(Model):
     @model_validator(mode="after")
     def _slower_is_for_least_motion(self) -> SearchSettings:
         if self.slower and not self.least_motion:
-            problem = "a slower motion is of use for least motion alone"
             raise refuse(
-                problem,
+                "a slower motion is of use for least motion alone",
                 key=".slower",
                 found=self.slower,
                 allowed="0, or least_motion: true",
@@ -222,11 +217,8 @@ class BoundarySettings(Model):
     def _periodic_has_no_ends(self) -> BoundarySettings:
         if self.periodic and (self.start_speed or self.end_speed):
             key = ".start_speed" if self.start_speed else ".end_speed"
-            problem = (
-                "a periodic motion has no ends: how fast it passes the seam is planned"
-            )
             raise refuse(
-                problem,
+                "a periodic motion has no ends: how fast it passes the seam is planned",
                 key=key,
                 found=self.start_speed or self.end_speed,
                 allowed="0, or periodic: false",

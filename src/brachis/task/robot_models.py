@@ -104,8 +104,11 @@ def _expand_word(mounting: object) -> object:
     if not isinstance(mounting, str):
         return mounting
     if mounting not in _WORDS:
-        allowed = f"{', '.join(_WORDS)}, or a mapping {{xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}}"
-        raise refuse("no mounting", found=mounting, allowed=allowed)
+        raise refuse(
+            "no mounting",
+            found=mounting,
+            allowed=f"{', '.join(_WORDS)}, or a mapping {{xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}}",
+        )
     return {"rpy_deg": _WORDS[mounting]}
 
 

@@ -90,9 +90,11 @@ class BSplineCurve(Model):
                 allowed="one",
             )
         if len(knots) != len(self.control_points) + outer:
-            allowed = f"{len(self.control_points) + outer}: control points + degree + 1"
             raise refuse(
-                "wrong number of knots", key=".knots", found=len(knots), allowed=allowed
+                "wrong number of knots",
+                key=".knots",
+                found=len(knots),
+                allowed=f"{len(self.control_points) + outer}: control points + degree + 1",
             )
         ends = set(knots[:outer]), set(knots[-outer:])
         inner = knots[outer:-outer]
@@ -102,17 +104,15 @@ class BSplineCurve(Model):
             or any(len(end) > 1 for end in ends)
             or ends[0] == ends[1]
         ):
-            allowed = "ascending knots, the first and the last one degree + 1 times"
             raise refuse(
                 "the B-spline is not clamped",
                 key=".knots",
                 found=list(knots),
-                allowed=allowed,
+                allowed="ascending knots, the first and the last one degree + 1 times",
             )
         if most > self.degree - _SMOOTH or {*inner} & (ends[0] | ends[1]):
-            problem = "a knot occurs so often that a derivative up to the third jumps"
             raise refuse(
-                problem,
+                "a knot occurs so often that a derivative up to the third jumps",
                 key=".knots",
                 found=most,
                 allowed=f"{self.degree - _SMOOTH} times at most",
@@ -139,8 +139,11 @@ Centre = Annotated[
 
 def _not_zero(turns: float) -> float:
     if turns == 0:
-        problem = "a circle without turns has zero length"
-        raise refuse(problem, found=turns, allowed="a number other than 0")
+        raise refuse(
+            "a circle without turns has zero length",
+            found=turns,
+            allowed="a number other than 0",
+        )
     return turns
 
 
@@ -251,18 +254,17 @@ class SplineThrough(Model):
     def _orientations_fit(self) -> SplineThrough:
         if self.orientations is None:
             if self.starts_oriented is not None:
-                problem = "the orientation at the start stands beside the orientations at the waypoints"
                 raise refuse(
-                    problem, key=".starts_oriented", allowed="orientations as well"
+                    "the orientation at the start stands beside the orientations at the waypoints",
+                    key=".starts_oriented",
+                    allowed="orientations as well",
                 )
         elif len(self.orientations) != len(self.through):
-            problem = "a spline needs an orientation for each of its waypoints, or none"
-            allowed = f"{len(self.through)}, as there are waypoints in through"
             raise refuse(
-                problem,
+                "a spline needs an orientation for each of its waypoints, or none",
                 key=".orientations",
                 found=len(self.orientations),
-                allowed=allowed,
+                allowed=f"{len(self.through)}, as there are waypoints in through",
             )
         return self
 
@@ -411,9 +413,8 @@ class SplineSegment(MovingSegment):
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> SplineSegment:
         if self.orientation is not None and self.spline.orientations is not None:
-            problem = "the spline's orientations say already how the tool turns"
             raise refuse(
-                problem,
+                "the spline's orientations say already how the tool turns",
                 key=".orientation",
                 allowed="orientation or spline.orientations, not both",
             )
@@ -448,9 +449,8 @@ class BSplineSegment(MovingSegment):
             self.orientation is not None
             and len(self.bspline.control_points[0]) == _POSE_COLUMNS
         ):
-            problem = "the curve's quaternions say already how the tool turns"
             raise refuse(
-                problem,
+                "the curve's quaternions say already how the tool turns",
                 key=".orientation",
                 allowed="orientation or control points with quaternions, not both",
             )

@@ -93,13 +93,12 @@ def read_gcode(
             for name, place in zip(POSITION, machine.at, strict=True)
             if place is None
         ]
-        hint = f"{', '.join(never)} is never stated" if never else None
         raise TaskError(
             "no motion",
             found=write_count(len(machine.points), "place"),
             allowed="2 or more",
             where=source,
-            hint=hint,
+            hint=f"{', '.join(never)} is never stated" if never else None,
         )
     chosen = [POSITION.index(name) for name in names]
     speed = np.array(machine.speeds)
@@ -137,9 +136,8 @@ def _block(machine: _Machine, code: str, where: str, number: int) -> None:
         elif letter in "XYZIJKRF":
             values[letter] = float(text)
         elif letter in "ABCUVW":
-            problem = "axes other than X, Y, Z are not read"
             raise TaskError(
-                problem,
+                "axes other than X, Y, Z are not read",
                 found=letter + text,
                 allowed="X, Y, Z, I, J, K, R, F",
                 where=where,
@@ -172,9 +170,11 @@ def _feed(machine: _Machine, value: float, where: str) -> None:
 
 def _miscellaneous(machine: _Machine, code: str, where: str) -> None:
     if code in _CALLS:
-        problem = "subprograms are not read"
         raise TaskError(
-            problem, found=f"M{code}", allowed="a program without calls", where=where
+            "subprograms are not read",
+            found=f"M{code}",
+            allowed="a program without calls",
+            where=where,
         )
     machine.ended = code in _ENDS
     machine.skipped.add(f"M{code}")
@@ -192,20 +192,22 @@ def _mode(machine: _Machine, code: str, where: str) -> None:
         machine.absolute = code == "90"
     elif code in _OFFSETS:
         if machine.points and machine.offset != code:
-            problem = "the work offset changes within the program: where the tool goes is not known"
             raise TaskError(
-                problem, found=f"G{code}", allowed="one work offset", where=where
+                "the work offset changes within the program: where the tool goes is not known",
+                found=f"G{code}",
+                allowed="one work offset",
+                where=where,
             )
         machine.offset = code
         machine.skipped.add(f"G{code}")
     elif code in _IGNORED:
         machine.skipped.add(f"G{code}")
     else:
-        allowed = (
-            "G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94"
-        )
         raise TaskError(
-            "this code is not read", found=f"G{code}", allowed=allowed, where=where
+            "this code is not read",
+            found=f"G{code}",
+            allowed="G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94",
+            where=where,
         )
 
 
@@ -275,10 +277,9 @@ def _arc(
     radius = hypot(*(one[[a, b]] - centre))
     at_end = hypot(*(other[[a, b]] - centre))
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
-        found = f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end"
         raise TaskError(
             "invalid arc: its start and end are at different radii",
-            found=found,
+            found=f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end",
             allowed="one radius; I, J, K from the start",
             where=where,
         )
@@ -311,10 +312,9 @@ def _centre(
     chord = other - one
     length = hypot(*chord)
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
-        found = f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart"
         raise TaskError(
             "invalid arc: no circle of this radius passes both ends",
-            found=found,
+            found=f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart",
             allowed="ends at most 2 R apart, and not the same",
             where=where,
         )
