@@ -7,10 +7,23 @@ written ``<like this>`` because they appear in pydantic's error locations; `brac
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, KeysView, Mapping
+from dataclasses import dataclass
+from types import NoneType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Final,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
 from pydantic import (
     BaseModel,
@@ -18,10 +31,12 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    GetCoreSchemaHandler,
     Strict,
+    Tag,
     WithJsonSchema,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from brachis.common.summary import show_value
 from brachis.errors import MissingAttributeError
@@ -124,7 +139,9 @@ Share = Annotated[
 ]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[str, Strict(), Field(min_length=1)]
-Vector = Annotated[tuple[Number, ...], Field(min_length=1)]
+_T = TypeVar("_T")
+NonEmpty = Annotated[tuple[_T, ...], Field(min_length=1)]
+Vector = NonEmpty[Number]
 
 
 def plain(
@@ -192,73 +209,116 @@ def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
     return add
 
 
-class _Chooser(Discriminator):
-    """A discriminator that can be hashed, so that the union which it serves can be part of another union."""
+@dataclass(frozen=True)
+class ByForm:
+    """Chooses a union's member by the form of the value: a word, a number, a list, a mapping or null.
 
-    def __hash__(self) -> int:
-        return hash(self.discriminator)
-
-
-def by_form(allowed: str, *words: str) -> Discriminator:
-    """Choose a union's member by the form of the value: a word, a number, a list, a mapping or null.
-
-    Parameters
+    Attributes
     ----------
     allowed : str
         The accepted forms, in words, for the error message.
-    *words : str
-        The strings that select the member tagged ``<word>``; any other string is refused.
     """
 
-    def form(value: object) -> str | None:
-        if isinstance(value, str):
-            return "<word>" if value in words else None
-        if value is None:
-            return "<null>"
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            return "<number>"
-        if isinstance(value, list | tuple):
-            return "<list>"
-        return "<mapping>" if isinstance(value, Mapping | BaseModel) else None
+    allowed: str
 
-    return _Chooser(
-        form,
-        custom_error_type=WRONG_FORM,
-        custom_error_message="must be {allowed}",
-        custom_error_context={"allowed": allowed},
-    )
+    def __get_pydantic_core_schema__(
+        self, union: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Tag every member with its form."""
+        members = {_form_of_type(member): member for member in get_args(union)}
+        words = get_args(members.get("<word>"))
+
+        def choose(value: object) -> str | None:
+            form = _form_of(value)
+            return None if form == "<word>" and value not in words else form
+
+        by_tag = Discriminator(
+            choose,
+            custom_error_type=WRONG_FORM,
+            custom_error_message="must be {allowed}",
+            custom_error_context={"allowed": self.allowed},
+        )
+        return _tagged_union(members, by_tag, handler)
 
 
-def by_key(problem: str, members: Mapping[str, tuple[str, ...]]) -> Discriminator:
-    """Choose a union's member by the keys of the mapping.
+@dataclass(frozen=True)
+class ByKey:
+    """Chooses a union's member, a model, by the keys of the mapping: those that the model requires.
 
-    Parameters
+    Attributes
     ----------
     problem : str
         What to say where the keys select no member, or more than one.
-    members : mapping of str to tuple of str
-        For every member's class name, the keys that select it. Its tag is ``<class name>``.
     """
-    allowed = " | ".join("{" + ", ".join(keys) + "}" for keys in members.values())
-    known = [key for keys in members.values() for key in keys]
 
-    def member(value: object) -> str | None:
-        if isinstance(value, BaseModel):
-            return f"<{type(value).__name__}>"
-        if not isinstance(value, Mapping):
-            return None
-        chosen = [
-            name for name, keys in members.items() if any(key in value for key in keys)
-        ]
-        return f"<{chosen[0]}>" if len(chosen) == 1 else None
+    problem: str
 
-    return _Chooser(
-        member,
-        custom_error_type=WRONG_KEYS,
-        custom_error_message="{problem}",
-        custom_error_context={
-            "problem": problem,
-            "allowed": allowed,
-            "known": " ".join(known),
-        },
+    def __get_pydantic_core_schema__(
+        self, union: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Tag every model with its name."""
+        members = {f"<{model.__name__}>": model for model in get_args(union)}
+        required = {tag: _required_keys(model) for tag, model in members.items()}
+
+        def choose(value: object) -> str | None:
+            if isinstance(value, BaseModel):
+                return f"<{type(value).__name__}>"
+            if not isinstance(value, Mapping):
+                return None
+            chosen = [tag for tag, keys in required.items() if keys & value.keys()]
+            return chosen[0] if len(chosen) == 1 else None
+
+        forms = (f"{{{', '.join(keys)}}}" for keys in required.values())
+        by_tag = Discriminator(
+            choose,
+            custom_error_type=WRONG_KEYS,
+            custom_error_message="{problem}",
+            custom_error_context={
+                "problem": self.problem,
+                "allowed": " | ".join(forms),
+                "known": " ".join(itertools.chain(*required.values())),
+            },
+        )
+        return _tagged_union(members, by_tag, handler)
+
+
+def _required_keys(model: type[BaseModel]) -> KeysView[str]:
+    fields = model.model_fields.items()
+    return {name: None for name, field in fields if field.is_required()}.keys()
+
+
+def _tagged_union(
+    members: Mapping[str, Any], by_tag: Discriminator, handler: GetCoreSchemaHandler
+) -> CoreSchema:
+    tagged = tuple(Annotated[member, Tag(tag)] for tag, member in members.items())
+    return handler.generate_schema(Annotated[Union[tagged], by_tag])  # noqa: UP007
+
+
+def _form_of(value: object) -> str | None:
+    if isinstance(value, bool):
+        return None
+    return next(
+        (form for kinds, form in _FORMS.items() if isinstance(value, kinds)), None
     )
+
+
+def _form_of_type(member: Any) -> str:
+    if get_origin(member) is Annotated:
+        return _form_of_type(get_args(member)[0])
+    origin = get_origin(member) or member
+    if origin is Literal:
+        return "<word>"
+    return next(
+        (form for kinds, form in _FORMS.items() if issubclass(origin, kinds)),
+        "<mapping>",
+    )
+
+
+_FORMS: Final[dict[Any, str]] = {
+    str: "<word>",
+    NoneType: "<null>",
+    (int, float): "<number>",
+    (list, tuple): "<list>",
+    (Mapping, BaseModel): "<mapping>",
+}
+"""Tags of the forms of values, by their types."""

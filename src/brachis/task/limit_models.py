@@ -20,20 +20,20 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
-    Tag,
     field_validator,
     model_validator,
 )
 
 from brachis.errors import write_count
 from brachis.task.fields import (
+    ByForm,
     Model,
     Name,
+    NonEmpty,
     NonNegative,
     Number,
     Positive,
     Share,
-    by_form,
     plain,
     refuse,
 )
@@ -47,12 +47,6 @@ class Array(Protocol):
 
     def tolist(self) -> Any:
         """Return plain numbers."""
-
-
-_LIMIT_FORMS = (
-    "a number > 0 for all joints, a list of numbers > 0, "
-    "a mapping of joint name to number > 0 or null, null (no limit)"
-)
 
 
 def _increasing(
@@ -80,43 +74,33 @@ def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
     return pair
 
 
-OneNumber = Annotated[Positive, Tag("<number>")]
-_Pair = Annotated[
-    Annotated[tuple[Number, Number], AfterValidator(_around_zero)], Tag("<list>")
-]
+_Pair = Annotated[tuple[Number, Number], AfterValidator(_around_zero)]
 _Entry = Annotated[
-    OneNumber | _Pair, by_form("a number > 0, or a pair [lower, upper] around zero")
+    Positive | _Pair, ByForm("a number > 0, or a pair [lower, upper] around zero")
 ]
 _EntryOrNull = Annotated[
-    OneNumber | _Pair | Annotated[None, Tag("<null>")],
-    by_form("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
+    Positive | _Pair | None,
+    ByForm("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
 ]
-Numbers = Annotated[Annotated[tuple[Positive, ...], Field(min_length=1)], Tag("<list>")]
-_Mapping = Annotated[dict[Name, Positive | None], Tag("<mapping>")]
-Null = Annotated[None, Tag("<null>")]
-UrdfWord = Annotated[Literal["urdf"], Tag("<word>")]
-
 UrdfLimit = Annotated[
-    UrdfWord
-    | OneNumber
-    | Annotated[Annotated[tuple[_Entry, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[dict[Name, _EntryOrNull], Tag("<mapping>")]
-    | Null,
-    by_form(
+    Literal["urdf"] | Positive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
+    ByForm(
         "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
-        "zero or null; null (no limit), urdf (as in the URDF)",
-        FROM_URDF,
+        "zero or null; null (no limit), urdf (as in the URDF)"
     ),
 ]
-OwnLimit = Annotated[OneNumber | Numbers | _Mapping | Null, by_form(_LIMIT_FORMS)]
+OwnLimit = Annotated[
+    Positive | NonEmpty[Positive] | dict[Name, Positive | None] | None,
+    ByForm(
+        "a number > 0 for all joints, a list of numbers > 0, "
+        "a mapping of joint name to number > 0 or null, null (no limit)"
+    ),
+]
 PositionLimit = Annotated[
-    UrdfWord
-    | Annotated[Annotated[tuple[Interval, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[dict[Name, Interval | None], Tag("<mapping>")]
-    | Null,
-    by_form(
-        "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), urdf (as in the URDF)",
-        FROM_URDF,
+    Literal["urdf"] | NonEmpty[Interval] | dict[Name, Interval | None] | None,
+    ByForm(
+        "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), "
+        "urdf (as in the URDF)"
     ),
 ]
 TorqueCurve = Annotated[
@@ -391,10 +375,8 @@ class ToolLimits(Model):
     """Limits on the motion of the tool frame's origin, and on how fast the tool turns."""
 
     speed: Annotated[
-        Annotated[Speed, Tag("<number>")]
-        | Annotated[SpeedTable, Tag("<mapping>")]
-        | Annotated[None, Tag("<null>")],
-        by_form("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
+        Speed | SpeedTable | None,
+        ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
     ] = Field(
         default=None,
         description="Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. "

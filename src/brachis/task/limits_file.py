@@ -12,7 +12,16 @@ from pydantic import Field, ValidationError, model_validator
 
 from brachis.common.files import check_kind, read_text
 from brachis.errors import TaskError, UnknownNameError
-from brachis.task.fields import Flag, Model, Name, Number, Positive, plain, refuse
+from brachis.task.fields import (
+    Flag,
+    Model,
+    Name,
+    NonEmpty,
+    Number,
+    Positive,
+    plain,
+    refuse,
+)
 from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, task_error
 from brachis.task.yaml_reader import read_yaml
@@ -28,9 +37,7 @@ class LimitsFile(Model):
 
     brachis_limits: Literal[1] = Field(description="Version of the format.")
     source: Name = Field(description="Where the figures are from.")
-    joints: Annotated[tuple[Name, ...], Field(min_length=1)] = Field(
-        description="The joints that the file limits."
-    )
+    joints: NonEmpty[Name] = Field(description="The joints that the file limits.")
     limits: LimitSpec = Field(
         description="As robot.limits, without scale; a list is in the order of joints, one number holds for all."
     )

@@ -14,16 +14,16 @@ from pydantic import (
     BeforeValidator,
     Field,
     JsonValue,
-    Tag,
     field_validator,
     model_validator,
 )
 
 from brachis.task.fields import (
+    ByForm,
     Model,
     Name,
+    NonEmpty,
     Number,
-    by_form,
     or_form,
     plain,
     refuse,
@@ -79,20 +79,16 @@ def _check_rows(rows: tuple[str, ...]) -> tuple[str, ...]:
 
 
 TaskSpace = Annotated[
-    Annotated[Literal["position", "pose", "pose_free_roll", "joints"], Tag("<word>")]
-    | Annotated[
-        Annotated[tuple[Row, ...], Field(min_length=1), AfterValidator(_check_rows)],
-        Tag("<list>"),
-    ],
-    by_form(_SPACE_FORMS, "position", "pose", "pose_free_roll", "joints"),
+    Literal["position", "pose", "pose_free_roll", "joints"]
+    | Annotated[tuple[Row, ...], Field(min_length=1), AfterValidator(_check_rows)],
+    ByForm(_SPACE_FORMS),
     AfterValidator(_expand_position),
 ]
 
 
 JointValues = Annotated[
-    Annotated[Annotated[tuple[Number, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[Annotated[dict[Name, Number], Field(min_length=1)], Tag("<mapping>")],
-    by_form(
+    NonEmpty[Number] | Annotated[dict[Name, Number], Field(min_length=1)],
+    ByForm(
         "a list of numbers in the order of the chain, or a mapping of joint name to number"
     ),
 ]
@@ -107,16 +103,14 @@ class Posture(Model):
 
 
 PathStart = Annotated[
-    Annotated[tuple[Number, ...], Tag("<list>")]
-    | Annotated[ToolPose, Tag("<mapping>")]
-    | Annotated[None, Tag("<null>")],
-    by_form(
+    tuple[Number, ...] | ToolPose | None,
+    ByForm(
         "a list of the rows of the task space, or of a pose a mapping {position: [x, y, z], rpy_deg: [...]}"
     ),
 ]
 FreePosture = Annotated[
-    Annotated[Literal["free"], Tag("<word>")] | Annotated[Posture, Tag("<mapping>")],
-    by_form("free, or a mapping {joints: [...]}", "free"),
+    Literal["free"] | Posture,
+    ByForm("free, or a mapping {joints: [...]}"),
 ]
 
 
@@ -129,9 +123,8 @@ def _each_once(joints: tuple[str, ...]) -> tuple[str, ...]:
 
 
 RedundantJoints = Annotated[
-    Annotated[Literal["auto"], Tag("<word>")]
-    | Annotated[Annotated[tuple[Name, ...], AfterValidator(_each_once)], Tag("<list>")],
-    by_form("auto, or a list of joint names", "auto"),
+    Literal["auto"] | Annotated[tuple[Name, ...], AfterValidator(_each_once)],
+    ByForm("auto, or a list of joint names"),
 ]
 
 

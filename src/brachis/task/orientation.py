@@ -17,12 +17,11 @@ from pydantic import (
     Field,
     JsonValue,
     SerializerFunctionWrapHandler,
-    Tag,
     model_serializer,
     model_validator,
 )
 
-from brachis.task.fields import Model, Number, by_form, by_key, refuse
+from brachis.task.fields import ByForm, ByKey, Model, Number, refuse
 from brachis.task.points.units import CONVENTIONS, choices
 
 Vector3 = tuple[Number, Number, Number]
@@ -190,34 +189,15 @@ class AlongTangent(Model):
 
 
 Turning = Annotated[
-    Annotated[Rotate, Tag("<Rotate>")] | Annotated[TurnTo, Tag("<TurnTo>")],
-    by_key(
-        "a turn needs exactly one of its forms",
-        {"Rotate": ("rotate",), "TurnTo": ("to",)},
-    ),
+    Rotate | TurnTo,
+    ByKey("a turn needs exactly one of its forms"),
 ]
 OrientationMode = Annotated[
-    Annotated[Literal["fixed", "tangent"], Tag("<word>")]
-    | Annotated[None, Tag("<null>")]
+    Literal["fixed", "tangent"]
     | Annotated[
-        Annotated[
-            Annotated[Rotate, Tag("<Rotate>")]
-            | Annotated[TurnTo, Tag("<TurnTo>")]
-            | Annotated[AlongTangent, Tag("<AlongTangent>")],
-            by_key(
-                "an orientation along a segment needs exactly one of its forms",
-                {
-                    "Rotate": ("rotate",),
-                    "TurnTo": ("to",),
-                    "AlongTangent": ("tangent",),
-                },
-            ),
-        ],
-        Tag("<mapping>"),
-    ],
-    by_form(
-        "fixed | tangent | {rotate: ...} | {to: ...} | {tangent: ...}",
-        "fixed",
-        "tangent",
-    ),
+        Rotate | TurnTo | AlongTangent,
+        ByKey("an orientation along a segment needs exactly one of its forms"),
+    ]
+    | None,
+    ByForm("fixed | tangent | {rotate: ...} | {to: ...} | {tangent: ...}"),
 ]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from brachis.task.fields import (
+    ByForm,
     Count,
     Flag,
     Model,
@@ -14,15 +15,13 @@ from brachis.task.fields import (
     NonNegative,
     Positive,
     Share,
-    by_form,
     refuse,
 )
 
 _VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}
 Intervals = Annotated[
-    Annotated[Literal["auto"], Tag("<word>")]
-    | Annotated[Annotated[Count, Field(ge=4, le=10_000)], Tag("<number>")],
-    by_form("auto, or a whole number", "auto"),
+    Literal["auto"] | Annotated[Count, Field(ge=4, le=10_000)],
+    ByForm("auto, or a whole number"),
 ]
 
 

@@ -10,27 +10,21 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from brachis.task.fields import (
+    ByForm,
     Model,
     Name,
+    NonEmpty,
     NonNegative,
     Number,
     Positive,
     Share,
-    by_form,
     plain,
     refuse,
 )
-from brachis.task.limit_models import (
-    FROM_URDF,
-    LimitSpec,
-    Null,
-    Numbers,
-    OneNumber,
-    UrdfWord,
-)
+from brachis.task.limit_models import FROM_URDF, LimitSpec
 from brachis.task.orientation import Vector3
 
 
@@ -122,29 +116,26 @@ Mounting = Annotated[
 
 
 PerJoint = Annotated[
-    Annotated[NonNegative, Tag("<number>")]
-    | Annotated[Annotated[tuple[NonNegative, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[dict[Name, NonNegative], Tag("<mapping>")],
-    by_form(
+    NonNegative | NonEmpty[NonNegative] | dict[Name, NonNegative],
+    ByForm(
         "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number"
     ),
 ]
 PerJointPositive = Annotated[
-    OneNumber | Numbers | Annotated[dict[Name, Positive], Tag("<mapping>")],
-    by_form(
+    Positive | NonEmpty[Positive] | dict[Name, Positive],
+    ByForm(
         "a number > 0 for all joints, a list of numbers, a mapping of joint name to number"
     ),
 ]
 UrdfFriction = Annotated[
-    UrdfWord
-    | Annotated[NonNegative, Tag("<number>")]
-    | Annotated[Annotated[tuple[NonNegative, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[dict[Name, NonNegative], Tag("<mapping>")]
-    | Null,
-    by_form(
+    Literal["urdf"]
+    | NonNegative
+    | NonEmpty[NonNegative]
+    | dict[Name, NonNegative]
+    | None,
+    ByForm(
         "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number, null (none), "
-        "urdf (as in the URDF)",
-        FROM_URDF,
+        "urdf (as in the URDF)"
     ),
 ]
 

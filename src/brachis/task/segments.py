@@ -16,18 +16,19 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, Tag, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from brachis.task.fields import (
+    ByKey,
     Count,
     Flag,
     Model,
     Name,
+    NonEmpty,
     NonNegative,
     Number,
     Positive,
     Vector,
-    by_key,
     refuse,
 )
 from brachis.task.orientation import (
@@ -223,7 +224,7 @@ class Helix(Model):
 class SplineThrough(Model):
     """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
-    through: Annotated[tuple[Vector, ...], Field(min_length=1)] = Field(
+    through: NonEmpty[Vector] = Field(
         description="Waypoints: all rows of the task space each (m, yaw in rad)."
     )
     orientations: tuple[Attitude, ...] | None = Field(
@@ -270,20 +271,12 @@ class SplineThrough(Model):
 
 
 Line = Annotated[
-    Annotated[LineTo, Tag("<LineTo>")]
-    | Annotated[LineBy, Tag("<LineBy>")]
-    | Annotated[LineHeading, Tag("<LineHeading>")],
-    by_key(
-        "a line needs exactly one of its forms",
-        {"LineTo": ("to",), "LineBy": ("by",), "LineHeading": ("length", "angle_deg")},
-    ),
+    LineTo | LineBy | LineHeading,
+    ByKey("a line needs exactly one of its forms"),
 ]
 Arc = Annotated[
-    Annotated[ArcCenter, Tag("<ArcCenter>")] | Annotated[ArcVia, Tag("<ArcVia>")],
-    by_key(
-        "an arc needs exactly one of its forms",
-        {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
-    ),
+    ArcCenter | ArcVia,
+    ByKey("an arc needs exactly one of its forms"),
 ]
 Shape = (
     LineTo
@@ -464,25 +457,13 @@ class CsvSegment(MovingSegment):
 
 
 Segment = Annotated[
-    Annotated[LineSegment, Tag("<LineSegment>")]
-    | Annotated[ArcSegment, Tag("<ArcSegment>")]
-    | Annotated[CircleSegment, Tag("<CircleSegment>")]
-    | Annotated[HelixSegment, Tag("<HelixSegment>")]
-    | Annotated[SplineSegment, Tag("<SplineSegment>")]
-    | Annotated[BSplineSegment, Tag("<BSplineSegment>")]
-    | Annotated[TurnSegment, Tag("<TurnSegment>")]
-    | Annotated[CsvSegment, Tag("<CsvSegment>")],
-    by_key(
-        "a segment needs exactly one kind",
-        {
-            "LineSegment": ("line",),
-            "ArcSegment": ("arc",),
-            "CircleSegment": ("circle",),
-            "HelixSegment": ("helix",),
-            "SplineSegment": ("spline",),
-            "BSplineSegment": ("bspline",),
-            "TurnSegment": ("turn",),
-            "CsvSegment": ("csv",),
-        },
-    ),
+    LineSegment
+    | ArcSegment
+    | CircleSegment
+    | HelixSegment
+    | SplineSegment
+    | BSplineSegment
+    | TurnSegment
+    | CsvSegment,
+    ByKey("a segment needs exactly one kind"),
 ]
