@@ -18,11 +18,11 @@ from brachis.path.site import ZERO_LENGTH, Site
 if TYPE_CHECKING:
     from brachis.path.protocol import Array
     from brachis.path.site import Site
-    from brachis.task import (
+    from brachis.task.segments import (
         ArcCenter,
         ArcVia,
-        Circle,
-        Helix,
+        CircleTurns,
+        HelixTurns,
         LineBy,
         LineHeading,
         LineTo,
@@ -167,7 +167,7 @@ def arc_center(shape: ArcCenter, site: Site) -> ArcCurve:
     return _with_yaw(about_center(shape, angle, site), shape.yaw, site)
 
 
-def circle(shape: Circle, site: Site) -> ArcCurve:
+def circle(shape: CircleTurns, site: Site) -> ArcCurve:
     """Return the turns about a centre."""
     return _with_yaw(
         about_center(shape, 2 * np.pi * shape.turns, site), shape.yaw, site
@@ -221,7 +221,7 @@ def _angle_of(vector: Array, outward: Array, forward: Array) -> float:
 
 
 def about_center(
-    shape: ArcCenter | Circle | Helix, angle: float, site: Site
+    shape: ArcCenter | CircleTurns | HelixTurns, angle: float, site: Site
 ) -> ArcCurve:
     """Return the arc by a signed angle, rad, about the centre of a shape; yaw is left out."""
     site.need_plane("an arc")
@@ -356,7 +356,7 @@ class HelixCurve:
         return result
 
 
-def helix(shape: Helix, site: Site) -> HelixCurve:
+def helix(shape: HelixTurns, site: Site) -> HelixCurve:
     """Return the climbing turns about an axis."""
     site.need_plane("a helix", _SPACE)
     arc = about_center(shape, 2 * np.pi * shape.turns, site)

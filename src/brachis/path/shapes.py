@@ -16,23 +16,23 @@ from brachis.path.curves import (
     line_to,
 )
 from brachis.path.splines import bspline_curve, spline_through
-from brachis.task import (
+from brachis.task.fields import Model
+from brachis.task.point_data import PointFile
+from brachis.task.segments import (
     ArcCenter,
     ArcVia,
     BSplineCurve,
-    Circle,
-    Helix,
+    CircleTurns,
+    HelixTurns,
     LineBy,
     LineHeading,
     LineTo,
-    PointFile,
     SplineThrough,
 )
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Curve
     from brachis.path.site import Site
-    from brachis.task import Shape
 
 
 def _unread(shape: PointFile, site: Site) -> NoReturn:
@@ -45,14 +45,14 @@ def _unread(shape: PointFile, site: Site) -> NoReturn:
     )
 
 
-BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
+BUILDERS: Final[dict[type[Model], Callable[[Any, Site], Curve]]] = {
     LineTo: line_to,
     LineBy: line_by,
     LineHeading: line_heading,
     ArcCenter: arc_center,
     ArcVia: arc_via,
-    Circle: circle,
-    Helix: helix,
+    CircleTurns: circle,
+    HelixTurns: helix,
     SplineThrough: spline_through,
     BSplineCurve: bspline_curve,
     PointFile: _unread,
@@ -60,6 +60,6 @@ BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
 """For every form of segment, the function that makes its curve."""
 
 
-def curve_of(shape: Shape, site: Site) -> Curve:
+def curve_of(shape: Model, site: Site) -> Curve:
     """Return the curve of a segment in all rows of the site."""
     return BUILDERS[type(shape)](shape, site)

@@ -1,6 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
-from brachis.task.constructors import fit_path
+from brachis.task.fitted import fit_path
 from brachis.task.keywords import TaskKeywords, check_keywords, task_with
 from brachis.task.limit_models import (
     FROM_URDF,
@@ -53,10 +53,8 @@ from brachis.task.segments import (
     ArcVia,
     BSplineCurve,
     BSplineSegment,
-    Circle,
     CircleSegment,
     CsvSegment,
-    Helix,
     HelixSegment,
     LineBy,
     LineHeading,
@@ -65,7 +63,6 @@ from brachis.task.segments import (
     MovingSegment,
     Segment,
     SegmentModel,
-    Shape,
     SplineSegment,
     SplineThrough,
     TurnSegment,
@@ -81,14 +78,12 @@ __all__ = [
     "BSplineCurve",
     "BSplineSegment",
     "BoundarySettings",
-    "Circle",
     "CircleSegment",
     "CsvSegment",
     "FileUnits",
     "FitReport",
     "FitTolerance",
     "FrictionSettings",
-    "Helix",
     "HelixSegment",
     "InertiaMatrix",
     "LimitKeywords",
@@ -112,7 +107,6 @@ __all__ = [
     "SearchSettings",
     "Segment",
     "SegmentModel",
-    "Shape",
     "SolverSettings",
     "Source",
     "SpeedTable",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Callable, KeysView, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import NoneType
 from typing import (
@@ -258,14 +258,18 @@ class ByKey:
     ) -> CoreSchema:
         """Tag every model with its name."""
         members = {f"<{model.__name__}>": model for model in get_args(union)}
-        required = {tag: _required_keys(model) for tag, model in members.items()}
+        required = {tag: required_keys(model) for tag, model in members.items()}
 
         def choose(value: object) -> str | None:
             if isinstance(value, BaseModel):
                 return f"<{type(value).__name__}>"
             if not isinstance(value, Mapping):
                 return None
-            chosen = [tag for tag, keys in required.items() if keys & value.keys()]
+            chosen = [
+                tag
+                for tag, keys in required.items()
+                if any(key in value for key in keys)
+            ]
             return chosen[0] if len(chosen) == 1 else None
 
         forms = (f"{{{', '.join(keys)}}}" for keys in required.values())
@@ -282,9 +286,10 @@ class ByKey:
         return _tagged_union(members, by_tag, handler)
 
 
-def _required_keys(model: type[BaseModel]) -> KeysView[str]:
+def required_keys(model: type[BaseModel]) -> tuple[str, ...]:
+    """Return the keys that a model requires, in order."""
     fields = model.model_fields.items()
-    return {name: None for name, field in fields if field.is_required()}.keys()
+    return tuple(name for name, field in fields if field.is_required())
 
 
 def _tagged_union(
@@ -297,21 +302,20 @@ def _tagged_union(
 def _form_of(value: object) -> str | None:
     if isinstance(value, bool):
         return None
-    return next(
-        (form for kinds, form in _FORMS.items() if isinstance(value, kinds)), None
-    )
+    if hasattr(value, "homogeneous"):  # a transform, such as Pinocchio's SE3
+        return "<mapping>"
+    forms = (form for kinds, form in _FORMS.items() if isinstance(value, kinds))
+    return next(forms, None)
 
 
 def _form_of_type(member: Any) -> str:
     if get_origin(member) is Annotated:
         return _form_of_type(get_args(member)[0])
-    origin = get_origin(member) or member
-    if origin is Literal:
+    kind = get_origin(member) or member
+    if kind is Literal:
         return "<word>"
-    return next(
-        (form for kinds, form in _FORMS.items() if issubclass(origin, kinds)),
-        "<mapping>",
-    )
+    forms = (form for kinds, form in _FORMS.items() if issubclass(kind, kinds))
+    return next(forms, "<mapping>")  # of a union of models
 
 
 _FORMS: Final[dict[Any, str]] = {

@@ -95,13 +95,14 @@ def _write_location(location: tuple[str | int, ...]) -> str:
     return text.removeprefix(".")
 
 
-def _models_in(annotation: object) -> Iterator[type]:
+def models_in(annotation: object) -> Iterator[type]:
+    """Yield the models, and dataclasses, that an annotation names."""
     if isinstance(annotation, type) and (
         issubclass(annotation, Model) or is_dataclass(annotation)
     ):
         yield annotation
     for part in get_args(annotation):
-        yield from _models_in(part)
+        yield from models_in(part)
 
 
 def _fields_of(model: type) -> Mapping[str, object]:
@@ -122,9 +123,7 @@ def _models_at(location: tuple[str | int, ...], model: type[Model]) -> list[type
             part in _fields_of(one) for one in models
         ):  # else a name in a mapping
             fields = [_fields_of(one).get(part) for one in models]
-            models = [
-                found for annotation in fields for found in _models_in(annotation)
-            ]
+            models = [found for annotation in fields for found in models_in(annotation)]
     return models
 
 
@@ -148,7 +147,7 @@ def key_paths(name: str, model: type[Model]) -> list[str]:
         level = [
             (path, each)
             for path, annotation in inside
-            for each in _models_in(annotation)
+            for each in models_in(annotation)
         ]
     return []
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import (
     AfterValidator,
@@ -142,6 +142,35 @@ class ToolPose(Attitude):
     """A place of the tool: its position, and its orientation in exactly one of these conventions."""
 
     position: Vector3 = Field(description="x, y, z, m.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_transform(cls, given: object) -> object:
+        """Take a transform such as Pinocchio's SE3 too."""
+        if not hasattr(given, "homogeneous"):
+            return given
+        ((position, turn),) = poses_of([given], "transform")
+        return {"position": position, **turn}
+
+
+def poses_of(
+    transforms: Any, source: str, orientations: Any = None
+) -> list[tuple[list[float], dict[str, Any]]]:
+    """Return positions, m, and orientations as a task file writes them; `source` names the transforms in messages."""
+    from brachis.task.point_data import FileUnits
+    from brachis.task.points.points import points_from
+
+    points = points_from(transforms, orientations, None, FileUnits(), source, least=1)
+    turns = [{"quaternion_wxyz": turn} for turn in points.turning.tolist()]
+    return list(zip(points.position.tolist(), turns, strict=True))
+
+
+class Transform(Protocol):
+    """A pose such as Pinocchio's ``SE3``."""
+
+    @property
+    def homogeneous(self) -> Any:
+        """Return the homogeneous matrix, (4, 4)."""
 
 
 class Rotation(Model):

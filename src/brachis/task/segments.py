@@ -6,17 +6,21 @@ start posture. Lengths are in metres, angles in degrees except the yaw coordinat
 therefore in radians. Coordinates are those of all rows of the task space; of a pose they are x, y, z. Whether their
 number fits the task space is for the path to say (`brachis.path.build_path`), which knows both.
 
-The curves that segments of a path are made of, as the task file writes them; see `brachis.task.segments`.
-
-Curves that a task gives as B-splines; fits to points become such curves.
+A kind of segment is a model here, in the union `Segment`, and the function in `brachis.path` that makes its curve.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    model_validator,
+)
 
 from brachis.task.fields import (
     ByKey,
@@ -30,6 +34,7 @@ from brachis.task.fields import (
     Positive,
     Vector,
     refuse,
+    required_keys,
 )
 from brachis.task.orientation import (
     Attitude,
@@ -37,6 +42,7 @@ from brachis.task.orientation import (
     OrientationMode,
     ToolPose,
     Turning,
+    poses_of,
 )
 from brachis.task.point_data import FitReport, PointFile
 
@@ -138,6 +144,14 @@ Centre = Annotated[
 ]
 
 
+def _as_list(value: object) -> object:
+    """Take a number for the one coordinate that it is."""
+    return [value] if isinstance(value, int | float) else value
+
+
+Coordinates = Annotated[Vector, BeforeValidator(_as_list)]
+
+
 def _not_zero(turns: float) -> float:
     if turns == 0:
         raise refuse(
@@ -151,7 +165,7 @@ def _not_zero(turns: float) -> float:
 class LineTo(Model):
     """A straight line to a point."""
 
-    to: Vector = Field(
+    to: Coordinates = Field(
         description="End point: all rows of the task space (m, yaw in rad)."
     )
 
@@ -159,7 +173,7 @@ class LineTo(Model):
 class LineBy(Model):
     """A straight line by a displacement."""
 
-    by: Vector = Field(
+    by: Coordinates = Field(
         description="Displacement: all rows of the task space (m, yaw in rad)."
     )
 
@@ -195,7 +209,7 @@ class ArcVia(Model):
     yaw: Yaw = "fixed"
 
 
-class Circle(Model):
+class CircleTurns(Model):
     """Whole or fractional turns about a centre."""
 
     center: Centre
@@ -206,7 +220,7 @@ class Circle(Model):
     yaw: Yaw = "fixed"
 
 
-class Helix(Model):
+class HelixTurns(Model):
     """Turns about an axis that climb along it, in three position rows."""
 
     center: Centre
@@ -217,14 +231,15 @@ class Helix(Model):
         description="Climb of each turn along the normal, m; negative: against it."
     )
     normal: Direction = Field(
-        description="Axis of rotation; right-hand rule. Any length but zero."
+        default=(0.0, 0.0, 1.0),
+        description="Axis of rotation; right-hand rule. Any length but zero.",
     )
 
 
 class SplineThrough(Model):
     """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
-    through: NonEmpty[Vector] = Field(
+    through: NonEmpty[Coordinates] = Field(
         description="Waypoints: all rows of the task space each (m, yaw in rad)."
     )
     orientations: tuple[Attitude, ...] | None = Field(
@@ -251,6 +266,20 @@ class SplineThrough(Model):
     )
     joints: JointOrder = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _of_poses(cls, content: object) -> object:
+        if not isinstance(content, Mapping):
+            return content
+        through = content.get("through")
+        orientations = content.get("orientations")
+        if not (_are_matrices(through) or _are_matrices(orientations)):
+            return content
+        poses = poses_of(through, "spline.through", orientations)
+        places = [position for position, _ in poses]
+        turns = [turn for _, turn in poses]
+        return {**content, "through": places, "orientations": turns}
+
     @model_validator(mode="after")
     def _orientations_fit(self) -> SplineThrough:
         if self.orientations is None:
@@ -270,28 +299,18 @@ class SplineThrough(Model):
         return self
 
 
-Line = Annotated[
-    LineTo | LineBy | LineHeading,
-    ByKey("a line needs exactly one of its forms"),
-]
-Arc = Annotated[
-    ArcCenter | ArcVia,
-    ByKey("an arc needs exactly one of its forms"),
-]
-Shape = (
-    LineTo
-    | LineBy
-    | LineHeading
-    | ArcCenter
-    | ArcVia
-    | Circle
-    | Helix
-    | SplineThrough
-    | BSplineCurve
-    | PointFile
-)
+def _are_matrices(values: Any) -> bool:
+    """Tell transforms, rotations and their matrices from coordinates and from what a task file has."""
+    first = values[0] if isinstance(values, list) and values else values
+    return any(hasattr(first, name) for name in ("homogeneous", "as_matrix")) or (
+        isinstance(first, list) and isinstance(first[0] if first else None, list)
+    )
 
 
+LineForm = Annotated[
+    LineTo | LineBy | LineHeading, ByKey("a line needs exactly one of its forms")
+]
+ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its forms")]
 _POSE_COLUMNS = 7
 _POSITIONS = 3
 
@@ -318,13 +337,9 @@ class SegmentModel(Model):
 
     def __repr__(self) -> str:
         """Show it as a program makes it."""
-        shape = getattr(self, self.kind)
-        rest = [
-            (name, value) for name, value in self.__repr_args__() if name != self.kind
-        ]
-        given = ", ".join(
-            f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest)
-        )
+        rest = [pair for pair in self.__repr_args__() if pair[0] != self.kind]
+        pairs = [*self.shape.__repr_args__(), *rest]
+        given = ", ".join(f"{name}={value!r}" for name, value in pairs)
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
@@ -337,11 +352,12 @@ class SegmentModel(Model):
     @property
     def kind(self) -> str:
         """The key that names the segment in the task file: ``line``, ``arc``, ``circle``, ``spline``, ..."""
-        return next(
-            name
-            for name in type(self).model_fields
-            if name not in {"blend", "orientation"}
-        )
+        return required_keys(type(self))[0]
+
+    @property
+    def shape(self) -> Any:
+        """What stands below the key that names the segment: a `LineTo`, an `ArcCenter`, ..."""
+        return getattr(self, self.kind)
 
 
 class MovingSegment(SegmentModel):
@@ -353,35 +369,44 @@ class MovingSegment(SegmentModel):
         "{to: ...} or {tangent: ...}. Null: fixed, or as a spline's `orientations` say.",
     )
 
-    @property
-    def shape(self) -> Shape:
-        """What stands below the key that names the segment."""
-        shape: Shape = getattr(self, self.kind)
-        return shape
-
 
 class LineSegment(MovingSegment):
     """A straight line."""
 
-    line: Line
+    line: LineForm
+
+    @model_validator(mode="before")
+    @classmethod
+    def _to_transform(cls, content: object) -> object:
+        if not isinstance(content, Mapping):
+            return content
+        line = content.get("line")
+        if not isinstance(line, Mapping) or not hasattr(line.get("to"), "homogeneous"):
+            return content
+        ((position, turn),) = poses_of([line["to"]], "line.to")
+        return {
+            "orientation": {"to": turn},
+            **content,
+            "line": {**line, "to": position},
+        }
 
 
 class ArcSegment(MovingSegment):
     """A circular arc."""
 
-    arc: Arc
+    arc: ArcForm
 
 
 class CircleSegment(MovingSegment):
     """A circle."""
 
-    circle: Circle
+    circle: CircleTurns
 
 
 class HelixSegment(MovingSegment):
     """A helix."""
 
-    helix: Helix
+    helix: HelixTurns
 
 
 class SplineSegment(MovingSegment):
@@ -390,7 +415,7 @@ class SplineSegment(MovingSegment):
     spline: SplineThrough
 
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
-        """See `SegmentModel.start_place`."""
+        """Return `starts_at`, or else the first waypoint; None where the waypoints are relative."""
         spline = self.spline
         if spline.relative:
             return None
@@ -426,7 +451,7 @@ class BSplineSegment(MovingSegment):
     bspline: BSplineCurve
 
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
-        """See `SegmentModel.start_place`."""
+        """Return the first control point; None where the curve is relative."""
         first = self.bspline.control_points[0]
         if self.bspline.relative or not of_poses or len(first) != _POSE_COLUMNS:
             return None if self.bspline.relative else first
