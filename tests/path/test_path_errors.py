@@ -105,7 +105,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"circle": {"center": [1, 0, 0], "normal": [0, 0, 0]}},
         XYZ,
-        ["circle.normal: the normal has zero length"],
+        ["circle.normal: a direction cannot have zero length"],
     ),
     (
         {"circle": {"center": [1, 0, 0], "normal": [1, 0, 1]}},

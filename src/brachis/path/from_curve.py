@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.path.pose import PosePath
 from brachis.path.sequence import SequencePath
 from brachis.task import BSplineSegment, SpeedTable
 
@@ -81,7 +80,7 @@ def bspline_segment(
             allowed="(first, last)",
         )
     else:
-        spline = _of_function(curve, _checked(interval), tolerance)
+        spline = _of_function(curve, _check_interval(interval), tolerance)
     parts = {
         "degree": int(spline.k),
         "knots": spline.t.tolist(),
@@ -90,7 +89,7 @@ def bspline_segment(
     return {"bspline": parts}
 
 
-def _checked(interval: tuple[float, float]) -> tuple[float, float]:
+def _check_interval(interval: tuple[float, float]) -> tuple[float, float]:
     first, last = (float(end) for end in interval)
     if not (np.isfinite([first, last]).all() and first < last):
         raise InputError(
@@ -109,7 +108,7 @@ def _of_pieces(
     interval: tuple[float, float] | None,
 ) -> BSpline:
     """Write piecewise polynomials, C3, as a clamped B-spline over the same breaks."""
-    first, last = _checked(interval or (breaks[0], breaks[-1]))
+    first, last = _check_interval(interval or (breaks[0], breaks[-1]))
     inner = np.unique(breaks[(breaks > first) & (breaks < last)])
     after = np.append(inner, last)  # so that there is a place where there are no breaks
     before = np.nextafter(after, first)
@@ -127,7 +126,7 @@ def _of_pieces(
                 "themselves (spline: {through: ...})",
             )
     degree = max(degree, _LEAST_DEGREE)
-    return _interpolating(
+    return _interpolate_at_abscissae(
         lambda u: _rows(pieces(u)), first, last, inner, degree, degree - _SMOOTH
     )
 
@@ -150,7 +149,7 @@ def _of_function(
     count, miss = _COARSEST, np.inf
     while count <= _FINEST:
         breaks = np.linspace(*interval, count + 1)
-        spline = _interpolating(values, *interval, breaks[1:-1], _DEGREE, 1)
+        spline = _interpolate_at_abscissae(values, *interval, breaks[1:-1], _DEGREE, 1)
         between = breaks[:-1] + np.diff(breaks) * 0.37
         miss = float(np.abs(spline(between) - values(between)).max())
         if miss <= tolerance:
@@ -165,7 +164,7 @@ def _of_function(
     )
 
 
-def _interpolating(
+def _interpolate_at_abscissae(
     values: Callable[[Array], Array],
     first: float,
     last: float,
@@ -203,13 +202,12 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     path : Path
         Built of them by `build_path`.
     """
-    sequence = path.coordinates if isinstance(path, PosePath) else path
-    if not isinstance(sequence, SequencePath):
+    if not isinstance(path, SequencePath):
         return ()
     tables: list[tuple[Array, Array]] = []
     goes_on = False
     for begin, end, piece in zip(
-        sequence.breaks, sequence.breaks[1:], sequence.pieces, strict=False
+        path.breaks, path.breaks[1:], path.pieces, strict=False
     ):
         if piece.segment is None:
             continue

@@ -86,6 +86,11 @@ class BSplineCurve(Model):
         default=None, description="What the curve was fitted to; written by brachis."
     )
 
+    @property
+    def has_quaternions(self) -> bool:
+        """Whether the control points say how the tool turns."""
+        return len(self.control_points[0]) == 7
+
     @model_validator(mode="after")
     def _knots_fit(self) -> BSplineCurve:
         knots = self.knots
@@ -134,7 +139,7 @@ Yaw = Annotated[
     ),
 ]
 Normal = Annotated[
-    tuple[Number, Number, Number] | None,
+    Direction | None,
     Field(
         description="Axis of rotation, for three position rows; right-hand rule. Any length but zero."
     ),
@@ -311,7 +316,6 @@ LineForm = Annotated[
     LineTo | LineBy | LineHeading, ByKey("a line needs exactly one of its forms")
 ]
 ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its forms")]
-_POSE_COLUMNS = 7
 _POSITIONS = 3
 
 
@@ -453,7 +457,7 @@ class BSplineSegment(MovingSegment):
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
         """Return the first control point; None where the curve is relative."""
         first = self.bspline.control_points[0]
-        if self.bspline.relative or not of_poses or len(first) != _POSE_COLUMNS:
+        if self.bspline.relative or not of_poses or not self.bspline.has_quaternions:
             return None if self.bspline.relative else first
         length = math.hypot(*first[_POSITIONS:]) or 1.0
         turn = [number / length for number in first[_POSITIONS:]]
@@ -463,10 +467,7 @@ class BSplineSegment(MovingSegment):
 
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> BSplineSegment:
-        if (
-            self.orientation is not None
-            and len(self.bspline.control_points[0]) == _POSE_COLUMNS
-        ):
+        if self.orientation is not None and self.bspline.has_quaternions:
             raise refuse(
                 "the curve's quaternions say already how the tool turns",
                 key=".orientation",
