@@ -379,6 +379,10 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         ],
     ),
     (
+        {"path": [{"circle": {"center": [1, 0, 0], "normal": [0, 0, 0]}}]},
+        ["path[0].circle.normal: a direction cannot have zero length"],
+    ),
+    (
         {"path": [{"circle": {"center": [0, 0], "turns": 0}}]},
         ["path[0].circle.turns: ", "zero length"],
     ),

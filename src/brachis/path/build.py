@@ -49,7 +49,7 @@ def build_path(
         A segment does not fit the task space, has zero length or is not defined; or the path has a corner that is not
         blended, or a blend that does not fit. The message names the key.
     UnknownNameError
-        There is no such row.
+        The row does not exist.
 
     Examples
     --------

@@ -134,7 +134,7 @@ def half_turn(key: str) -> PathError:
     )
 
 
-def _fixed(start: Array, sigma: Array, order: int) -> Array:
+def _stay(start: Array, sigma: Array, order: int) -> Array:
     """Return a rotation matrix that stays, and its derivatives."""
     result = np.zeros((order + 1, sigma.size, 3, 3))
     result[0] = start
@@ -180,7 +180,7 @@ def orientation_along(
         The orientation is not defined along this curve.
     """
     if mode is None or mode == "fixed":
-        return partial(_fixed, start)
+        return partial(_stay, start)
     if isinstance(mode, Rotate | TurnTo):
         return turn_of(mode, start, key).over(curve.length)
     given = mode.tangent.up if isinstance(mode, AlongTangent) else None

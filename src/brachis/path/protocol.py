@@ -85,8 +85,8 @@ class Curve(Protocol):
 
 
 Orientation = Callable[[Array, int], Array]
-"""Orientation of the tool along a segment: from K values of sigma and the order, the rotation matrix and its derivatives
-by sigma, shape (order + 1, K, 3, 3)."""
+"""Orientation of the tool along a segment: from K values of sigma and the order, the rotation matrix and as many
+derivatives by sigma, shape (order + 1, K, 3, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
