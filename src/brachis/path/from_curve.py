@@ -1,4 +1,4 @@
-"""Segments of a path from curves of other libraries, and speeds of the tool along a path from the feed rates of points."""
+"""Segments from curves of other libraries, and speeds of the tool along a path from the feed rates of its points."""
 
 from __future__ import annotations
 

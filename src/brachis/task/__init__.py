@@ -31,21 +31,7 @@ from brachis.task.orientation import (
     ToolPose,
     TurnTo,
 )
-from brachis.task.planning_models import (
-    BoundarySettings,
-    RefinementSettings,
-    SearchSettings,
-    SolverSettings,
-    SplineSettings,
-)
 from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
-from brachis.task.robot_models import (
-    FrictionSettings,
-    InertiaMatrix,
-    Payload,
-    Placement,
-    RobotSettings,
-)
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,
@@ -66,6 +52,18 @@ from brachis.task.segments import (
     SplineSegment,
     SplineThrough,
     TurnSegment,
+)
+from brachis.task.settings import (
+    BoundarySettings,
+    FrictionSettings,
+    InertiaMatrix,
+    Payload,
+    Placement,
+    RefinementSettings,
+    RobotSettings,
+    SearchSettings,
+    SolverSettings,
+    SplineSettings,
 )
 
 __all__ = [

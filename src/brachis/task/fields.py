@@ -12,6 +12,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from types import NoneType
 from typing import (
     TYPE_CHECKING,
@@ -19,6 +20,7 @@ from typing import (
     Any,
     Final,
     Literal,
+    Self,
     TypeVar,
     Union,
     get_args,
@@ -69,37 +71,50 @@ class Model(BaseModel):
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
+    def check(self, *rules: tuple[object, str, str, str]) -> Self:
+        """Return the model, unless its keys contradict each other.
+
+        Parameters
+        ----------
+        *rules : tuple of object, str, str, str
+            Whether the rule is broken; the key to blame, such as ``"spline.knots"``; what is wrong; what is allowed.
+        """
+        for broken, key, problem, allowed in rules:
+            if broken:
+                found = attrgetter(key)(self)
+                raise refuse(
+                    problem,
+                    key=key,
+                    found=found,
+                    allowed=allowed,
+                    absent=found is None,
+                )
+        return self
+
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
         """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
-        fields = type(self).model_fields
         given = [
-            (name, getattr(self, name))
-            for name in fields
+            (name, getattr(self, name), field.default)
+            for name, field in type(self).model_fields.items()
             if name in self.model_fields_set
         ]
-        return [
-            (name, _Shown(value))
-            for name, value in given
-            if value != fields[name].default
-        ]
+        return [(name, _Shown(value)) for name, value, usual in given if value != usual]
 
     def __str__(self) -> str:
         """Show it as `repr` does."""
         return repr(self)
 
 
+@dataclass(frozen=True)
 class _Shown:
     """A value that is shown as in summaries."""
 
-    def __init__(self, value: object) -> None:
-        self._value = value
+    value: object
 
     def __repr__(self) -> str:
-        return (
-            repr(self._value)
-            if isinstance(self._value, str | Model)
-            else show_value(self._value)
-        )
+        if isinstance(self.value, str | Model):
+            return repr(self.value)
+        return show_value(self.value)
 
 
 _PERCENT = re.compile(r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$")
@@ -112,7 +127,9 @@ def _from_percent(value: object) -> object:
     percent = _PERCENT.match(value)
     if percent is None:
         raise refuse(
-            "no share", found=value, allowed="from 0 to 100 %, or a number from 0 to 1"
+            "not a share",
+            found=value,
+            allowed="from 0 to 100 %, or a number from 0 to 1",
         )
     return float(percent[1]) / 100.0
 
@@ -173,7 +190,7 @@ def refuse(
     problem : str
         What is wrong.
     key : str, optional
-        Where, below the validated value, for example ``"[2].blend"`` or ``".degree"``.
+        Where, below the validated value, for example ``"[2].blend"`` or ``"degree"``.
     found : object, optional
         What was found; the validated value itself where it is None.
     allowed : str, optional
@@ -182,17 +199,8 @@ def refuse(
         Whether the fault is that nothing was given, so that there is nothing to show.
     """
     # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
-    return PydanticCustomError(
-        REFUSED,
-        "{problem}",
-        {
-            "problem": problem,
-            "key": key,
-            "found": found,
-            "allowed": allowed,
-            "absent": absent,
-        },
-    )
+    facts = {"key": key, "found": found, "allowed": allowed, "absent": absent}
+    return PydanticCustomError(REFUSED, "{problem}", {"problem": problem, **facts})
 
 
 def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:

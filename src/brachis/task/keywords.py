@@ -12,15 +12,17 @@ from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task
 from brachis.task.orientation import ToolPose, Transform
-from brachis.task.planning_models import (
+from brachis.task.segments import SegmentModel
+from brachis.task.settings import (
     BoundarySettings,
+    Payload,
+    Placement,
     RefinementSettings,
+    RobotSettings,
     SearchSettings,
     SolverSettings,
     SplineSettings,
 )
-from brachis.task.robot_models import Payload, Placement, RobotSettings
-from brachis.task.segments import SegmentModel
 
 Posture = (
     Array

@@ -311,7 +311,7 @@ class SpeedTable(Model):
         if len(self.speed) != len(self.s):
             raise refuse(
                 "there is not one speed for every path coordinate",
-                key=".speed",
+                key="speed",
                 found=write_count(len(self.speed), "speed"),
                 allowed=f"{len(self.s)}",
             )
@@ -319,7 +319,7 @@ class SpeedTable(Model):
             if self.s[row] < self.s[row - 1]:
                 raise refuse(
                     "the path coordinates do not ascend",
-                    key=f".s[{row}]",
+                    key=f"s[{row}]",
                     found=self.s[row],
                     allowed=f">= {self.s[row - 1]:g}",
                 )
@@ -327,7 +327,7 @@ class SpeedTable(Model):
             if len(list(same)) > 2:
                 raise refuse(
                     "a place has more than two speeds",
-                    key=".s",
+                    key="s",
                     found=place,
                     allowed="a place at most twice, which is a step",
                 )
@@ -424,7 +424,7 @@ class ToolLimits(Model):
             if cap is not None and cap < slowest:
                 raise refuse(
                     "the tool's largest speed is below the process speed",
-                    key=f".process_speed[{number}].speed",
+                    key=f"process_speed[{number}].speed",
                     found=part.speed,
                     allowed=f"at most {cap:g} m/s there, or a higher tool_limits.speed",
                 )

@@ -20,7 +20,7 @@ from brachis.task.fitted import expand_csv_files
 from brachis.task.limits_file import with_limits_of_file
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
-from brachis.task.robot_models import RobotSettings
+from brachis.task.settings import RobotSettings
 from brachis.task.yaml_reader import read_yaml
 
 _INDEX = re.compile(r"\[(\d+)\]")

@@ -12,8 +12,9 @@ A kind of segment is a model here, in the union `Segment`, and the function in `
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -92,44 +93,44 @@ class BSplineCurve(Model):
         return len(self.control_points[0]) == 7
 
     @model_validator(mode="after")
-    def _knots_fit(self) -> BSplineCurve:
+    def _knots_fit(self) -> Self:
         knots = self.knots
         outer = self.degree + 1
-        if len({len(point) for point in self.control_points}) > 1:
-            raise refuse(
-                "control points differ in their number of coordinates",
-                key=".control_points",
-                allowed="one",
-            )
-        if len(knots) != len(self.control_points) + outer:
+        needed = len(self.control_points) + outer
+        if len(knots) != needed:
             raise refuse(
                 "wrong number of knots",
-                key=".knots",
+                key="knots",
                 found=len(knots),
-                allowed=f"{len(self.control_points) + outer}: control points + degree + 1",
+                allowed=f"{needed}: control points + degree + 1",
             )
-        ends = set(knots[:outer]), set(knots[-outer:])
-        inner = knots[outer:-outer]
-        most = max((inner.count(knot) for knot in inner), default=0)
-        if (
-            list(knots) != sorted(knots)
-            or any(len(end) > 1 for end in ends)
-            or ends[0] == ends[1]
-        ):
-            raise refuse(
+        times = Counter(knots)
+        ends = (knots[0], knots[-1])
+        clamped = ends == (knots[outer - 1], knots[-outer]) and ends[0] < ends[1]
+        inner = [count for knot, count in times.items() if knot not in ends]
+        most = max(inner, default=0)
+        allowed = self.degree - _SMOOTH
+        often = most > allowed or any(times[end] > outer for end in ends)
+        return self.check(
+            (
+                len({len(point) for point in self.control_points}) > 1,
+                "control_points",
+                "control points differ in their number of coordinates",
+                "one",
+            ),
+            (
+                not clamped or list(knots) != sorted(knots),
+                "knots",
                 "the B-spline is not clamped",
-                key=".knots",
-                found=list(knots),
-                allowed="ascending knots, the first and the last one degree + 1 times",
-            )
-        if most > self.degree - _SMOOTH or {*inner} & (ends[0] | ends[1]):
-            raise refuse(
-                "a knot occurs so often that a derivative up to the third jumps",
-                key=".knots",
-                found=most,
-                allowed=f"{self.degree - _SMOOTH} times at most",
-            )
-        return self
+                "ascending knots, the first and the last one degree + 1 times",
+            ),
+            (
+                often,
+                "knots",
+                f"a knot occurs {most} times, so often that a derivative up to the third jumps",
+                f"{allowed} times at most",
+            ),
+        )
 
 
 Yaw = Annotated[
@@ -286,22 +287,23 @@ class SplineThrough(Model):
         return {**content, "through": places, "orientations": turns}
 
     @model_validator(mode="after")
-    def _orientations_fit(self) -> SplineThrough:
-        if self.orientations is None:
-            if self.starts_oriented is not None:
-                raise refuse(
-                    "the orientation at the start stands beside the orientations at the waypoints",
-                    key=".starts_oriented",
-                    allowed="orientations as well",
-                )
-        elif len(self.orientations) != len(self.through):
+    def _orientations_fit(self) -> Self:
+        count = len(self.through)
+        if self.orientations is not None and len(self.orientations) != count:
             raise refuse(
                 "a spline needs an orientation for each of its waypoints, or none",
-                key=".orientations",
+                key="orientations",
                 found=len(self.orientations),
-                allowed=f"{len(self.through)}, as there are waypoints in through",
+                allowed=f"{count}, as there are waypoints in through",
             )
-        return self
+        return self.check(
+            (
+                self.orientations is None and self.starts_oriented is not None,
+                "starts_oriented",
+                "the orientation at the start stands beside the orientations at the waypoints",
+                "orientations as well",
+            )
+        )
 
 
 def _are_matrices(values: Any) -> bool:
@@ -433,14 +435,15 @@ class SplineSegment(MovingSegment):
         return ToolPose.model_validate({"position": place, **oriented.model_dump()})
 
     @model_validator(mode="after")
-    def _one_word_on_orientation(self) -> SplineSegment:
-        if self.orientation is not None and self.spline.orientations is not None:
-            raise refuse(
+    def _one_word_on_orientation(self) -> Self:
+        return self.check(
+            (
+                self.orientation is not None and self.spline.orientations is not None,
+                "orientation",
                 "the spline's orientations say already how the tool turns",
-                key=".orientation",
-                allowed="orientation or spline.orientations, not both",
+                "orientation or spline.orientations, not both",
             )
-        return self
+        )
 
 
 class TurnSegment(SegmentModel):
@@ -466,14 +469,15 @@ class BSplineSegment(MovingSegment):
         )
 
     @model_validator(mode="after")
-    def _one_word_on_orientation(self) -> BSplineSegment:
-        if self.orientation is not None and self.bspline.has_quaternions:
-            raise refuse(
+    def _one_word_on_orientation(self) -> Self:
+        return self.check(
+            (
+                self.orientation is not None and self.bspline.has_quaternions,
+                "orientation",
                 "the curve's quaternions say already how the tool turns",
-                key=".orientation",
-                allowed="orientation or control points with quaternions, not both",
+                "orientation or control points with quaternions, not both",
             )
-        return self
+        )
 
 
 class CsvSegment(MovingSegment):
