@@ -12,10 +12,12 @@ Limits on the motion of the tool.
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Final, Literal, Protocol, TypedDict
+from typing import Annotated, Any, Final, Literal, Protocol, TypedDict, Unpack
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -24,7 +26,7 @@ from pydantic import (
     model_validator,
 )
 
-from brachis.errors import write_count
+from brachis.errors import UnknownNameError, write_count
 from brachis.task.fields import (
     ByForm,
     Model,
@@ -52,10 +54,11 @@ class Array(Protocol):
 def _increasing(
     pair: tuple[float | None, float | None],
 ) -> tuple[float | None, float | None]:
-    if None not in pair and not pair[0] < pair[1]:  # type: ignore[operator]
+    low, high = pair
+    if low is not None and high is not None and low >= high:
         raise refuse(
             "the lower limit must be below the upper one",
-            found=list(pair),
+            found=pair,
             allowed="[low, high] with low < high",
         )
     return pair
@@ -68,7 +71,7 @@ def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < 0.0 < pair[1]:
         raise refuse(
             "a pair of limits lies around zero",
-            found=list(pair),
+            found=pair,
             allowed="[lower, upper] with lower < 0 < upper",
         )
     return pair
@@ -240,20 +243,7 @@ class LimitSpec:
 
     __pydantic_config__ = Model.model_config
 
-    def __init__(
-        self,
-        torque: StatedLimit = FROM_URDF,
-        velocity: StatedLimit = FROM_URDF,
-        acceleration: StatedLimit = None,
-        position: StatedRange = FROM_URDF,
-        scale: Mapping[str, float] | LimitScale | None = None,
-        power: StatedLimit = None,
-        total_power: float | None = None,
-        rms_torque: StatedLimit = None,
-        torque_speed: StatedCurves = None,
-        jerk: StatedLimit = None,
-        torque_rate: StatedLimit = None,
-    ) -> None:
+    def __init__(self, **stated: Unpack[LimitKeywords]) -> None:
         """Take limits from a program; they are checked when a robot is made with them, where its joints are known.
 
         Parameters
@@ -275,14 +265,17 @@ class LimitSpec:
         jerk, torque_rate : float, sequence, array, mapping or None, optional
             rad/s^3 or m/s^3; Nm/s or N/s. As `acceleration`. They need ``spline.degree`` >= 3 and acceleration at rest.
         """
-        if not isinstance(scale, LimitScale):
-            scale = LimitScale().model_copy(
-                update={kind: plain(factor) for kind, factor in (scale or {}).items()}
+        given: dict[str, Any] = {"scale": None, **stated}
+        if not isinstance(given["scale"], LimitScale):
+            factors = plain(given["scale"] or {})
+            given["scale"] = LimitScale().model_copy(update=factors)  # type: ignore[arg-type]
+        for each in fields(self):
+            value = plain(given.pop(each.name, each.default), tuple)
+            object.__setattr__(self, each.name, value)
+        if given:
+            raise UnknownNameError(
+                "limit", next(iter(given)), LimitKeywords.__annotations__
             )
-        stated = (torque, velocity, acceleration, position, scale)
-        further = (power, total_power, rms_torque, torque_speed, jerk, torque_rate)
-        for each, value in zip(fields(self), (*stated, *further), strict=True):
-            object.__setattr__(self, each.name, plain(value, tuple))
 
 
 _SPEED = {"ge": 1e-6, "le": 1e12}
@@ -315,16 +308,16 @@ class SpeedTable(Model):
                 found=write_count(len(self.speed), "speed"),
                 allowed=f"{len(self.s)}",
             )
-        for row in range(1, len(self.s)):
-            if self.s[row] < self.s[row - 1]:
+        for row, (before, place) in enumerate(itertools.pairwise(self.s), 1):
+            if place < before:
                 raise refuse(
                     "the path coordinates do not ascend",
                     key=f"s[{row}]",
-                    found=self.s[row],
-                    allowed=f">= {self.s[row - 1]:g}",
+                    found=place,
+                    allowed=f">= {before:g}",
                 )
-        for place, same in itertools.groupby(self.s):
-            if len(list(same)) > 2:
+        for place, times in Counter(self.s).items():
+            if times > 2:
                 raise refuse(
                     "a place has more than two speeds",
                     key="s",
@@ -344,7 +337,7 @@ def _between(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < pair[1]:
         raise refuse(
             "the part of the path is empty",
-            found=list(pair),
+            found=pair,
             allowed="[begin, end] with begin < end",
         )
     return pair
@@ -405,13 +398,13 @@ class ToolLimits(Model):
     @field_validator("process_speed")
     @classmethod
     def _apart(cls, parts: tuple[ProcessSpeed, ...]) -> tuple[ProcessSpeed, ...]:
-        for number in range(1, len(parts)):
-            if parts[number].s[0] <= parts[number - 1].s[1]:
-                end = parts[number - 1].s[1]
+        for number, (before, part) in enumerate(itertools.pairwise(parts), 1):
+            end = before.s[1]
+            if part.s[0] <= end:
                 raise refuse(
                     "the parts of the path overlap, meet or are out of order",
                     key=f"[{number}].s",
-                    found=list(parts[number].s),
+                    found=part.s,
                     allowed=f"a begin above {end:g}; the part before ends there, and speeds change in a gap",
                 )
         return parts
@@ -442,15 +435,4 @@ def _least_between(
         for s, speed in zip(cap.s, cap.speed, strict=True)
         if part[0] <= s <= part[1]
     ]
-    return min([*inside, *(_at(cap, place) for place in part)])
-
-
-def _at(table: SpeedTable, place: float) -> float:
-    """Largest speed at a place that may lie between two of the table's."""
-    rows = list(zip(table.s, table.speed, strict=True))
-    if place <= rows[0][0] or place >= rows[-1][0]:
-        return rows[0 if place <= rows[0][0] else -1][1]
-    for (s, speed), (s_next, next_speed) in itertools.pairwise(rows):
-        if s < s_next and s <= place <= s_next:
-            return speed + (next_speed - speed) * (place - s) / (s_next - s)
-    raise AssertionError
+    return float(min([*inside, *np.interp(part, cap.s, cap.speed)]))

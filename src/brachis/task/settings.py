@@ -278,7 +278,7 @@ class SplineSettings(Model):
             (
                 order > 1 and self.degree <= order,
                 "degree",
-                f"degree {self.degree} cannot give a continuous {last} that is zero at the ends, as rest: {self.rest} asks",
+                f"rest: {self.rest} asks for a continuous {last}, zero at the ends: degree {self.degree} is too low",
                 f">= {order + 1}, or {' or '.join(lower)}",
             ),
             (
