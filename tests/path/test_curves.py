@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from brachis.errors import PathError
 from brachis.path import Array, Curve, SequencePath, build_path
 from brachis.path.blends import septic
-from brachis.path.site import Site
+from brachis.path.context import SegmentContext
 from brachis.task import ArcSegment, load_task
 
 
@@ -285,7 +285,7 @@ def test_a_spline_whose_start_is_stated() -> None:
 
 
 def test_a_site_knows_its_position_rows() -> None:
-    site = Site("path[0].line", np.array([1.0, 2.0, 3.0]), ("x", "z", "yaw"))
+    site = SegmentContext("path[0].line", np.array([1.0, 2.0, 3.0]), ("x", "z", "yaw"))
     assert site.positions == ("x", "z")
     np.testing.assert_array_equal(site.position, [1.0, 2.0])
 

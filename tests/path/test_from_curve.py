@@ -84,8 +84,8 @@ def test_functions_are_met_within_the_tolerance():
         (lambda u: (abs(u - 0.4), u, u), ((0.0, 1.0),), "not smooth enough"),
         (lambda u: (u, u, u), (), "interval"),
         (lambda u: (u, u, u), ((1.0, 0.0),), "is not an interval"),
-        (lambda u: (u, u, np.nan), ((0.0, 1.0),), "no points"),
-        (lambda u: u, ((0.0, 1.0),), "no points"),
+        (lambda u: (u, u, np.nan), ((0.0, 1.0),), "m finite numbers"),
+        (lambda u: u, ((0.0, 1.0),), "m finite numbers"),
     ],
 )
 def test_what_is_refused(curve, more, words):

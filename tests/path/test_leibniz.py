@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from brachis.common.arrays import with_like_signs
-from brachis.path.joins import smallest
+from brachis.path.pose import smallest
 from brachis.path.rotations import (
     angular_velocity,
     hat,

@@ -40,7 +40,7 @@ def pose_path(
 def smooth_places(path: PosePath, distance: float, count: int = 60) -> np.ndarray:
     """Values of s farther than `distance` from where the path is not analytic."""
     s = np.random.default_rng(4).uniform(0.0, 1.0, 4 * count)
-    sequence = path.coordinates
+    sequence = path
     rough = [
         start + (piece.curve.knots - piece.first) / sequence.total
         for start, piece in zip(sequence.breaks[:-1], sequence.pieces, strict=True)

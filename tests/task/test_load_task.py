@@ -299,7 +299,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"search": {"slower": "150 %"}},
-        ["search.slower: no share; found '150 %'", "100 %"],
+        ["search.slower: not a share; found '150 %'", "100 %"],
     ),
     (
         {"search": {"slower": 1.5}},
@@ -336,7 +336,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ({"task_space": ["yaw", "x", "y"]}, ["task_space: yaw needs", "comes last"]),
     (
         {"task_space": ["x", "x"]},
-        ["task_space: a row occurs twice", "found ['x', 'x']"],
+        ["task_space: a name occurs twice", "found ['x', 'x']"],
     ),
     (
         {"task_space": ["x", "w"]},
@@ -379,6 +379,10 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         ],
     ),
     (
+        {"path": [{"circle": {"center": [1, 0, 0], "normal": [0, 0, 0]}}]},
+        ["path[0].circle.normal: a direction cannot have zero length"],
+    ),
+    (
         {"path": [{"circle": {"center": [0, 0], "turns": 0}}]},
         ["path[0].circle.turns: ", "zero length"],
     ),
@@ -402,7 +406,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         {"path": [LINE, LINE | {"blend": 0.1}]},
         ["path[1].blend: the last segment", "found 0.1"],
     ),
-    ({"redundant_joints": ["a", "a"]}, ["redundant_joints: a joint occurs twice"]),
+    ({"redundant_joints": ["a", "a"]}, ["redundant_joints: a name occurs twice"]),
     (
         {"redundant_joints": "j3"},
         [

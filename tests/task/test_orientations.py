@@ -253,7 +253,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         {"spline": SPLINE, "orientation": "fixed"},
         [
             "path[0].orientation: the spline's orientations say already",
-            "found a mapping with the keys spline, orient",
+            "found 'fixed'",
         ],
     ),
     ({"csv": {}}, ["path[0].csv.file: this key is required, and missing"]),

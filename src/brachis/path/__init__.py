@@ -1,11 +1,10 @@
 """The prescribed path and its derivatives by the path coordinate, up to the third."""
 
 from brachis.path.build import build_path, check_on_path, path_of
-from brachis.path.frame import PathFrame
 from brachis.path.from_curve import bspline_segment, with_feed_rates
 from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, Path, PathSample
-from brachis.path.sequence import SequencePath, check_closed, path_speed
+from brachis.path.sequence import PathFrame, SequencePath, check_closed, path_speed
 
 __all__ = [
     "Array",

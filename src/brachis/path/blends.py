@@ -1,31 +1,26 @@
-"""Blends: septic polynomials that round the corner between two curves.
-
-Septic polynomials between given derivatives.
-
-Blends between curves of poses.
-"""
+"""Blends: septic polynomials that round the corner between two curves, of rows or of poses."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from math import factorial, floor, perm
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.common.arrays import with_like_signs
-from brachis.errors import PathError
-from brachis.path.joins import smallest
-from brachis.path.pose import LEAST_QUALITY, POSITIONS, QuaternionPoseCurve, rotations
+from brachis.path.context import stands_still
+from brachis.path.joins import Join
+from brachis.path.pose import (
+    LEAST_QUALITY,
+    POSITIONS,
+    least_quality,
+    quaternion_curve,
+    rotations,
+)
+from brachis.path.protocol import Array, Curve
 from brachis.path.rotations import quaternion_derivatives, quaternions_of, rotation_of
-from brachis.path.site import stands_still
 from brachis.robot.plausibility import position_hint
-
-if TYPE_CHECKING:
-    from brachis.path.joins import Join
-    from brachis.path.protocol import Array, Curve
-
-_DEGREE = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,20 +73,14 @@ def septic(start: Array, end: Array, length: float) -> SepticCurve:
 
 def _powers(u: Array, order: int) -> Array:
     """Return the derivatives of the powers of the normalised parameter, shape (K, 8)."""
-    exponents = np.arange(_DEGREE + 1)
+    exponents = np.arange(8)
     factors = np.array(
         [perm(k, order) if k >= order else 0 for k in exponents], dtype=float
     )
     return factors * u[:, None] ** np.maximum(exponents - order, 0)
 
 
-SLOWEST = 0.2
-"""Smallest speed (norm of the position's derivative by sigma, 1 on a line) that a blend may have."""
-_CHECKED_POINTS = 201
-_ROUNDING = 1e-12
-
-
-def blend_rows(first: Curve, second: Curve, size: float, join: Join) -> SepticCurve:
+def blend_rows(first: Curve, second: Curve, size: float, join: Join) -> Curve:
     """Return the blend that replaces the last `size` of one curve and the first `size` of the next.
 
     Parameters
@@ -108,12 +97,45 @@ def blend_rows(first: Curve, second: Curve, size: float, join: Join) -> SepticCu
     PathError
         The blend is longer than half of a neighbour, or (nearly) stops or reverses; or a neighbour moves yaw alone.
     """
-    check_neighbours(first, second, size, join, still="yaw alone moves", turning="yaw")
-    start, end, length = ends(first, second, size, join.positions)
-    return checked_septic(start, end, length, join)
+    _check_neighbours(first, second, size, join, still="yaw alone moves", turning="yaw")
+    return _blend(*_ends(first, second, size), join)
 
 
-def check_neighbours(
+def blend_poses(first: Curve, second: Curve, size: float, join: Join) -> Curve:
+    """Return the blend that replaces the last `size` of one curve of poses and the first `size` of the next.
+
+    It is the polynomial of the position and the quaternion, which is then divided by its length; see `blend_rows`.
+
+    Raises
+    ------
+    PathError
+        As for rows; or the tool turns too much in the blend.
+    """
+    _check_neighbours(
+        first,
+        second,
+        size,
+        join,
+        still="the tool turns on the spot",
+        turning="the tool",
+    )
+    start, corner, end = _ends(first, second, size)
+    start = _with_quaternion(start)
+    end = _with_quaternion(end)
+    end[:, POSITIONS:] *= _sign(first, second, size)
+    columns = _blend(start, corner, end, join)
+    _, least = least_quality(columns)
+    if least < LEAST_QUALITY:
+        raise join.wrong_blend(
+            "the tool turns too much in the blend",
+            f"quaternions interpolated with a quality of {least:.2g} out of 1",
+            f"{LEAST_QUALITY} or more",
+            "Shorten the blend, or turn the tool along longer segments",
+        )
+    return quaternion_curve(columns)
+
+
+def _check_neighbours(
     first: Curve, second: Curve, size: float, join: Join, *, still: str, turning: str
 ) -> None:
     """Refuse a blend where the position stands still, or that is too long.
@@ -124,124 +146,56 @@ def check_neighbours(
     ------
     PathError
     """
-    where, at = f"{join.blend_key}: {join.where}", (join.s, join.s)
+    found = f"{size:g} {join.unit}"
     if stands_still(first, join.positions) or stands_still(second, join.positions):
-        problem = (
-            f"a blend needs motion of the position on both sides, and {still} on one"
-        )
-        hint = f"Turn {turning} along a line"
-        raise PathError(
-            problem,
-            s_interval=at,
-            found=f"{size:g} {join.unit}",
-            allowed="no blend here",
-            where=where,
-            hint=hint,
+        raise join.wrong_blend(
+            f"a blend needs motion of the position on both sides, and {still} on one",
+            found,
+            "no blend here",
+            f"Turn {turning} along a line",
         )
     longest = min(first.length, second.length) / 2
-    if size > longest * (1 + _ROUNDING):
-        problem = "the blend is longer than half of a neighbouring segment"
-        # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
-        allowed = f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}"
-        looks = position_hint(size, 0.0, longest, join.unit)
-        raise PathError(
-            problem,
-            s_interval=at,
-            found=f"{size:g} {join.unit}",
-            allowed=allowed,
-            where=where,
-            hint=looks,
+    if size > longest * (1 + 1e-12):
+        raise join.wrong_blend(
+            "the blend is longer than half of a neighbouring segment",
+            found,
+            # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
+            f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}",
+            position_hint(size, 0.0, longest, join.unit),
         )
 
 
-def ends(
-    first: Curve, second: Curve, size: float, positions: int
-) -> tuple[Array, Array, float]:
-    """Return the derivatives, (4, m), at the start and the end of a blend, and its length.
-
-    The length is the mean of the chord and of the polygon over the corner, which keeps the blend's speed near 1.
-    """
+def _ends(first: Curve, second: Curve, size: float) -> tuple[Array, Array, Array]:
+    """Return the derivatives, (4, m), at the start of a blend, the corner, (m,), and the derivatives at its end."""
     start = first.derivatives(np.array([first.length - size]))[:, 0]
     corner = second.derivatives(np.zeros(1), 0)[0, 0]
-    end = second.derivatives(np.array([size]))[:, 0]
-    chord = _distance(start[0], end[0], positions)
-    polygon = _distance(start[0], corner, positions) + _distance(
-        corner, end[0], positions
-    )
-    return start, end, (chord + polygon) / 2
+    return start, corner, second.derivatives(np.array([size]))[:, 0]
 
 
-def checked_septic(start: Array, end: Array, length: float, join: Join) -> SepticCurve:
+def _blend(start: Array, corner: Array, end: Array, join: Join) -> SepticCurve:
     """Return the septic polynomial between derivatives (4, m), after a check that its position keeps going.
 
-    Raises
-    ------
-    PathError
-    """
-    curve = septic(start, end, length)
-    sigma = np.linspace(0.0, curve.length, _CHECKED_POINTS)
-    speed = float(
-        np.linalg.norm(
-            curve.derivatives(sigma, 1)[1, :, : join.positions], axis=1
-        ).min()
-    )
-    if not speed > SLOWEST:
-        problem = (
-            "the corner is too sharp for a blend, which would all but stop and reverse"
-        )
-        raise PathError(
-            problem,
-            s_interval=(join.s, join.s),
-            found=f"a smallest speed of {speed:.3g} relative to the segments",
-            allowed=f"more than {SLOWEST}",
-            where=f"{join.blend_key}: {join.where}",
-            hint="Turn in two corners, or by an arc",
-        )
-    return curve
-
-
-def _distance(one: Array, other: Array, positions: int) -> float:
-    return float(np.linalg.norm((one - other)[:positions]))
-
-
-_SIGN_POINTS = 9
-
-
-def blend_poses(
-    first: Curve, second: Curve, size: float, join: Join
-) -> QuaternionPoseCurve:
-    """Return the blend that replaces the last `size` of one curve of poses and the first `size` of the next.
-
-    It is the polynomial of the position and the quaternion, which is then divided by its length; see
-    `brachis.path.blends.blend_rows`.
+    Its length is the mean of the chord and of the polygon over the corner, which keeps its speed near 1.
 
     Raises
     ------
     PathError
-        As for rows; or the tool turns too much in the blend.
     """
-    check_neighbours(
-        first,
-        second,
-        size,
-        join,
-        still="the tool turns on the spot",
-        turning="the tool",
+    rows = join.positions
+    corners = [start[0, :rows], corner[:rows], end[0, :rows]]
+    before, chord, after = (
+        float(np.linalg.norm(one - other)) for one, other in combinations(corners, 2)
     )
-    start, end, length = ends(first, second, size, join.positions)
-    start, end = _with_quaternion(start), _with_quaternion(end)
-    end[:, POSITIONS:] *= _sign(first, second, size)
-    curve = QuaternionPoseCurve(checked_septic(start, end, length, join))
-    _, least = smallest(curve.quality, curve.knots)
-    if least < LEAST_QUALITY:
-        problem = "the tool turns too much in the blend"
-        raise PathError(
-            problem,
-            s_interval=(join.s, join.s),
-            found=f"quaternions interpolated with a quality of {least:.2g} out of 1",
-            allowed=f"{LEAST_QUALITY} or more",
-            where=f"{join.blend_key}: {join.where}",
-            hint="Shorten the blend, or turn the tool along longer segments",
+    curve = septic(start, end, (chord + (before + after)) / 2)
+    velocity = curve.derivatives(np.linspace(0.0, curve.length, 201), 1)[1]
+    speed = float(np.linalg.norm(velocity[:, :rows], axis=1).min())
+    slowest = 0.2  # it is 1 on a line
+    if not speed > slowest:
+        raise join.wrong_blend(
+            "the corner is too sharp for a blend, which would all but stop and reverse",
+            f"a smallest speed of {speed:.3g} relative to the segments",
+            f"more than {slowest}",
+            "Turn in two corners, or by an arc",
         )
     return curve
 
@@ -255,7 +209,7 @@ def _with_quaternion(pose: Array) -> Array:
 
 def _sign(first: Curve, second: Curve, size: float) -> float:
     """Return the sign of the end's quaternion that continues the start's along both curves."""
-    steps = np.linspace(0.0, size, _SIGN_POINTS)
+    steps = np.linspace(0.0, size, 9)
     poses = [
         first.derivatives(first.length - size + steps, 0)[0],
         second.derivatives(steps, 0)[0],

@@ -1,82 +1,20 @@
-"""From the segments of a task to a path.
-
-Joining curves to a path, with blends.
-
-The path of a task: from where the start posture's tool is, or from the place that the task names.
-"""
+"""The path of a task: the curves of its segments, joined with blends, from where the start posture's tool is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import PathError, StartError, write_apart
 from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
-from brachis.path.frame import PathFrame
 from brachis.path.joins import find_joins, refuse_corners
-from brachis.path.protocol import Path
-from brachis.path.sequence import Piece, SequencePath
+from brachis.path.protocol import Array, Curve, Path
+from brachis.path.sequence import PathFrame, Piece
 from brachis.robot import TaskMap
 from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import POSE_ROWS, joints_of, position_rows
-from brachis.task import Task
-
-if TYPE_CHECKING:
-    from brachis.path.coordinates import Coordinates
-    from brachis.path.joins import Corner
-    from brachis.path.protocol import Array, Curve, Path
-    from brachis.task import Segment
-
-_NOTHING = 1e-11
-
-
-def join_curves(
-    curves: Sequence[Curve], blends: Sequence[float | None], coordinates: Coordinates
-) -> SequencePath:
-    """Return the path along curves, with their corners rounded.
-
-    Parameters
-    ----------
-    curves : sequence of Curve
-        Each starts where its predecessor ends.
-    blends : sequence of float or None
-        For every curve, what its blend with the next one takes from either, m.
-    coordinates : Coordinates
-        What the curves' columns are.
-
-    Raises
-    ------
-    PathError
-        Curves do not continue each other to the third derivative and are not blended; or a blend does not fit.
-    """
-    corners: list[Corner | None] = []
-    pieces: list[Piece] = []
-    taken = 0.0
-    joins = find_joins(curves, coordinates.rows)
-    for join, curve, following, size in zip(
-        joins, curves, curves[1:], blends, strict=False
-    ):
-        if size is None:
-            corners.append(coordinates.corner(join, curve, following))
-            pieces.append(Piece(curve, taken, curve.length, join.index))
-            taken = 0.0
-        else:
-            rounded = coordinates.blend(curve, following, size, join)
-            pieces += [
-                Piece(curve, taken, curve.length - size, join.index),
-                Piece(rounded, 0.0, rounded.length),
-            ]
-            taken = size
-    pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
-    refuse_corners([corner for corner in corners if corner is not None])
-    # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
-    kept = tuple(
-        piece for piece in pieces if piece.length > _NOTHING * piece.curve.length
-    )
-    return SequencePath.of(kept, len(position_rows(coordinates.rows)))
+from brachis.task import Segment, Task
 
 
 def build_path(
@@ -111,7 +49,7 @@ def build_path(
         A segment does not fit the task space, has zero length or is not defined; or the path has a corner that is not
         blended, or a blend that does not fit. The message names the key.
     UnknownNameError
-        There is no such row.
+        The row does not exist.
 
     Examples
     --------
@@ -122,28 +60,59 @@ def build_path(
     """
     rows = tuple(task_space_rows)
     coordinates = _coordinates(rows)
-    point = coordinates.checked(np.array(start, dtype=float))
+    point = coordinates.check_start(np.array(start, dtype=float))
     if frame is not None:
         point = frame.to_frame(point)
     if not segments:
-        problem = "a path needs at least one segment"
-        raise PathError(problem, where="path")
+        raise PathError("a path needs at least one segment", where="path")
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
         curves.append(coordinates.curve(segment, i, point))
         point = curves[-1].derivatives(np.array([curves[-1].length]), 0)[0, 0]
-    sequence = join_curves(curves, [segment.blend for segment in segments], coordinates)
-    return coordinates.path(replace(sequence, frame=frame))
+    pieces = _join(curves, [segment.blend for segment in segments], coordinates)
+    positions = len(position_rows(coordinates.rows))
+    return coordinates.path_type.of(pieces, positions, frame)
 
 
-def _coordinates(rows: tuple[str, ...]) -> Coordinates:
+def _coordinates(rows: tuple[str, ...]) -> RowCoordinates:
     """Return what the coordinates of a task space with these rows are."""
     if joints_of(rows):
         return JointCoordinates(rows)
     return PoseCoordinates() if rows == POSE_ROWS else RowCoordinates(rows)
 
 
-_ON_PATH = 1e-6
+def _join(
+    curves: Sequence[Curve],
+    blends: Sequence[float | None],
+    coordinates: RowCoordinates,
+) -> tuple[Piece, ...]:
+    """Return the parts of curves, each of which starts where its predecessor ends, with their corners rounded.
+
+    `blends` says for every curve what its blend with the next one takes from either, m.
+
+    Raises
+    ------
+    PathError
+        Curves do not continue each other to the third derivative and are not blended; or a blend does not fit.
+    """
+    corners = []
+    pieces = []
+    taken = 0.0
+    for join in find_joins(curves, coordinates.rows):
+        i = join.index
+        curve = curves[i]
+        size = blends[i]
+        pieces.append(Piece(curve, taken, curve.length - (size or 0.0), i))
+        taken = size or 0.0
+        if size is None:
+            corners.append(coordinates.corner(join, curve, curves[i + 1]))
+        else:
+            rounded = coordinates.blend(curve, curves[i + 1], size, join)
+            pieces.append(Piece(rounded, 0.0, rounded.length))
+    pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
+    refuse_corners([corner for corner in corners if corner is not None])
+    # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
+    return tuple(piece for piece in pieces if piece.length > 1e-11 * piece.curve.length)
 
 
 def path_of(task_map: TaskMap, task: Task) -> Path:
@@ -195,15 +164,18 @@ def check_on_path(
     place = task_map.value(posture)
     miss = np.abs(task_map.difference(place, target))
     worst = int(np.argmax(miss))
-    if miss[worst] > _ON_PATH:
-        found, allowed = write_apart(miss[worst], _ON_PATH, digits=3)
+    largest = 1e-6  # m, rad
+    if miss[worst] > largest:
+        unit = task_map.units[worst]
+        found, allowed = write_apart(miss[worst], largest, digits=3)
+        end = "beginning" if name == "start" else "end"
         raise StartError(
             f"the {name} posture is off the path",
             where=f"{name}.joints",
-            found=f"{found} {task_map.units[worst]} off in {task_map.rows[worst]}",
-            allowed=f"at most {allowed} {task_map.units[worst]}",
+            found=f"{found} {unit} off in {task_map.rows[worst]}",
+            allowed=f"at most {allowed} {unit}",
             hint=_hint(task_map, place, target)
-            or f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
+            or f"Choose a posture whose tool is at the path's {end}",
         )
 
 

@@ -1,60 +1,119 @@
-"""What the coordinates along a path are, to those who build it.
-
-Paths of rows of a task space, where the tool's orientation is not prescribed.
-
-Paths in a space of joints, where every joint is prescribed.
-
-Paths of poses.
-"""
+"""What the coordinates along a path are, to those who build it: rows of a task space, positions of joints, or poses."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 
 from brachis.errors import PathError, UnknownNameError
 from brachis.path.blends import blend_poses, blend_rows
+from brachis.path.context import ZERO_LENGTH, SegmentContext
+from brachis.path.curves import (
+    LineCurve,
+    arc_center,
+    arc_via,
+    circle,
+    helix,
+    line_by,
+    line_heading,
+    line_to,
+)
 from brachis.path.joins import pose_corner, row_corner
-from brachis.path.pose import POSITIONS, PosePath, rotations
-from brachis.path.pose_segment import pose_curve
+from brachis.path.orientation import orientation_along, turn_of
+from brachis.path.pose import POSITIONS, PosePath, pose_curve, rotations
+from brachis.path.protocol import Array, Curve, MappedCurve
 from brachis.path.rotations import matrices, quaternions_of, rotation_of
-from brachis.path.shapes import curve_of
-from brachis.path.site import Site
+from brachis.path.sequence import SequencePath
+from brachis.path.splines import (
+    bspline_curve,
+    pose_bspline,
+    pose_spline,
+    spline_through,
+)
 from brachis.robot.task_map.protocol import AXES, POSE_COORDINATES, ROWS, YAW, joints_of
-from brachis.task import (
+from brachis.task.point_data import PointFile
+from brachis.task.segments import (
+    ArcCenter,
+    ArcVia,
     BSplineCurve,
     BSplineSegment,
+    CircleTurns,
+    HelixTurns,
+    LineBy,
+    LineHeading,
     LineSegment,
+    LineTo,
+    Segment,
     SplineSegment,
     SplineThrough,
     TurnSegment,
 )
 
-if TYPE_CHECKING:
-    from brachis.path.joins import Corner, Join
-    from brachis.path.protocol import Array, Curve, Path
-    from brachis.path.sequence import SequencePath
-    from brachis.task import Segment
+
+def _unread(shape: PointFile, context: SegmentContext) -> Curve:
+    raise context.wrong(
+        "the file has not been read",
+        ".file",
+        found=shape.file,
+        allowed="a curve",
+        hint="brachis.load_task reads it and makes a curve of it",
+    )
 
 
-class Coordinates(Protocol):
-    """Rows of a task space, or the coordinates of poses."""
+BUILDERS: Final[dict[type, Callable[[Any, SegmentContext], Curve]]] = {
+    LineTo: line_to,
+    LineBy: line_by,
+    LineHeading: line_heading,
+    ArcCenter: arc_center,
+    ArcVia: arc_via,
+    CircleTurns: circle,
+    HelixTurns: helix,
+    SplineThrough: spline_through,
+    BSplineCurve: bspline_curve,
+    PointFile: _unread,
+}
+"""For every form of segment, the function that makes the curve of its rows, or of a pose's position."""
 
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """Names of the first coordinates, those of the position before others."""
-        ...
 
-    def checked(self, start: Array) -> Array:
+@dataclass(frozen=True)
+class RowCoordinates:
+    """Rows of a task space; the task velocity is their own derivative.
+
+    Attributes
+    ----------
+    rows : tuple of str
+        Names of the first coordinates, those of the position before others.
+    """
+
+    rows: tuple[str, ...]
+    path_type = SequencePath
+    corner = staticmethod(row_corner)
+    blend = staticmethod(blend_rows)
+
+    def check_start(self, start: Array) -> Array:
         """Return the coordinates of the path's start after a check, freed of rounding.
 
         Raises
         ------
         PathError, UnknownNameError
         """
-        ...
+        for row in self.rows:
+            if row not in ROWS:
+                raise UnknownNameError(
+                    "row of the task space", row, ROWS, where="task_space"
+                )
+        if start.shape != (len(self.rows),) or not np.all(np.isfinite(start)):
+            raise PathError(
+                "the start of the path needs one finite coordinate for each row of the task space",
+                found=start.tolist(),
+                allowed=f"[{', '.join(self.rows)}]",
+                where="start",
+            )
+        return start
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """Return the curve of the segment with this index in the path, from its start on.
@@ -64,89 +123,38 @@ class Coordinates(Protocol):
         PathError
             The segment has zero length, or does not fit these coordinates.
         """
-        ...
-
-    def corner(self, join: Join, first: Curve, second: Curve) -> Corner | None:
-        """Return what jumps from one curve to the next, or None where three derivatives continue."""
-        ...
-
-    def blend(self, first: Curve, second: Curve, size: float, join: Join) -> Curve:
-        """Return the curve that replaces the last `size` (sigma) of one curve and the first `size` of the next.
-
-        Raises
-        ------
-        PathError
-            The blend does not fit.
-        """
-        ...
-
-    def path(self, sequence: SequencePath) -> Path:
-        """Return the path of the task velocity along the coordinates."""
-        ...
-
-
-@dataclass(frozen=True)
-class RowCoordinates:
-    """Rows of a task space; see `Coordinates`."""
-
-    rows: tuple[str, ...]
-    corner = staticmethod(row_corner)
-    blend = staticmethod(blend_rows)
-
-    def checked(self, start: Array) -> Array:
-        """See `Coordinates.checked`."""
-        for row in self.rows:
-            if row not in ROWS:
-                raise UnknownNameError(
-                    kind="row of the task space",
-                    name=row,
-                    valid=ROWS,
-                    where="task_space",
-                )
-        if start.shape != (len(self.rows),) or not np.all(np.isfinite(start)):
-            problem = "the start of the path needs one finite coordinate for each row of the task space"
-            raise PathError(
-                problem,
-                found=start.tolist(),
-                allowed=f"[{', '.join(self.rows)}]",
-                where="start",
-            )
-        return start
-
-    def curve(self, segment: Segment, index: int, start: Array) -> Curve:
-        """See `Coordinates.curve`."""
-        found, hint = f"task_space [{', '.join(self.rows)}]", "Set task_space: pose"
+        found = f"task_space [{', '.join(self.rows)}]"
         if isinstance(segment, TurnSegment):
-            problem = "a turn is for task spaces of poses"
+            hint = "Set task_space: pose"
             if YAW in self.rows:
                 hint = "Use line: {by: [0, 0, ...]} to turn yaw"
             raise PathError(
-                problem, found=found, where=f"path[{index}].turn", hint=hint
+                "a turn is for task spaces of poses",
+                found=found,
+                where=f"path[{index}].turn",
+                hint=hint,
             )
         if segment.orientation is not None:
-            problem = "an orientation along a segment is for task spaces of poses"
             raise PathError(
-                problem, found=found, where=f"path[{index}].orientation", hint=hint
+                "an orientation along a segment is for task spaces of poses",
+                found=found,
+                where=f"path[{index}].orientation",
+                hint="Set task_space: pose",
             )
-        return curve_of(
-            segment.shape, Site(f"path[{index}].{segment.kind}", start, self.rows)
-        )
-
-    def path(self, sequence: SequencePath) -> SequencePath:
-        """See `Coordinates.path`: the task velocity is the coordinates' own derivative."""
-        return sequence
+        context = SegmentContext(f"path[{index}].{segment.kind}", start, self.rows)
+        return BUILDERS[type(segment.shape)](segment.shape, context)
 
 
 @dataclass(frozen=True)
 class JointCoordinates(RowCoordinates):
-    """Rows of a space of joints; see `Coordinates`."""
+    """The positions of all joints."""
 
-    def checked(self, start: Array) -> Array:
-        """See `Coordinates.checked`; the start is a posture of the robot, or stated as one."""
+    def check_start(self, start: Array) -> Array:
+        """Return the start as it is: a posture of the robot, or stated as one."""
         return start
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
-        """See `Coordinates.curve`."""
+        """Return the curve of a segment, whose coordinates may be in another order of the joints."""
         if not isinstance(segment, LineSegment | SplineSegment | BSplineSegment):
             by = ", ".join(["1.5708", *["0"] * (len(self.rows) - 1)])
             raise PathError(
@@ -156,16 +164,14 @@ class JointCoordinates(RowCoordinates):
                 where=f"path[{index}]",
                 hint=f"A turn of one joint by 90 degrees is line: {{by: [{by}]}}",
             )
-        shape = segment.shape
-        names = (
-            shape.joints if isinstance(shape, SplineThrough | BSplineCurve) else None
-        )
+        names = getattr(segment.shape, "joints", None)
         if names is None:
             return super().curve(segment, index, start)
-        own, where = joints_of(self.rows), f"path[{index}].{segment.kind}.joints"
-        unknown = [name for name in names if name not in own]
-        if unknown:
-            raise UnknownNameError("joint", unknown[0], own, where=where)
+        own = joints_of(self.rows)
+        where = f"path[{index}].{segment.kind}.joints"
+        for name in names:
+            if name not in own:
+                raise UnknownNameError("joint", name, own, where=where)
         if len(names) != len(own):
             raise PathError(
                 "joints are missing",
@@ -174,69 +180,74 @@ class JointCoordinates(RowCoordinates):
                 where=where,
             )
         order = [own.index(name) for name in names]
-        other = JointCoordinates(tuple(self.rows[place] for place in order))
-        return Reordered(
-            super(JointCoordinates, other).curve(segment, index, start[order]),
-            [names.index(joint) for joint in own],
-        )
+        permuted = RowCoordinates(tuple(self.rows[column] for column in order))
+        columns = [names.index(joint) for joint in own]
+        curve = permuted.curve(segment, index, start[order])
+        return MappedCurve(curve, partial(_permute, columns))
 
 
-@dataclass(frozen=True, eq=False)
-class Reordered:
-    """A curve whose columns stand in another order.
-
-    Attributes
-    ----------
-    curve : Curve
-    columns : list of int
-        Columns of the curve in the order wanted.
-    """
-
-    curve: Curve
-    columns: list[int]
-
-    @property
-    def length(self) -> float:
-        """See `Curve`."""
-        return self.curve.length
-
-    @property
-    def knots(self) -> Array:
-        """See `Curve`."""
-        return self.curve.knots
-
-    def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """See `Curve`."""
-        return self.curve.derivatives(sigma, order)[:, :, self.columns]
-
-
-_ROTATION_TOLERANCE = 1e-6
+def _permute(columns: list[int], _sigma: Array, derivatives: Array) -> Array:
+    return derivatives[:, :, columns]
 
 
 @dataclass(frozen=True)
-class PoseCoordinates:
-    """The twelve coordinates of poses; see `Coordinates`."""
+class PoseCoordinates(RowCoordinates):
+    """The twelve coordinates of poses."""
 
     rows: tuple[str, ...] = AXES
-    curve = staticmethod(pose_curve)
+    path_type = PosePath
     corner = staticmethod(pose_corner)
     blend = staticmethod(blend_poses)
-    path = staticmethod(PosePath)
 
-    def checked(self, start: Array) -> Array:
-        """See `Coordinates.checked`."""
+    def check_start(self, start: Array) -> Array:
+        """Return the start with the nearest rotation matrix."""
         allowed = "the position (3), then a rotation matrix row by row (9)"
         if start.shape != (POSE_COORDINATES,) or not np.all(np.isfinite(start)):
-            problem = "the start of a path of poses needs 12 finite coordinates"
             raise PathError(
-                problem, found=start.tolist(), allowed=allowed, where="start"
+                "the start of a path of poses needs 12 finite coordinates",
+                found=start.tolist(),
+                allowed=allowed,
+                where="start",
             )
         rotation = rotations(start)
         stretch = np.abs(rotation @ rotation.T - np.eye(3)).max()
-        if stretch > 2.0 * _ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
-            problem = "the start of the path has no rotation matrix"
+        if stretch > 2e-6 or np.linalg.det(rotation) < 0.0:
             raise PathError(
-                problem, found=rotation.tolist(), allowed=allowed, where="start"
+                "the start of the path has no rotation matrix",
+                found=rotation.tolist(),
+                allowed=allowed,
+                where="start",
             )
         nearest = matrices(quaternions_of(rotation_of(rotation))[None])[0]
         return np.concatenate([start[:POSITIONS], nearest.ravel()])
+
+    def curve(self, segment: Segment, index: int, start: Array) -> Curve:
+        """Return the curve of position and orientation along a segment."""
+        position = start[:POSITIONS]
+        rotation = rotations(start)
+        context = SegmentContext(
+            f"path[{index}].{segment.kind}",
+            position,
+            AXES,
+            to_turn="A segment turn: {...} turns the tool on the spot",
+            along_tangent="Set orientation: tangent beside it",
+        )
+        if isinstance(segment, TurnSegment):
+            turn = turn_of(segment.turn, rotation, context.key)
+            if abs(turn.angle) < ZERO_LENGTH:
+                raise context.wrong(
+                    "the turn has zero length",
+                    found="0 degrees",
+                    allowed="another orientation than before",
+                )
+            still = LineCurve(position, np.zeros(POSITIONS), abs(turn.angle))
+            return pose_curve(still, turn.over(still.length))
+        shape = segment.shape
+        if isinstance(shape, SplineThrough) and shape.orientations is not None:
+            return pose_spline(shape, shape.orientations, context, rotation)
+        if isinstance(shape, BSplineCurve) and shape.has_quaternions:
+            return pose_bspline(shape, context, rotation)
+        curve = BUILDERS[type(shape)](shape, context)
+        key = f"path[{index}].orientation"
+        turning = orientation_along(segment.orientation, curve, rotation, key)
+        return pose_curve(curve, turning)

@@ -1,32 +1,22 @@
-"""Straight lines in task coordinates.
-
-Circular arcs and circles, in the plane of two position rows or anywhere in three.
-
-Helices in three position rows.
-"""
+"""Straight lines, arcs and helices: their curves, and the functions that make them of a task's segments."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.errors import PathError
-from brachis.path.site import ZERO_LENGTH, Site
-
-if TYPE_CHECKING:
-    from brachis.path.protocol import Array
-    from brachis.path.site import Site
-    from brachis.task import (
-        ArcCenter,
-        ArcVia,
-        Circle,
-        Helix,
-        LineBy,
-        LineHeading,
-        LineTo,
-    )
+from brachis.path.context import ZERO_LENGTH, SegmentContext
+from brachis.path.protocol import Array
+from brachis.task.segments import (
+    ArcCenter,
+    ArcVia,
+    CircleTurns,
+    HelixTurns,
+    LineBy,
+    LineHeading,
+    LineTo,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,45 +51,36 @@ class LineCurve:
         return result
 
 
-def line_to(shape: LineTo, site: Site) -> LineCurve:
+def line_to(shape: LineTo, context: SegmentContext) -> LineCurve:
     """Return the line to a point."""
-    return _line(
-        site.coordinates(shape.to, "to", site.rows) - site.start,
-        site,
-        ".to",
-        list(shape.to),
-    )
+    end = context.coordinates(shape.to, "to", context.rows)
+    return _line(end - context.start, context, ".to", list(shape.to))
 
 
-def line_by(shape: LineBy, site: Site) -> LineCurve:
+def line_by(shape: LineBy, context: SegmentContext) -> LineCurve:
     """Return the line by a displacement."""
-    return _line(
-        site.coordinates(shape.by, "by", site.rows), site, ".by", list(shape.by)
-    )
+    displacement = context.coordinates(shape.by, "by", context.rows)
+    return _line(displacement, context, ".by", list(shape.by))
 
 
-def line_heading(shape: LineHeading, site: Site) -> LineCurve:
+def line_heading(shape: LineHeading, context: SegmentContext) -> LineCurve:
     """Return the line of given length and direction in the plane of the two position rows."""
-    site.need_plane("a line by length and angle_deg", (2,))
+    context.need_rows("a line by length and angle_deg", 2)
     angle = np.deg2rad(shape.angle_deg)
-    displacement = np.zeros_like(site.start)
+    displacement = np.zeros_like(context.start)
     displacement[:2] = shape.length * np.array([np.cos(angle), np.sin(angle)])
-    return _line(displacement, site, ".length", shape.length)
+    return _line(displacement, context, ".length", shape.length)
 
 
-def _line(displacement: Array, site: Site, key: str, found: object) -> LineCurve:
-    length = float(np.linalg.norm(displacement[: len(site.positions)]))
+def _line(
+    displacement: Array, context: SegmentContext, key: str, found: object
+) -> LineCurve:
+    length = float(np.linalg.norm(displacement[: len(context.positions)]))
     if length < ZERO_LENGTH:
         length = float(np.linalg.norm(displacement))
     if length < ZERO_LENGTH:
-        raise site.zero_length(key=key, found=found)
-    return LineCurve(site.start, displacement / length, length)
-
-
-_PLANE_ROWS = 2
-# Relative: coordinates are given with a few digits.
-_PERPENDICULAR = 1e-3
-_COLLINEAR = 1e-6
+        raise context.zero_length(key, found)
+    return LineCurve(context.start, displacement / length, length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,41 +140,41 @@ class ArcCurve:
         return result
 
 
-def arc_center(shape: ArcCenter, site: Site) -> ArcCurve:
+def arc_center(shape: ArcCenter, context: SegmentContext) -> ArcCurve:
     """Return the arc about a centre by an angle."""
     angle = float(np.deg2rad(shape.angle_deg))
     if abs(angle) < ZERO_LENGTH:
-        raise site.zero_length(key=".angle_deg", found=shape.angle_deg)
-    return _with_yaw(about_center(shape, angle, site), shape.yaw, site)
+        raise context.zero_length(".angle_deg", shape.angle_deg)
+    return _with_yaw(_about_center(shape, angle, context), shape.yaw, context)
 
 
-def circle(shape: Circle, site: Site) -> ArcCurve:
+def circle(shape: CircleTurns, context: SegmentContext) -> ArcCurve:
     """Return the turns about a centre."""
-    return _with_yaw(
-        about_center(shape, 2 * np.pi * shape.turns, site), shape.yaw, site
-    )
+    arc = _about_center(shape, 2 * np.pi * shape.turns, context)
+    return _with_yaw(arc, shape.yaw, context)
 
 
-def arc_via(shape: ArcVia, site: Site) -> ArcCurve:
+def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
     """Return the arc through a point to another one.
 
     The centre c is as far from the start p as from the two points p + a and p + b: ``a.(c - p) = a.a / 2`` and the same
     with b, where c - p is a combination of a and b, whatever the number of rows.
     """
-    site.need_plane("an arc")
-    to_via = site.coordinates(shape.via, "via", site.positions) - site.position
-    to_end = site.coordinates(shape.to, "to", site.positions) - site.position
+    context.need_rows("an arc", 2, 3)
+    start = context.position
+    to_via = context.coordinates(shape.via, "via", context.positions) - start
+    to_end = context.coordinates(shape.to, "to", context.positions) - start
     if np.linalg.norm(to_end) < ZERO_LENGTH:
-        raise site.zero_length(key=".to", found=list(shape.to))
+        raise context.zero_length(".to", list(shape.to))
     sides = np.stack([to_via, to_end])
     gram = sides @ sides.T
-    if np.linalg.det(gram) <= _COLLINEAR**2 * gram[0, 0] * gram[1, 1]:
-        problem = "start, via and end of the arc lie on a line"
-        raise PathError(
-            problem,
-            found=f"start {site.position.tolist()}, via {list(shape.via)}, to {list(shape.to)}",
+    collinear = 1e-6  # relative: coordinates are given with a few digits
+    if np.linalg.det(gram) <= collinear**2 * gram[0, 0] * gram[1, 1]:
+        raise context.wrong(
+            "start, via and end of the arc lie on a line",
+            ".via",
+            found=f"start {start.tolist()}, via {list(shape.via)}, to {list(shape.to)}",
             allowed="three different points that are not collinear",
-            where=f"{site.key}.via",
             hint="Use line: {to: [...]} for a straight segment",
         )
     to_center = np.linalg.solve(gram, np.diag(gram) / 2) @ sides
@@ -201,123 +182,98 @@ def arc_via(shape: ArcVia, site: Site) -> ArcCurve:
     radius = float(np.linalg.norm(outward))
     # Of the two directions along the circle, forward is the one in which via comes before the end.
     forward = to_via - (to_via @ outward) / radius**2 * outward
-    if np.linalg.norm(forward) < _COLLINEAR * radius:  # via is opposite to the start
+    if np.linalg.norm(forward) < collinear * radius:  # via is opposite to the start
         forward = -(to_end - (to_end @ outward) / radius**2 * outward)
     forward *= radius / np.linalg.norm(forward)
-    angles = [
+    via_angle, angle = (
         _angle_of(point - to_center, outward, forward) for point in (to_via, to_end)
-    ]
-    if angles[0] > angles[1]:
-        forward = -forward
-        angles[1] = 2 * np.pi - angles[1]
-    return _with_yaw(
-        ArcCurve(site.position + to_center, outward, forward, radius * angles[1]),
-        shape.yaw,
-        site,
     )
+    if via_angle > angle:
+        forward = -forward
+        angle = 2 * np.pi - angle
+    arc = ArcCurve(start + to_center, outward, forward, radius * angle)
+    return _with_yaw(arc, shape.yaw, context)
 
 
 def _angle_of(vector: Array, outward: Array, forward: Array) -> float:
     return float(np.arctan2(vector @ forward, vector @ outward) % (2 * np.pi))
 
 
-def about_center(
-    shape: ArcCenter | Circle | Helix, angle: float, site: Site
+def _about_center(
+    shape: ArcCenter | CircleTurns | HelixTurns, angle: float, context: SegmentContext
 ) -> ArcCurve:
     """Return the arc by a signed angle, rad, about the centre of a shape; yaw is left out."""
-    site.need_plane("an arc")
-    center = site.coordinates(shape.center, "center", site.positions)
-    outward = site.position - center
+    context.need_rows("an arc", 2, 3)
+    center = context.coordinates(shape.center, "center", context.positions)
+    outward = context.position - center
     if np.linalg.norm(outward) < ZERO_LENGTH:
-        problem = "the arc has zero length: its centre is its start, so that the radius is zero"
-        raise PathError(
-            problem,
+        raise context.wrong(
+            "the arc has zero length: its centre is its start, so that the radius is zero",
+            ".center",
             found=list(shape.center),
             allowed="another point",
-            where=f"{site.key}.center",
         )
-    if center.size == _PLANE_ROWS:
+    if center.size == 2:
         if shape.normal is not None:
-            problem = "a normal is for three position rows; here the plane is that of the task space"
-            raise PathError(
-                problem,
+            raise context.wrong(
+                "a normal is for three position rows; here the plane is that of the task space",
+                ".normal",
                 found=list(shape.normal),
                 allowed="no normal",
-                where=f"{site.key}.normal",
             )
         forward = np.array([-outward[1], outward[0]])
     else:
-        normal = _normal(shape.normal, outward, site)
+        normal = _normal(shape.normal, outward, context)
         # The plane is the one through the start: a centre given with a few digits is moved into it.
         center = center + (normal @ outward) * normal
-        outward = site.position - center
+        outward = context.position - center
         forward = np.cross(normal, outward)
     length = abs(angle) * float(np.linalg.norm(outward))
     return ArcCurve(center, outward, np.sign(angle) * forward, length)
 
 
 def _normal(
-    normal: tuple[float, float, float] | None, outward: Array, site: Site
+    normal: tuple[float, float, float] | None, outward: Array, context: SegmentContext
 ) -> Array:
     """Return the unit normal of an arc in three rows."""
-    where = f"{site.key}.normal"
     if normal is None:
-        problem = (
-            "with three position rows a centre does not determine the plane of the arc"
-        )
-        raise PathError(
-            problem,
+        raise context.wrong(
+            "with three position rows a centre does not determine the plane of the arc",
+            ".normal",
             found="no normal",
             allowed="the axis of rotation, [nx, ny, nz]",
-            where=where,
             hint="Or use via and to",
         )
-    size = float(np.linalg.norm(normal))
-    if size < ZERO_LENGTH:
-        problem = "the normal has zero length"
-        raise PathError(
-            problem, found=list(normal), allowed="any other vector", where=where
-        )
-    unit = np.asarray(normal) / size
+    unit = np.asarray(normal) / float(np.linalg.norm(normal))
     slope = float(unit @ outward / np.linalg.norm(outward))
-    if abs(slope) > _PERPENDICULAR:
-        problem = "the normal is not perpendicular to the radius from the centre to the segment's start"
-        raise PathError(
-            problem,
+    largest = 1e-3  # coordinates are given with a few digits
+    if abs(slope) > largest:
+        raise context.wrong(
+            "the normal is not perpendicular to the radius from the centre to the segment's start",
+            ".normal",
             found=f"{np.rad2deg(np.arccos(np.clip(slope, -1, 1))):.6g} degrees between them",
-            allowed=f"90 degrees to within {np.rad2deg(_PERPENDICULAR):.2g}",
-            where=where,
+            allowed=f"90 degrees to within {np.rad2deg(largest):.2g}",
             hint=f"Move the centre by {float(unit @ outward):.6g} m along the normal, or use via and to",
         )
     return unit
 
 
-def _with_yaw(arc: ArcCurve, turning: str, site: Site) -> ArcCurve:
+def _with_yaw(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
     """Return the arc with the yaw that the segment asks for."""
-    if site.has_yaw:
-        sense = float(
-            np.sign(arc.outward[0] * arc.forward[1] - arc.outward[1] * arc.forward[0])
-        )
-        return replace(
-            arc,
-            yaw=(
-                float(site.start[-1]),
-                sense / arc.radius if turning == "tangent" else 0.0,
-            ),
-        )
-    if turning == "tangent":
-        problem = "yaw is not a row of the task space"
-        raise PathError(
-            problem,
+    tangent = turning == "tangent"
+    if "yaw" in context.rows:
+        sense = float(np.sign(np.linalg.det([arc.outward, arc.forward])))
+        slope = sense / arc.radius if tangent else 0.0
+        return replace(arc, yaw=(float(context.start[-1]), slope))
+    if tangent:
+        raise context.wrong(
+            "yaw is not a row of the task space",
+            ".yaw",
             found="tangent",
             allowed="fixed",
-            where=f"{site.key}.yaw",
-            hint=site.along_tangent,
+            hint=context.along_tangent,
         )
     return arc
-
-
-_SPACE = (3,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,9 +318,9 @@ class HelixCurve:
         return result
 
 
-def helix(shape: Helix, site: Site) -> HelixCurve:
+def helix(shape: HelixTurns, context: SegmentContext) -> HelixCurve:
     """Return the climbing turns about an axis."""
-    site.need_plane("a helix", _SPACE)
-    arc = about_center(shape, 2 * np.pi * shape.turns, site)
+    context.need_rows("a helix", 3)
+    arc = _about_center(shape, 2 * np.pi * shape.turns, context)
     axis = np.asarray(shape.normal) / np.linalg.norm(shape.normal)
     return HelixCurve(arc, abs(shape.turns) * shape.pitch * axis)

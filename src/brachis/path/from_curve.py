@@ -1,33 +1,22 @@
-"""Segments of a path from curves of other libraries: SciPy's splines, or any function.
-
-Largest speeds of the tool along a path, by the feed rates of its points.
-"""
+"""Segments from curves of other libraries, and speeds of the tool along a path from the feed rates of its points."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.path.pose import PosePath
+from brachis.path.protocol import Array, Path
 from brachis.path.sequence import SequencePath
-from brachis.task import BSplineSegment, SpeedTable
+from brachis.task import BSplineSegment, Segment, SpeedTable, Task
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from scipy.interpolate import BSpline, PPoly
 
-    from brachis.path.protocol import Array, Path
-    from brachis.task import Segment, Task
-
 _SMOOTH = 3
-_LEAST_DEGREE, _DEGREE = 4, 5
-_SAME = 1e-7
-"""Jumps of a derivative, relative to its largest value, that are rounding."""
-_COARSEST, _FINEST = 8, 4096
+"""Derivatives that a path must have."""
 
 
 def bspline_segment(
@@ -81,7 +70,7 @@ def bspline_segment(
             allowed="(first, last)",
         )
     else:
-        spline = _of_function(curve, _checked(interval), tolerance)
+        spline = _of_function(curve, _check_interval(interval), tolerance)
     parts = {
         "degree": int(spline.k),
         "knots": spline.t.tolist(),
@@ -90,8 +79,8 @@ def bspline_segment(
     return {"bspline": parts}
 
 
-def _checked(interval: tuple[float, float]) -> tuple[float, float]:
-    first, last = (float(end) for end in interval)
+def _check_interval(interval: tuple[float, float]) -> tuple[float, float]:
+    first, last = map(float, interval)
     if not (np.isfinite([first, last]).all() and first < last):
         raise InputError(
             "is not an interval",
@@ -109,14 +98,14 @@ def _of_pieces(
     interval: tuple[float, float] | None,
 ) -> BSpline:
     """Write piecewise polynomials, C3, as a clamped B-spline over the same breaks."""
-    first, last = _checked(interval or (breaks[0], breaks[-1]))
+    first, last = _check_interval(interval or (breaks[0], breaks[-1]))
     inner = np.unique(breaks[(breaks > first) & (breaks < last)])
-    after = np.append(inner, last)  # so that there is a place where there are no breaks
+    after = np.append(inner, last)  # one place at least, also without breaks
     before = np.nextafter(after, first)
     for order in range(_SMOOTH + 1):
         values = _rows(pieces(after, nu=order))
         jumps = np.abs(values - _rows(pieces(before, nu=order))).max(axis=1)
-        if jumps.max() > _SAME * (1.0 + np.abs(values).max()):
+        if jumps.max() > 1e-7 * (1.0 + np.abs(values).max()):
             place = float(after[int(np.argmax(jumps))])
             raise InputError(
                 "the curve is not smooth enough: a path must be smooth to the third derivative",
@@ -126,10 +115,8 @@ def _of_pieces(
                 hint="Interpolate with scipy.interpolate.make_interp_spline(x, y, k=5), or give the waypoints "
                 "themselves (spline: {through: ...})",
             )
-    degree = max(degree, _LEAST_DEGREE)
-    return _interpolating(
-        lambda u: _rows(pieces(u)), first, last, inner, degree, degree - _SMOOTH
-    )
+    grid = np.concatenate([[first], inner, [last]])
+    return _interpolate(lambda u: _rows(pieces(u)), grid, max(degree, _SMOOTH + 1))
 
 
 def _of_function(
@@ -141,49 +128,46 @@ def _of_function(
         points = np.array([np.asarray(curve(float(each)), dtype=float) for each in u])
         if points.ndim != 2 or not np.isfinite(points).all():
             raise InputError(
-                "the function's values are no points",
+                "the function's values are not points of a path",
                 where="curve",
                 allowed="m finite numbers each",
             )
         return points
 
-    count, miss = _COARSEST, np.inf
-    while count <= _FINEST:
+    for count in 2 ** np.arange(3, 13):
         breaks = np.linspace(*interval, count + 1)
-        spline = _interpolating(values, *interval, breaks[1:-1], _DEGREE, 1)
+        spline = _interpolate(values, breaks, 5, multiplicity=1)
         between = breaks[:-1] + np.diff(breaks) * 0.37
         miss = float(np.abs(spline(between) - values(between)).max())
         if miss <= tolerance:
             return spline
-        count *= 2
     raise InputError(
         "the function is not smooth enough for a spline",
         where="curve",
-        found=f"{miss:.3g} rad or m off with {_FINEST} intervals",
+        found=f"{miss:.3g} rad or m off with {count} intervals",
         allowed=f"{tolerance:g}",
         hint="A path must be smooth to the third derivative; raise the tolerance if the function is rounded",
     )
 
 
-def _interpolating(
+def _interpolate(
     values: Callable[[Array], Array],
-    first: float,
-    last: float,
-    inner: Array,
+    breaks: Array,
     degree: int,
-    multiplicity: int,
+    multiplicity: int | None = None,
 ) -> BSpline:
-    """Interpolate at the Greville abscissae, which is exact where the spline space has the function."""
+    """Interpolate at the Greville abscissae, which is exact where the spline space has the function.
+
+    Inner breaks are knots of this multiplicity; as many as three continuous derivatives allow unless given.
+    """
     from scipy.interpolate import make_interp_spline
 
-    ends = np.ones(degree + 1)
-    knots = np.concatenate([first * ends, np.repeat(inner, multiplicity), last * ends])
-    sites = (
-        np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
-        .mean(axis=1)
-        .clip(first, last)
-    )
-    return make_interp_spline(sites, values(sites), k=degree, t=knots)
+    times = np.full(len(breaks), multiplicity or degree - _SMOOTH)
+    times[[0, -1]] = degree + 1
+    knots = np.repeat(breaks, times)
+    windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
+    abscissae = windows.mean(axis=1).clip(breaks[0], breaks[-1])
+    return make_interp_spline(abscissae, values(abscissae), k=degree, t=knots)
 
 
 def _rows(values: Array) -> Array:
@@ -203,36 +187,30 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     path : Path
         Built of them by `build_path`.
     """
-    sequence = path.coordinates if isinstance(path, PosePath) else path
-    if not isinstance(sequence, SequencePath):
+    if not isinstance(path, SequencePath):
         return ()
-    tables: list[tuple[Array, Array]] = []
-    goes_on = False
+    tables: list[Array] = []
+    goes_on = False  # whether the last table holds up to the end of its segment
     for begin, end, piece in zip(
-        sequence.breaks, sequence.breaks[1:], sequence.pieces, strict=False
+        path.breaks, path.breaks[1:], path.pieces, strict=False
     ):
         if piece.segment is None:
             continue
         segment = segments[piece.segment]
-        for sigma, speed in map(
-            np.transpose,
-            segment.bspline.speeds if isinstance(segment, BSplineSegment) else (),
-        ):
+        speeds = segment.bspline.speeds if isinstance(segment, BSplineSegment) else ()
+        for sigma, speed in map(np.transpose, speeds):
             at = np.unique(np.clip(sigma, piece.first, piece.last))
             if len(at) > 1:
                 s = np.interp(at, [piece.first, piece.last], [begin, end])
-                at_start = goes_on and sigma[0] <= piece.first
-                before = (
-                    tables.pop() if at_start and tables else (np.empty(0), np.empty(0))
-                )
-                values = np.interp(at, sigma, speed)
-                tables.append((np.append(before[0], s), np.append(before[1], values)))
+                table = np.stack([s, np.interp(at, sigma, speed)])
+                if goes_on and tables and sigma[0] <= piece.first:
+                    table = np.concatenate([tables.pop(), table], axis=1)
+                tables.append(table)
             goes_on = bool(sigma[-1] >= piece.last)
-        if not isinstance(segment, BSplineSegment) or not segment.bspline.speeds:
-            goes_on = False
+        goes_on &= bool(speeds)
     return tuple(
-        SpeedTable(s=tuple(s.tolist()), speed=tuple(speed.tolist()))
-        for s, speed in tables
+        SpeedTable(s=tuple(s), speed=tuple(speed))
+        for s, speed in (table.tolist() for table in tables)
     )
 
 
@@ -241,6 +219,5 @@ def with_feed_rates(task: Task, path: Path) -> Task:
     tables = feed_tables(task.path, path)
     if not tables:
         return task
-    return task.model_copy(
-        update={"tool_limits": task.tool_limits.model_copy(update={"feed": tables})}
-    )
+    limits = task.tool_limits.model_copy(update={"feed": tables})
+    return task.model_copy(update={"tool_limits": limits})

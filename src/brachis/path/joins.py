@@ -1,31 +1,20 @@
-"""Checking that curves continue each other to the third derivative.
-
-Checking that curves of poses continue each other to the third derivative.
-
-Looking for the smallest value of a function along a curve.
-"""
+"""Checking that curves, of rows or of poses, continue each other to the third derivative."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import PathError
+from brachis.path.context import place, stands_still
 from brachis.path.pose import POSITIONS, twist
-from brachis.path.site import place, stands_still
+from brachis.path.protocol import Array, Curve
 from brachis.robot.task_map.protocol import joints_of, position_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from brachis.path.protocol import Array, Curve
 
 TOLERANCE = 1e-6
 """Largest relative mismatch of derivatives at a join: coordinates are given with six digits or more."""
-_WORTH_MENTIONING = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +62,19 @@ class Join:
     def unit(self) -> str:
         """Unit of lengths along the path."""
         return "rad, m" if joints_of(self.rows) else "m"
+
+    def wrong_blend(
+        self, problem: str, found: str, allowed: str, hint: str | None
+    ) -> PathError:
+        """Return the error that the corner cannot be rounded."""
+        return PathError(
+            problem,
+            s_interval=(self.s, self.s),
+            found=found,
+            allowed=allowed,
+            where=f"{self.blend_key}: {self.where}",
+            hint=hint,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +142,7 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
         corner = angle_between(before[1], after[1])
         speed, new_speed = (float(np.linalg.norm(one[1])) for one in (before, after))
         # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
-        if corner > _WORTH_MENTIONING * abs(new_speed - speed):
+        if corner > 0.01 * abs(new_speed - speed):
             return f"a corner of {np.rad2deg(corner):.4g} degrees{_of_yaw(before, after, positions)}"
         return f"the parameter's speed changing from {speed:.6g} to {new_speed:.6g}"
     if jumps[2] > TOLERANCE:
@@ -152,11 +154,11 @@ def refuse_corners(corners: Sequence[Corner]) -> None:
     """Raise a `PathError` for the first of the corners, naming the others, if there are any."""
     if not corners:
         return
-    corner, join = corners[0], corners[0].join
+    corner = corners[0]
+    join = corner.join
     others = ", ".join(other.join.blend_key for other in corners[1:])
-    problem = "the path must be smooth to the third derivative"
     raise PathError(
-        problem,
+        "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
         found=corner.found,
         allowed="segments that continue each other, or a blend",
@@ -167,7 +169,8 @@ def refuse_corners(corners: Sequence[Corner]) -> None:
 
 def angle_between(one: Array, other: Array) -> float:
     """Return the angle between two vectors, accurate for small ones as well."""
-    a, b = one * np.linalg.norm(other), other * np.linalg.norm(one)
+    a = one * np.linalg.norm(other)
+    b = other * np.linalg.norm(one)
     return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
 
 
@@ -185,25 +188,21 @@ def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
     """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
     on_the_spot = [stands_still(curve, POSITIONS) for curve in (first, second)]
     if on_the_spot[0] != on_the_spot[1]:
-        found = "a stop: the position moves on one side, and the tool turns on the spot on the other"
         return Corner(
             join,
-            found,
+            "a stop: the position moves on one side, and the tool turns on the spot on the other",
             "Turn the tool along a segment, by its orientation, or in a task of its own",
         )
     before, after, length = at_join(first, second)
     jump = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)
     if jump:
         return Corner(join, jump, f"Set {join.rounding}")
-    jump = _turning_mismatch(before, after, length, "rad" if on_the_spot[0] else "m")
-    smooth = "Set profile: smooth where the tool turns"
-    return (
-        Corner(
-            join, jump, smooth if on_the_spot[0] else f"{smooth}, or {join.rounding}"
-        )
-        if jump
-        else None
-    )
+    unit = "rad" if on_the_spot[0] else "m"
+    jump = _turning_mismatch(before, after, length, unit)
+    advice = "Set profile: smooth where the tool turns"
+    if not on_the_spot[0]:
+        advice += f", or {join.rounding}"
+    return Corner(join, jump, advice) if jump else None
 
 
 def _turning_mismatch(
@@ -233,30 +232,3 @@ def _turning_mismatch(
         return f"the tool's turning rate jumps: {rate:.4g} rad/{unit} before and {new_rate:.4g} after"
     angle = np.rad2deg(angle_between(old[0], new[0]))
     return f"the axis about which the tool turns jumps by {angle:.4g} degrees"
-
-
-_POINTS = 64
-
-
-def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, float]:
-    """Return where a continuous function is smallest, and its value there.
-
-    Parameters
-    ----------
-    function : callable
-        Values, shape (K,), at K values of sigma. It is looked at 64 times between two knots, and then as often around
-        the smallest value found.
-    knots : ndarray, shape (n,)
-        Values of sigma between which the function is smooth.
-    """
-    fractions = np.arange(_POINTS) / _POINTS
-    grid = np.append(
-        (knots[:-1, None] + fractions * np.diff(knots)[:, None]).ravel(), knots[-1]
-    )
-    near = int(np.argmin(function(grid)))
-    fine = np.linspace(
-        grid[max(near - 1, 0)], grid[min(near + 1, len(grid) - 1)], 2 * _POINTS + 1
-    )
-    values = function(fine)
-    best = int(np.argmin(values))
-    return float(fine[best]), float(values[best])

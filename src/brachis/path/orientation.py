@@ -1,19 +1,19 @@
-"""Orientations along a segment: fixed, turning about an axis, or turning with the tangent.
-
-Turns of the tool about an axis that stands still.
-"""
+"""Orientations along a segment: fixed, turning about an axis that stands still, or turning with the tangent."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import PathError
 from brachis.path.blends import septic
+from brachis.path.context import ZERO_LENGTH, place
 from brachis.path.curves import ArcCurve, HelixCurve, LineCurve
-from brachis.path.joins import smallest
+from brachis.path.pose import smallest
+from brachis.path.protocol import Array, Curve, Orientation
 from brachis.path.rotations import (
     hat,
     product,
@@ -22,45 +22,24 @@ from brachis.path.rotations import (
     sine_cosine,
     unit,
 )
-from brachis.path.site import ZERO_LENGTH, place
 from brachis.task import AlongTangent, Rotate, TurnTo
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-    from brachis.path.protocol import Array, Curve, Orientation
-
 AMBIGUOUS = 1e-4
 """How near to half a turn (rad) an orientation cannot be from another one: rounding would decide which way to turn."""
 
 
-@dataclass(frozen=True, eq=False)
-class AboutAxis:
-    """A rotation about an axis that stands still, ``start exp(angle(sigma) hat(axis))``.
-
-    Attributes
-    ----------
-    start : ndarray, shape (3, 3)
-        The rotation matrix at the start.
-    axis : ndarray, shape (3,)
-        Unit vector of the axis, in the tool frame.
-    angle : Curve
-        The angle, rad, as the only column.
-    """
-
-    start: Array
-    axis: Array
-    angle: Curve
-
-    def matrices(self, sigma: Array, order: int = 3) -> Array:
-        """Return the rotation matrix and its derivatives by sigma, shape (order + 1, K, 3, 3)."""
-        sine, cosine = sine_cosine(self.angle.derivatives(sigma, order)[..., 0])
-        aside = hat(self.axis)
-        result = sine[..., None, None] * (self.start @ aside) - cosine[
-            ..., None, None
-        ] * (self.start @ aside @ aside)
-        result[0] += self.start @ (np.eye(3) + aside @ aside)
-        return result
+def _about_axis(
+    start: Array, axis: Array, angle: Curve, sigma: Array, order: int
+) -> Array:
+    """Return the rotation ``start exp(angle(sigma) hat(axis))``, about an axis in the tool frame, and derivatives."""
+    sine, cosine = sine_cosine(angle.derivatives(sigma, order)[..., 0, None, None])
+    aside = hat(axis)
+    result = sine * (start @ aside) - cosine * (start @ aside @ aside)
+    result[0] += start @ (np.eye(3) + aside @ aside)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,21 +63,18 @@ class Turn:
     angle: float
     smooth: bool
 
-    def over(self, length: float) -> AboutAxis:
+    def over(self, length: float) -> Orientation:
         """Return the rotation spread over a range of sigma.
 
         Where it is smooth, its angle is the septic polynomial whose first three derivatives vanish at both ends,
         ``35 u^4 - 84 u^5 + 70 u^6 - 20 u^7`` times the angle with ``u = sigma / length``.
         """
+        angle: Curve = LineCurve(np.zeros(1), np.array([self.angle / length]), length)
         if self.smooth:
             start, end = np.zeros((2, 4, 1))
             end[0] = self.angle
-            return AboutAxis(self.start, self.axis, septic(start, end, length))
-        return AboutAxis(
-            self.start,
-            self.axis,
-            LineCurve(np.zeros(1), np.array([self.angle / length]), length),
-        )
+            angle = septic(start, end, length)
+        return partial(_about_axis, self.start, self.axis, angle)
 
 
 def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
@@ -123,15 +99,10 @@ def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
         axis = np.array(rotate.axis) / np.linalg.norm(rotate.axis)
         if rotate.frame == "path":
             axis = start.T @ axis
-        return Turn(
-            start, axis, float(np.deg2rad(rotate.angle_deg)), rotate.profile == "smooth"
-        )
-    return turn_between(
-        start,
-        rotation_from(turning.to),
-        f"{key}.to",
-        smooth=turning.to.profile == "smooth",
-    )
+        angle = float(np.deg2rad(rotate.angle_deg))
+        return Turn(start, axis, angle, rotate.profile == "smooth")
+    smooth = turning.to.profile == "smooth"
+    return turn_between(start, rotation_from(turning.to), f"{key}.to", smooth=smooth)
 
 
 def turn_between(
@@ -154,9 +125,8 @@ def turn_between(
 
 def half_turn(key: str) -> PathError:
     """Return the error that an orientation is half a turn away from the one before."""
-    problem = "the orientation is half a turn away from the one before, so that the way there is ambiguous"
     return PathError(
-        problem,
+        "the orientation is half a turn away from the one before, so that the way there is ambiguous",
         found="180 degrees",
         allowed="less than 180 degrees",
         where=key,
@@ -164,55 +134,25 @@ def half_turn(key: str) -> PathError:
     )
 
 
-_PARALLEL = np.sin(np.deg2rad(1.0))
-_STOPS = 1e-3
+def _stay(start: Array, sigma: Array, order: int) -> Array:
+    """Return a rotation matrix that stays, and its derivatives."""
+    result = np.zeros((order + 1, sigma.size, 3, 3))
+    result[0] = start
+    return result
 
 
-@dataclass(frozen=True, eq=False)
-class Fixed:
-    """An orientation that stays.
+def _with_frame(
+    position: Curve, up: Array, tool: Array, sigma: Array, order: int
+) -> Array:
+    """Return the rotation of a tool that rests in a frame along a curve: x along its tangent, y along up x tangent.
 
-    Attributes
-    ----------
-    start : ndarray, shape (3, 3)
-        The rotation matrix.
+    One more derivative of the position is needed than of the orientation.
     """
-
-    start: Array
-
-    def matrices(self, sigma: Array, order: int = 3) -> Array:
-        """Return the rotation matrix and its derivatives by sigma, shape (order + 1, K, 3, 3)."""
-        result = np.zeros((order + 1, sigma.size, 3, 3))
-        result[0] = self.start
-        return result
-
-
-@dataclass(frozen=True, eq=False)
-class WithTangent:
-    """An orientation that turns with a frame along a curve: x along its tangent, y along up x tangent.
-
-    Attributes
-    ----------
-    position : Curve
-        The curve in three position rows; one more derivative of it is needed than of the orientation.
-    up : ndarray, shape (3,)
-        World direction that is never along the tangent.
-    tool : ndarray, shape (3, 3)
-        Rotation matrix of the tool in the moving frame.
-    """
-
-    position: Curve
-    up: Array
-    tool: Array
-
-    def matrices(self, sigma: Array, order: int = 3) -> Array:
-        """Return the rotation matrix and its derivatives by sigma, shape (order + 1, K, 3, 3)."""
-        tangent = unit(self.position.derivatives(sigma, order + 1)[1:])
-        sideways = unit(tangent @ hat(self.up).T)
-        upwards = product(hat(tangent), sideways, "...ij,...j->...i")
-        frame = np.stack([tangent, sideways, upwards], axis=-1)
-        result: Array = frame @ self.tool
-        return result
+    tangent = unit(position.derivatives(sigma, order + 1)[1:])
+    sideways = unit(tangent @ hat(up).T)
+    upwards = product(hat(tangent), sideways, "...ij,...j->...i")
+    frame: Array = np.stack([tangent, sideways, upwards], axis=-1)
+    return frame @ tool
 
 
 def orientation_along(
@@ -240,32 +180,30 @@ def orientation_along(
         The orientation is not defined along this curve.
     """
     if mode is None or mode == "fixed":
-        return Fixed(start)
+        return partial(_stay, start)
     if isinstance(mode, Rotate | TurnTo):
         return turn_of(mode, start, key).over(curve.length)
     given = mode.tangent.up if isinstance(mode, AlongTangent) else None
-    return _with_tangent(curve, _up(given, curve), start, key)
-
-
-def _up(given: tuple[float, float, float] | None, curve: Curve) -> Array:
+    up = np.array([0.0, 0.0, 1.0])
     if given is not None:
-        return np.array(given) / np.linalg.norm(given)
-    return (
-        curve.normal
-        if isinstance(curve, ArcCurve | HelixCurve)
-        else np.array([0.0, 0.0, 1.0])
-    )
+        up = np.array(given) / np.linalg.norm(given)
+    elif isinstance(curve, ArcCurve | HelixCurve):
+        up = curve.normal
+    return _with_tangent(curve, up, start, key)
 
 
-def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> WithTangent:
+def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> Orientation:
     sigma, speed = smallest(
         lambda sigma: np.linalg.norm(curve.derivatives(sigma, 1)[1], axis=1),
         curve.knots,
     )
-    if speed < _STOPS:
-        problem = "the curve all but stops, so that it has no tangent"
-        hint = "Use orientation: fixed, or other waypoints"
-        raise PathError(problem, found=_place(curve, sigma), where=key, hint=hint)
+    if speed < 1e-3:
+        raise PathError(
+            "the curve all but stops, so that it has no tangent",
+            found=_place(curve, sigma),
+            where=key,
+            hint="Use orientation: fixed, or other waypoints",
+        )
 
     def sine(sigma: Array) -> Array:
         tangent = unit(curve.derivatives(sigma, 1)[1:])[0]
@@ -273,17 +211,16 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> WithTangen
         return size
 
     sigma, least = smallest(sine, curve.knots)
-    if least < _PARALLEL:
-        problem = "the tangent becomes parallel to up, so that it does not say how the tool is turned about it"
+    if least < np.sin(np.deg2rad(1.0)):
         raise PathError(
-            problem,
+            "the tangent becomes parallel to up, so that it does not say how the tool is turned about it",
             found=f"{np.rad2deg(np.arcsin(least)):.2g} degrees between them at {_place(curve, sigma)}",
             allowed="1 degree or more",
             where=key,
             hint=f"Set {key}: {{tangent: {{up: [...]}}}} to a direction that the tangent does not take",
         )
-    frame = WithTangent(curve, up, np.eye(3)).matrices(np.zeros(1), 0)[0, 0]
-    return WithTangent(curve, up, frame.T @ start)
+    frame = _with_frame(curve, up, np.eye(3), np.zeros(1), 0)[0, 0]
+    return partial(_with_frame, curve, up, frame.T @ start)
 
 
 def _place(curve: Curve, sigma: float) -> str:

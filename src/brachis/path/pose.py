@@ -2,122 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
-from brachis.path.protocol import PathSample
+from brachis.path.protocol import Array, Curve, MappedCurve, Orientation, PathSample
 from brachis.path.rotations import angular_velocity, matrices, product, unit
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from brachis.path.protocol import Array, Curve, Orientation
-    from brachis.path.sequence import SequencePath
+from brachis.path.sequence import SequencePath
 
 POSITIONS = 3
 LEAST_QUALITY = 0.5
 """Quality of interpolated quaternions below which the tool turns quite otherwise than its neighbours ask for."""
 
 
-@dataclass(frozen=True, eq=False)
-class PoseCurve:
-    """A position and an orientation over the same parameter, as the twelve coordinates of a pose.
-
-    Attributes
-    ----------
-    position : Curve
-        The position, three columns, m.
-    orientation : Orientation
-        The orientation over the same sigma.
-    """
-
-    position: Curve
-    orientation: Orientation
-
-    @property
-    def length(self) -> float:
-        """Range of sigma."""
-        return self.position.length
-
-    @property
-    def knots(self) -> Array:
-        """Values of sigma between which the curve is analytic; the orientation adds none."""
-        return self.position.knots
-
-    def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, 12)."""
-        return _coordinates(
-            self.position.derivatives(sigma, order),
-            self.orientation.matrices(sigma, order),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class QuaternionPoseCurve:
-    """A position and a quaternion, which need not have unit length, as the twelve coordinates of a pose.
-
-    Divided by its length the quaternion is that of the orientation. This construction does not depend on the choice of
-    the world frame or the tool frame: others multiply all quaternions by a unit quaternion, which commutes with it.
-
-    Attributes
-    ----------
-    columns : Curve
-        x, y, z, then the quaternion w, x, y, z: seven columns.
-    """
-
-    columns: Curve
-
-    @property
-    def length(self) -> float:
-        """Range of sigma."""
-        return self.columns.length
-
-    @property
-    def knots(self) -> Array:
-        """Values of sigma between which the curve is analytic."""
-        return self.columns.knots
-
-    def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, 12)."""
-        columns = self.columns.derivatives(sigma, order)
-        return _coordinates(
-            columns[..., :POSITIONS], matrices(unit(columns[..., POSITIONS:]))
-        )
-
-    def quality(self, sigma: Array) -> Array:
-        """Return how near to 1 the quaternions' lengths are before they are divided by them, shape (K,).
-
-        It is the length, or where this is greater than 1 its reciprocal.
-        """
-        lengths: Array = np.linalg.norm(
-            self.columns.derivatives(sigma, 0)[0, :, POSITIONS:], axis=1
-        )
-        return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))
-
-
-@dataclass(frozen=True, eq=False)
-class PosePath:
-    """A path of poses; see `brachis.path.protocol.PathSample` for what a sample consists of.
-
-    Attributes
-    ----------
-    coordinates : SequencePath
-        The twelve coordinates of the pose along the path.
-    """
-
-    coordinates: SequencePath
-
-    @property
-    def length(self) -> float:
-        """Arc length of the position, m."""
-        return self.coordinates.length
-
-    @property
-    def breaks(self) -> Array:
-        """Values of s where pieces join, from 0 to 1."""
-        return self.coordinates.breaks
+class PosePath(SequencePath):
+    """A path of poses, whose samples have the body twist; see `brachis.path.protocol.PathSample`."""
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s; beyond [0, 1] as the first or last piece continues.
@@ -127,8 +27,73 @@ class PosePath:
         s : array_like, shape (K,)
             Path coordinates.
         """
-        derivatives = self.coordinates.derivatives(s)
+        derivatives = self.derivatives(s)
         return PathSample(derivatives[0], *twist(derivatives))
+
+
+def pose_curve(position: Curve, orientation: Orientation) -> MappedCurve:
+    """Return the twelve coordinates of a position, three columns, m, and an orientation over the same parameter."""
+    return MappedCurve(position, partial(_with_orientation, orientation))
+
+
+def _with_orientation(orientation: Orientation, sigma: Array, position: Array) -> Array:
+    return _coordinates(position, orientation(sigma, len(position) - 1))
+
+
+def quaternion_curve(columns: Curve) -> MappedCurve:
+    """Return the twelve coordinates of a position and a quaternion, which need not have unit length.
+
+    Divided by its length the quaternion is that of the orientation. This construction does not depend on the choice of
+    the world frame or the tool frame: others multiply all quaternions by a unit quaternion, which commutes with it.
+
+    Parameters
+    ----------
+    columns : Curve
+        x, y, z, then the quaternion w, x, y, z: seven columns.
+    """
+    return MappedCurve(columns, _from_quaternions)
+
+
+def _from_quaternions(_sigma: Array, columns: Array) -> Array:
+    rotation = matrices(unit(columns[..., POSITIONS:]))
+    return _coordinates(columns[..., :POSITIONS], rotation)
+
+
+def least_quality(columns: Curve) -> tuple[float, float]:
+    """Return where the quaternions, the last four columns, are farthest from unit length, and how far.
+
+    The quality of a quaternion is its length, or where this is greater than 1 its reciprocal.
+    """
+
+    def quality(sigma: Array) -> Array:
+        quaternions = columns.derivatives(sigma, 0)[0, :, POSITIONS:]
+        lengths: Array = np.linalg.norm(quaternions, axis=1)
+        return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))
+
+    return smallest(quality, columns.knots)
+
+
+def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, float]:
+    """Return where a continuous function is smallest, and its value there.
+
+    Parameters
+    ----------
+    function : callable
+        Values, shape (K,), at K values of sigma. It is looked at 64 times between two knots, and then as often around
+        the smallest value found.
+    knots : ndarray, shape (n,)
+        Values of sigma between which the function is smooth.
+    """
+    count = 64
+    fractions = np.arange(count) / count
+    inside = knots[:-1, None] + fractions * np.diff(knots)[:, None]
+    grid = np.append(inside.ravel(), knots[-1])
+    near = int(np.argmin(function(grid)))
+    before, after = np.clip([near - 1, near + 1], 0, len(grid) - 1)
+    fine = np.linspace(grid[before], grid[after], 2 * count + 1)
+    values = function(fine)
+    best = int(np.argmin(values))
+    return float(fine[best]), float(values[best])
 
 
 def twist(coordinates: Array) -> Array:
@@ -142,7 +107,8 @@ def twist(coordinates: Array) -> Array:
     coordinates : ndarray, shape (order + 1, K, 12)
         Derivatives of the coordinates of the pose.
     """
-    position, rotation = coordinates[..., :POSITIONS], rotations(coordinates)
+    position = coordinates[..., :POSITIONS]
+    rotation = rotations(coordinates)
     velocity = product(np.swapaxes(rotation, -1, -2), position[1:], "...ij,...j->...i")
     return np.concatenate([velocity, angular_velocity(rotation)], axis=-1)
 

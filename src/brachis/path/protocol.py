@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Array = npt.NDArray[np.float64]
 
@@ -86,9 +84,36 @@ class Curve(Protocol):
         ...
 
 
-class Orientation(Protocol):
-    """Orientation of the tool along a segment."""
+Orientation = Callable[[Array, int], Array]
+"""Orientation of the tool along a segment: from K values of sigma and the order, the rotation matrix and as many
+derivatives by sigma, shape (order + 1, K, 3, 3)."""
 
-    def matrices(self, sigma: Array, order: int = 3) -> Array:
-        """Return the rotation matrix and its derivatives by sigma, shape (order + 1, K, 3, 3)."""
-        ...
+
+@dataclass(frozen=True, eq=False)
+class MappedCurve:
+    """A curve whose coordinates are a function of another curve's, over the same parameter.
+
+    Attributes
+    ----------
+    curve : Curve
+        The other curve.
+    function : callable
+        Of sigma, shape (K,), and the curve's coordinates and derivatives, shape (order + 1, K, c).
+    """
+
+    curve: Curve
+    function: Callable[[Array, Array], Array]
+
+    @property
+    def length(self) -> float:
+        """Range of sigma."""
+        return self.curve.length
+
+    @property
+    def knots(self) -> Array:
+        """Values of sigma between which the curve is analytic; the function adds none."""
+        return self.curve.knots
+
+    def derivatives(self, sigma: Array, order: int = 3) -> Array:
+        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        return self.function(sigma, self.curve.derivatives(sigma, order))

@@ -1,8 +1,6 @@
-"""Rotations and quaternions (w, x, y, z), and their derivatives along a path.
+"""Rotations and quaternions (w, x, y, z), and exact derivatives of products, unit vectors and sines by Leibniz' rule.
 
 SciPy's rotations are imported where they are used: a fifth of a second that paths without orientation need not wait.
-
-Exact higher derivatives of products, unit vectors, and sines, by Leibniz' rule.
 
 A function of one parameter is given by its derivatives: an array whose first axis counts them, from the value on; shape
 (order + 1, ...). Then ``f[1:]`` are the derivatives of f', and ``(f g)[k] = sum_i binomial(k, i) f[i] g[k - i]``.
@@ -15,13 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.path.protocol import Array
+from brachis.task import Attitude
 from brachis.task.points.units import rotation_by
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
-
-    from brachis.path.protocol import Array
-    from brachis.task import Attitude
 
 
 def product(one: Array, other: Array, how: str) -> Array:
@@ -65,8 +62,10 @@ def unit(vector: Array) -> Array:
 
 def sine_cosine(angle: Array) -> tuple[Array, Array]:
     """Return the derivatives of the sine and the cosine of an angle, shape (order + 1, ...)."""
-    sine, cosine = np.zeros_like(angle), np.zeros_like(angle)
-    sine[0], cosine[0] = np.sin(angle[0]), np.cos(angle[0])
+    sine = np.zeros_like(angle)
+    cosine = np.zeros_like(angle)
+    sine[0] = np.sin(angle[0])
+    cosine[0] = np.cos(angle[0])
     for k in range(len(angle) - 1):
         sine[k + 1] = sum(
             comb(k, i) * angle[i + 1] * cosine[k - i] for i in range(k + 1)
@@ -91,9 +90,8 @@ def matrices(quaternions: Array) -> Array:
     products = product(quaternions, quaternions, "...i,...j->...ij")
     of_vector = products[..., 1:, 1:]
     diagonal = products[..., 0, 0] - np.trace(of_vector, axis1=-2, axis2=-1)
-    return 2.0 * (of_vector + hat(products[..., 0, 1:])) + diagonal[
-        ..., None, None
-    ] * np.eye(3)
+    skew = hat(products[..., 0, 1:])
+    return 2.0 * (of_vector + skew) + diagonal[..., None, None] * np.eye(3)
 
 
 def quaternion_derivatives(rotation: Array) -> Array:
@@ -103,12 +101,14 @@ def quaternion_derivatives(rotation: Array) -> Array:
     """
     result = np.zeros((len(rotation), 4))
     result[0] = quaternions_of(rotation_of(rotation[0]))
-    rate = angular_velocity(rotation)
+    velocity = angular_velocity(rotation)
+    rate = np.concatenate([np.zeros((len(velocity), 1)), velocity], axis=1)
     for k in range(len(rotation) - 1):
-        result[k + 1] = (
-            sum(comb(k, i) * _turning(result[i], rate[k - i]) for i in range(k + 1))
-            / 2.0
+        terms = (
+            comb(k, i) * quaternion_product(result[i], rate[k - i])
+            for i in range(k + 1)
         )
+        result[k + 1] = sum(terms) / 2.0
     return result
 
 
@@ -121,9 +121,9 @@ def angular_velocity(rotation: Array) -> Array:
         Derivatives of the rotation matrix R; the angular velocity is that of ``R^T R'``.
     """
     skew = product(np.swapaxes(rotation, -1, -2), rotation[1:], "...ij,...jk->...ik")
-    upper = np.stack([skew[..., 1, 2], skew[..., 2, 0], skew[..., 0, 1]], axis=-1)
-    lower = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
-    return (lower - upper) / 2.0
+    one = [1, 2, 0]
+    other = [2, 0, 1]
+    return (skew[..., other, one] - skew[..., one, other]) / 2.0
 
 
 def rotation_of(matrix: Array) -> Rotation:
@@ -144,7 +144,10 @@ def rotation_from(attitude: Attitude) -> Rotation:
     return rotation_by(convention, np.array(values))
 
 
-def _turning(quaternion: Array, rate: Array) -> Array:
-    """Return the product, (4,), of a quaternion and the one whose vector part is `rate`, (3,), and scalar part zero."""
-    w, v = quaternion[0], quaternion[1:]
-    return np.concatenate([[-v @ rate], w * rate + np.cross(v, rate)])
+def quaternion_product(one: Array, other: Array) -> Array:
+    """Return the products, (..., 4), of quaternions (w, x, y, z)."""
+    w = one[..., :1]
+    v = one[..., 1:]
+    scalar = w * other[..., :1] - np.sum(v * other[..., 1:], axis=-1, keepdims=True)
+    vector = w * other[..., 1:] + other[..., :1] * v + np.cross(v, other[..., 1:])
+    return np.concatenate([scalar, vector], axis=-1)

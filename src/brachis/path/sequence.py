@@ -1,24 +1,79 @@
-"""A path made of curves.
-
-How a path begins and ends: how fast it runs there per unit s, and whether it closes.
-"""
+"""A path made of curves, the frame in which they are given, and how the path begins and ends."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.path.protocol import PathSample
+from brachis.path.protocol import Array, Curve, Path, PathSample
+from brachis.robot import TaskMap
+from brachis.robot.task_map.protocol import AXES, POSE_ROWS, YAW, position_rows
+from brachis.task import Placement
+from brachis.task.points.units import rotation_by
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
-    from brachis.path.frame import PathFrame
-    from brachis.path.protocol import Array, Curve, Path
-    from brachis.robot import TaskMap
+@dataclass(frozen=True, eq=False)
+class PathFrame:
+    """Task coordinates in a frame, (..., c), as those in the world: ``turn @ coordinates + origin``.
+
+    Attributes
+    ----------
+    turn : (c, c) ndarray
+        An orthogonal matrix.
+    origin : (c,) ndarray
+        m, rad.
+    """
+
+    turn: Array
+    origin: Array
+
+    @classmethod
+    def of(cls, placement: Placement, rows: Sequence[str]) -> PathFrame:
+        """Return the frame with a placement in the world, for a task space with these rows.
+
+        Raises
+        ------
+        PathError
+            The frame turns the rows out of their line or plane.
+        """
+        rotation = rotation_by("rpy", np.radians(placement.rpy_deg)).as_matrix()
+        if tuple(rows) == POSE_ROWS:
+            coordinates = np.zeros((12, 12))
+            coordinates[:3, :3] = rotation
+            coordinates[3:, 3:] = np.kron(rotation, np.eye(3))  # of a matrix row by row
+            return cls(coordinates, np.concatenate([placement.xyz, np.zeros(9)]))
+        axes = [AXES.index(row) for row in position_rows(rows)]
+        block = rotation[np.ix_(axes, axes)]
+        if (
+            np.abs(block @ block.T - np.eye(len(axes))).max() > 1e-9
+            or np.linalg.det(block) < 0.0
+        ):
+            raise PathError(
+                "the frame of the path turns it out of the rows of the task space",
+                where="path_frame",
+                found=f"rpy_deg {list(placement.rpy_deg)} with task_space [{', '.join(rows)}]",
+                allowed="a turn within these rows",
+                hint="Set task_space: position, or turn the frame about the axis that is not among them",
+            )
+        turn = np.eye(len(rows))
+        turn[: len(axes), : len(axes)] = block
+        origin = np.array(placement.xyz)[axes]
+        if YAW in rows:
+            origin = np.append(origin, np.arctan2(block[1, 0], block[0, 0]))
+        return cls(turn, origin)
+
+    def to_world(self, coordinates: Array) -> Array:
+        """Return coordinates in the world, (c,)."""
+        return np.asarray(self.turn @ coordinates + self.origin)
+
+    def to_frame(self, coordinates: Array) -> Array:
+        """Return coordinates in the frame, (c,), of coordinates in the world."""
+        return np.asarray(self.turn.T @ (coordinates - self.origin))
+
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -67,17 +122,16 @@ class SequencePath:
     pieces: tuple[Piece, ...]
     breaks: Array
     length: float
-    frame: PathFrame | None = None
+    frame: PathFrame | None
 
     @classmethod
-    def of(cls, pieces: tuple[Piece, ...], positions: int) -> SequencePath:
+    def of(
+        cls, pieces: tuple[Piece, ...], positions: int, frame: PathFrame | None
+    ) -> Self:
         """Put pieces together whose first `positions` rows are those of the position."""
         ends = np.cumsum([0.0, *(piece.length for piece in pieces)])
-        return cls(
-            pieces,
-            ends / ends[-1],
-            sum(piece.arc_length(positions) for piece in pieces),
-        )
+        length = sum(piece.arc_length(positions) for piece in pieces)
+        return cls(pieces, ends / ends[-1], length, frame)
 
     @property
     def total(self) -> float:
@@ -97,23 +151,16 @@ class SequencePath:
     def derivatives(self, s: Sequence[float] | Array) -> Array:
         """Return the coordinates in the world and their derivatives by s up to the third, shape (4, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
-        which = np.clip(
-            np.searchsorted(self.breaks, values, side="right") - 1,
-            0,
-            len(self.pieces) - 1,
-        )
+        which = np.searchsorted(self.breaks[1:-1], values, side="right")
         total = self.total
         rows = self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2]
         result = np.empty((4, values.size, rows))
         order = np.argsort(which, kind="stable")
-        for here in (
-            np.split(order, np.flatnonzero(np.diff(which[order])) + 1)
-            if len(order)
-            else ()
-        ):
-            i = int(which[here[0]])
-            sigma = self.pieces[i].first + (values[here] - self.breaks[i]) * total
-            result[:, here] = self.pieces[i].curve.derivatives(sigma)
+        used, starts = np.unique(which[order], return_index=True)
+        for i, here in zip(used, np.split(order, starts[1:]), strict=False):
+            piece = self.pieces[i]
+            sigma = piece.first + (values[here] - self.breaks[i]) * total
+            result[:, here] = piece.curve.derivatives(sigma)
         result *= total ** np.arange(4)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T
@@ -121,20 +168,14 @@ class SequencePath:
         return result
 
 
-_CLOSED = 1e-6
-"""Largest gap of a closed path, m and rad, and of its derivatives by s, relative to their size."""
-_STILL = 1e-9
-
-
 def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
     """Return how far the position moves per unit s, m; where it stands still, how far the angles turn, rad.
 
     Of a path of joints it is the norm of their derivatives.
     """
-    position, angle = (
-        float(size[0]) for size in task_map.norms(path.sample(np.array([s])).xi)
-    )
-    return position if position > _STILL else angle
+    sizes = task_map.norms(path.sample(np.array([s])).xi)
+    position, angle = (float(size[0]) for size in sizes)
+    return position if position > 1e-9 else angle
 
 
 def check_closed(task_map: TaskMap, path: Path) -> None:
@@ -147,22 +188,18 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
     ends = path.sample(np.array([0.0, 1.0]))
     gap = np.abs(task_map.difference(*ends.target))
     worst = int(np.argmax(gap))
-    allowed = f"an end where the path begins, to {_CLOSED:g} m and rad"
-    if gap[worst] > _CLOSED:
-        found = (
-            f"{gap[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}"
-        )
+    largest = 1e-6  # m and rad; of derivatives relative to their size
+    if gap[worst] > largest:
         raise PathError(
             "the path does not close",
-            found=found,
-            allowed=allowed,
+            found=f"{gap[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}",
+            allowed=f"an end where the path begins, to {largest:g} m and rad",
             where="boundary.periodic",
         )
     for derivative, name in ((ends.xi, "tangent"), (ends.xi_ds, "curvature")):
         jump = float(np.linalg.norm(derivative[1] - derivative[0]))
-        if jump > _CLOSED * max(
-            float(np.linalg.norm(ends.xi[0])), float(np.linalg.norm(derivative))
-        ):
+        size = max(np.linalg.norm(ends.xi[0]), np.linalg.norm(derivative))
+        if jump > largest * size:
             raise PathError(
                 f"the path's {name} jumps where it closes",
                 found=f"a jump of {jump:.3g} in {np.linalg.norm(derivative[0]):.3g} (by s)",

@@ -1,36 +1,43 @@
-"""Smooth curves through waypoints.
-
-B-spline curves that are given by knots and control points.
-"""
+"""Smooth curves through waypoints, and B-splines given by knots and control points; of rows or of poses."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.common.arrays import with_like_signs
 from brachis.errors import PathError
+from brachis.path.context import ZERO_LENGTH, SegmentContext, place
 from brachis.path.curves import LineCurve
-from brachis.path.pose import POSITIONS, QuaternionPoseCurve
-from brachis.path.rotations import quaternions_of, rotation_of
-from brachis.path.site import ZERO_LENGTH, Site
-from brachis.robot.plausibility import place_hint
+from brachis.path.orientation import AMBIGUOUS, half_turn, turn_between
+from brachis.path.pose import (
+    LEAST_QUALITY,
+    POSITIONS,
+    least_quality,
+    pose_curve,
+    quaternion_curve,
+)
+from brachis.path.protocol import Array, MappedCurve
+from brachis.path.rotations import (
+    quaternion_product,
+    quaternions_of,
+    rotation_from,
+    rotation_of,
+)
+from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import joints_of
+from brachis.task.orientation import Attitude
+from brachis.task.segments import BSplineCurve, SplineThrough
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
-
-    from brachis.path.protocol import Array
-    from brachis.path.site import Site
-    from brachis.task import BSplineCurve, SplineThrough
+    from scipy.spatial.transform import Rotation
 
 START_TOLERANCE = 1e-4
 """How far a segment may start from where its waypoints expect, m and rad."""
-_OF_NEXT = 0.01
-"""Share of the distance to the next waypoint up to which a first waypoint is taken for the segment's start."""
-_DEGREE = 5
-_FEWEST_WAYPOINTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,28 +66,123 @@ class SplineCurve:
         return np.stack([self.spline(sigma, nu=k) for k in range(order + 1)])
 
 
-def spline_through(shape: SplineThrough, site: Site) -> SplineCurve | LineCurve:
+def spline_through(
+    shape: SplineThrough, context: SegmentContext
+) -> SplineCurve | LineCurve:
     """Return the smooth curve from the segment's start through waypoints; a line where there is only one."""
     if shape.orientations is not None:
-        problem = "orientations are for task spaces of poses"
-        where = f"{site.key}.orientations"
-        raise PathError(
-            problem,
-            found=f"task_space [{', '.join(site.rows)}]",
-            where=where,
+        raise context.wrong(
+            "orientations are for task spaces of poses",
+            ".orientations",
+            found=f"task_space [{', '.join(context.rows)}]",
             hint="Set task_space: pose",
         )
-    waypoints = waypoints_of(shape, site)
-    if repeats_start(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)):
+    waypoints = _waypoints_of(shape, context)
+    if _repeats_start(_lengths(waypoints)):
         waypoints = np.delete(waypoints, 1, axis=0)
-    steps = np.diff(waypoints, axis=0)
-    chords = np.linalg.norm(steps[:, : len(site.positions)], axis=1)
-    return interpolate(
-        chord_knots(chords, np.linalg.norm(steps, axis=1), shape, site), waypoints
-    )
+    chords = _lengths(waypoints[:, : len(context.positions)])
+    knots = _chord_knots(chords, _lengths(waypoints), shape, context)
+    return _interpolate(knots, waypoints)
 
 
-def waypoints_of(shape: SplineThrough, site: Site) -> Array:
+def pose_spline(
+    shape: SplineThrough,
+    attitudes: Sequence[Attitude],
+    context: SegmentContext,
+    rotation: Array,
+) -> MappedCurve:
+    """Return the smooth curve through poses; where there is only one, the line with a uniform turn.
+
+    Position and quaternion are one natural quintic spline over the chord lengths of the positions (the angles between
+    the orientations, where the position stands still). The quaternions' signs are such that neighbours are close.
+
+    Parameters
+    ----------
+    shape : SplineThrough
+        The waypoints.
+    attitudes : sequence of Attitude
+        The orientations at the waypoints.
+    context : SegmentContext
+        Place of the segment, in three position rows.
+    rotation : ndarray, shape (3, 3)
+        Rotation matrix of the tool at the segment's start.
+
+    Raises
+    ------
+    PathError
+        The segment starts elsewhere than its waypoints expect, or a waypoint repeats another one, or orientations are
+        half a turn apart or turn back and forth too much.
+    """
+    points = _waypoints_of(shape, context)
+    turned = _rotations(shape, attitudes, context, rotation)
+    if _repeats_start(np.hypot(_lengths(points), _angles(turned))):
+        kept = np.delete(np.arange(len(points)), 1)
+        points = points[kept]
+        turned = turned[kept]
+    angles = _angles(turned)
+    for i in np.flatnonzero(angles > np.pi - AMBIGUOUS):
+        raise half_turn(
+            f"{context.key}.orientations[{i + len(attitudes) - len(angles)}]"
+        )
+    knots = _chord_knots(_lengths(points), angles, shape, context)
+    if len(points) == 2:
+        last = f"{context.key}.orientations[{len(attitudes) - 1}]"
+        turn = turn_between(rotation, turned[1], last)
+        position = _interpolate(knots, points)
+        return pose_curve(position, turn.over(position.length))
+    quaternions = with_like_signs(quaternions_of(turned))
+    columns = _interpolate(knots, np.concatenate([points, quaternions], axis=1))
+    sigma, least = least_quality(columns)
+    if least < LEAST_QUALITY:
+        near = int(np.searchsorted(columns.knots, sigma)) - 1
+        raise context.wrong(
+            "the orientations differ too much, over too short a distance, for a smooth curve through them",
+            f".orientations[{max(near, 0)}]",
+            found=f"quaternions interpolated with a quality of {least:.2g} out of 1",
+            allowed=f"{LEAST_QUALITY} or more",
+            hint="Give more waypoints, or orientations that are closer to each other",
+        )
+    return quaternion_curve(columns)
+
+
+def _lengths(points: Array) -> Array:
+    """Return the distances, (n - 1,), between n successive points."""
+    lengths: Array = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return lengths
+
+
+def _angles(turned: Rotation) -> Array:
+    """Return the angles, (n - 1,), rad, between n successive rotations."""
+    return np.asarray((turned[:-1].inv() * turned[1:]).magnitude())
+
+
+def _rotations(
+    shape: SplineThrough,
+    attitudes: Sequence[Attitude],
+    context: SegmentContext,
+    matrix: Array,
+) -> Rotation:
+    """Return the n rotations at the start and the waypoints."""
+    start = rotation_of(matrix)
+    given = [rotation_from(attitude) for attitude in attitudes]
+    expected = start
+    if shape.starts_oriented is not None:
+        expected = rotation_from(shape.starts_oriented)
+        angle = (start.inv() * expected).magnitude()
+        if not shape.relative and angle > START_TOLERANCE:
+            raise _starts_elsewhere(
+                context,
+                ".starts_oriented",
+                f"an orientation that is {angle:.4g} rad off",
+                turn_hint(matrix, expected.as_matrix()),
+            )
+    if shape.relative:
+        change = start if shape.starts_oriented is None else start * expected.inv()
+        given = [change * one for one in given]
+    return start.concatenate([start, *given])
+
+
+def _waypoints_of(shape: SplineThrough, context: SegmentContext) -> Array:
     """Return the segment's start and the waypoints, shape (n, m).
 
     Raises
@@ -88,62 +190,68 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
     PathError
         A waypoint has the wrong number of coordinates, or the segment does not start where the waypoints expect.
     """
+    start = context.start
     points = [
-        site.coordinates(point, f"through[{i}]", site.rows)
+        context.coordinates(point, f"through[{i}]", context.rows)
         for i, point in enumerate(shape.through)
     ]
-    expected = (
-        None
-        if shape.starts_at is None
-        else site.coordinates(shape.starts_at, "starts_at", site.rows)
-    )
+    expected = None
+    if shape.starts_at is not None:
+        expected = context.coordinates(shape.starts_at, "starts_at", context.rows)
     if shape.relative:
-        points = [
-            point + site.start - (0.0 if expected is None else expected)
-            for point in points
-        ]
+        origin = 0.0 if expected is None else expected
+        points = [point + start - origin for point in points]
     elif expected is not None:
-        off = site.start - expected
-        count = len(site.positions)
-        distance = float(np.linalg.norm(off[:count]))
+        off = start - expected
+        count = len(context.positions)
+        _check_start(".starts_at", off[:count], off[count:], context)
+    return np.stack([start, *points])
+
+
+def _repeats_start(steps: Array) -> bool:
+    """Tell whether the first waypoint is the segment's start, from the steps between it and all waypoints, (n - 1,).
+
+    It is, where it is within the tolerance and within 1 % of the distance to the next waypoint.
+    """
+    if len(steps) < 2:
+        return False
+    return bool(steps[0] < START_TOLERANCE and steps[0] <= 0.01 * steps[1])
+
+
+def _check_start(key: str, off: Array, turned: Array, context: SegmentContext) -> None:
+    """Refuse a segment whose start is off where it is expected: `off` in the position rows, `turned`, rad, in others.
+
+    Raises
+    ------
+    PathError
+    """
+    expected = context.position - off
+    hint = place_hint(context.position, expected, context.positions)
+    unit = "rad or m" if joints_of(context.rows) else "m"
+    for away, of, looks in ((off, unit, hint), (turned, "rad", None)):
+        distance = float(np.linalg.norm(away))
         if distance > START_TOLERANCE:
-            hint = place_hint(site.position, expected[:count], site.positions)
-            unit = "rad or m" if joints_of(site.rows) else "m"
-            raise starts_elsewhere(
-                f"{site.key}.starts_at",
-                f"{site.describe()}, {distance:.4g} {unit} off",
-                hint,
-            )
-        if np.any(np.abs(off[count:]) > START_TOLERANCE):
-            raise starts_elsewhere(
-                f"{site.key}.starts_at",
-                f"{site.describe()}, {abs(off[-1]):.4g} rad off",
-            )
-    return np.stack([site.start, *points])
+            here = place(context.rows, context.start)
+            found = f"{here}, {distance:.4g} {of} off"
+            raise _starts_elsewhere(context, key, found, looks)
 
 
-def repeats_start(steps: Array) -> bool:
-    """Tell whether the first waypoint is the segment's start, from the steps between it and all waypoints, (n - 1,)."""
-    return len(steps) > 1 and bool(
-        steps[0] < START_TOLERANCE and steps[0] <= _OF_NEXT * steps[1]
-    )
-
-
-def starts_elsewhere(where: str, found: str, hint: str | None = None) -> PathError:
+def _starts_elsewhere(
+    context: SegmentContext, key: str, found: str, hint: str | None
+) -> PathError:
     """Return the error that a segment does not start where its waypoints expect; `hint` says what they look like."""
-    problem = "the segment starts elsewhere than its waypoints expect"
-    return PathError(
-        problem,
+    return context.wrong(
+        "the segment starts elsewhere than its waypoints expect",
+        key,
         found=found,
         allowed=f"at most {START_TOLERANCE:g} m and rad off",
-        where=where,
         hint=hint
         or "Set relative: true to count from the segment's start, or begin the path there",
     )
 
 
-def chord_knots(
-    chords: Array, otherwise: Array, shape: SplineThrough, site: Site
+def _chord_knots(
+    chords: Array, otherwise: Array, shape: SplineThrough, context: SegmentContext
 ) -> Array:
     """Return the cumulative chord lengths, shape (n,), of n waypoints.
 
@@ -155,7 +263,7 @@ def chord_knots(
         What to take where all positions are the same, rad.
     shape : SplineThrough
         The waypoints.
-    site : Site
+    context : SegmentContext
         Place of the segment.
 
     Raises
@@ -166,23 +274,20 @@ def chord_knots(
     if np.all(chords < ZERO_LENGTH):
         chords = otherwise
     if np.all(chords < ZERO_LENGTH):
-        raise site.zero_length(
-            key=".through", found=[list(point) for point in shape.through]
-        )
+        raise context.zero_length(".through", [list(each) for each in shape.through])
     if np.any(chords < ZERO_LENGTH):
-        repeated = (
-            int(np.argmax(chords < ZERO_LENGTH)) + len(shape.through) - len(chords)
-        )
-        raise PathError(
+        before = len(shape.through) - len(chords)
+        repeated = int(np.argmax(chords < ZERO_LENGTH)) + before
+        raise context.wrong(
             "a waypoint repeats its predecessor",
+            f".through[{repeated}]",
             found=list(shape.through[repeated]),
             allowed="waypoints that differ from their predecessors in the position rows",
-            where=f"{site.key}.through[{repeated}]",
         )
     return np.concatenate([[0.0], np.cumsum(chords)])
 
 
-def interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
+def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
     """Return the natural quintic spline, or the line, through waypoints of shape (n, m) at knots of shape (n,).
 
     Raises
@@ -190,14 +295,13 @@ def interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
     PathError
         The distances of the waypoints differ so much that no spline can be computed.
     """
-    if len(waypoints) < _FEWEST_WAYPOINTS:
-        return LineCurve(
-            waypoints[0], (waypoints[1] - waypoints[0]) / knots[1], float(knots[1])
-        )
+    if len(waypoints) == 2:
+        slope = (waypoints[1] - waypoints[0]) / knots[1]
+        return LineCurve(waypoints[0], slope, float(knots[1]))
     try:
         return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
     except ValueError as error:  # knots that fall together, or singular equations
-        distances = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
+        distances = _lengths(waypoints)
         raise PathError(
             "no spline goes through the waypoints: their distances differ too much",
             found=f"distances from {distances.min():.3g} to {distances.max():.3g} (m or rad)",
@@ -212,22 +316,18 @@ def _natural(knots: Array, waypoints: Array) -> BSpline:
 
     # Over a parameter in [0, 1], so that the derivatives at the ends are of the same magnitude as the values.
     unit = knots / knots[-1]
-    if len(knots) == _FEWEST_WAYPOINTS:
+    if len(knots) == 3:
         # The conditions at the ends leave a parabola, but as equations they lose digits where a chord is short.
         spline = make_interp_spline(unit, waypoints, k=2, t=np.repeat([0.0, 1.0], 3))
     else:
         zero = np.zeros(waypoints.shape[1])
         ends = [(3, zero), (4, zero)]
         # The stubs do not know conditions on chosen derivatives, which SciPy documents.
-        spline = make_interp_spline(unit, waypoints, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
+        spline = make_interp_spline(unit, waypoints, k=5, bc_type=(ends, ends))  # type: ignore[arg-type]
     return type(spline)(spline.t * knots[-1], spline.c, spline.k)
 
 
-POSE_COLUMNS = 7
-"""Of control points with quaternions."""
-
-
-def bspline_curve(shape: BSplineCurve, site: Site) -> SplineCurve:
+def bspline_curve(shape: BSplineCurve, context: SegmentContext) -> SplineCurve:
     """Return the curve, moved to the segment's start: it keeps its form to the last digit of the start.
 
     Raises
@@ -236,29 +336,30 @@ def bspline_curve(shape: BSplineCurve, site: Site) -> SplineCurve:
         Control points are all the same or have the wrong number of coordinates, or the curve starts elsewhere than the
         segment.
     """
-    first = site.coordinates(shape.control_points[0], "control_points[0]", site.rows)
-    points, off = np.array(shape.control_points), site.start - first
+    key = "control_points[0]"
+    first = context.coordinates(shape.control_points[0], key, context.rows)
+    points = np.array(shape.control_points)
+    off = context.start - first
+    count = len(context.positions)
     if not shape.relative:
-        _check_start(off[: len(site.positions)], off[len(site.positions) :], site)
+        _check_start(f".{key}", off[:count], off[count:], context)
     if not np.ptp(points, axis=0).any():
-        raise PathError(
-            "the segment has zero length",
-            allowed="control points that differ",
-            where=site.key,
+        raise context.wrong(
+            "the segment has zero length", allowed="control points that differ"
         )
-    return _curve(shape, points + off)
+    return _of_control_points(shape, points + off)
 
 
 def pose_bspline(
-    shape: BSplineCurve, site: Site, rotation: Array
-) -> QuaternionPoseCurve:
+    shape: BSplineCurve, context: SegmentContext, rotation: Array
+) -> MappedCurve:
     """Return the curve of poses, moved and turned to the segment's start.
 
     Parameters
     ----------
     shape : BSplineCurve
         Control points with quaternions.
-    site : Site
+    context : SegmentContext
         Place of the segment, in three position rows.
     rotation : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
@@ -270,42 +371,20 @@ def pose_bspline(
     """
     points = np.array(shape.control_points)
     first = points[0, POSITIONS:] / np.linalg.norm(points[0, POSITIONS:])
-    turn = _product(
-        quaternions_of(rotation_of(rotation)), first * [1.0, -1.0, -1.0, -1.0]
-    )
-    off = site.start - points[0, :POSITIONS]
+    start = quaternions_of(rotation_of(rotation))
+    turn = quaternion_product(start, first * [1.0, -1.0, -1.0, -1.0])
+    off = context.start - points[0, :POSITIONS]
     if not shape.relative:
-        _check_start(off, 2.0 * turn[1:], site)
+        _check_start(".control_points[0]", off, 2.0 * turn[1:], context)
     points[:, :POSITIONS] += off
-    points[:, POSITIONS:] = _product(turn, points[:, POSITIONS:])
-    return QuaternionPoseCurve(_curve(shape, points))
+    points[:, POSITIONS:] = quaternion_product(turn, points[:, POSITIONS:])
+    return quaternion_curve(_of_control_points(shape, points))
 
 
-def _check_start(off: Array, turned: Array, site: Site) -> None:
-    hints = place_hint(site.position, site.position - off, site.positions), None
-    for away, unit, hint in zip((off, turned), ("m", "rad"), hints, strict=True):
-        distance = float(np.linalg.norm(away))
-        if distance > START_TOLERANCE:
-            where = f"{site.key}.control_points[0]"
-            raise starts_elsewhere(
-                where, f"{site.describe()}, {distance:.4g} {unit} off", hint
-            )
-
-
-def _curve(shape: BSplineCurve, points: Array) -> SplineCurve:
+def _of_control_points(shape: BSplineCurve, points: Array) -> SplineCurve:
     """Return the curve of control points, (n, m), from sigma = 0 on."""
     from scipy.interpolate import BSpline
 
     spline = BSpline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
     breaks = np.unique(spline.t)
     return SplineCurve(spline, float(breaks[-1]), breaks)
-
-
-def _product(one: Array, other: Array) -> Array:
-    """Return the products, (..., 4), of quaternions (w, x, y, z)."""
-    w, v = one[..., :1], one[..., 1:]
-    scalar = w * other[..., :1] - np.sum(v * other[..., 1:], axis=-1, keepdims=True)
-    return np.concatenate(
-        [scalar, w * other[..., 1:] + other[..., :1] * v + np.cross(v, other[..., 1:])],
-        axis=-1,
-    )

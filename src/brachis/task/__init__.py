@@ -1,6 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
-from brachis.task.constructors import fit_path
+from brachis.task.fitted import fit_path
 from brachis.task.keywords import TaskKeywords, check_keywords, task_with
 from brachis.task.limit_models import (
     FROM_URDF,
@@ -31,21 +31,7 @@ from brachis.task.orientation import (
     ToolPose,
     TurnTo,
 )
-from brachis.task.planning_models import (
-    BoundarySettings,
-    RefinementSettings,
-    SearchSettings,
-    SolverSettings,
-    SplineSettings,
-)
 from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
-from brachis.task.robot_models import (
-    FrictionSettings,
-    InertiaMatrix,
-    Payload,
-    Placement,
-    RobotSettings,
-)
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,
@@ -53,10 +39,8 @@ from brachis.task.segments import (
     ArcVia,
     BSplineCurve,
     BSplineSegment,
-    Circle,
     CircleSegment,
     CsvSegment,
-    Helix,
     HelixSegment,
     LineBy,
     LineHeading,
@@ -65,10 +49,21 @@ from brachis.task.segments import (
     MovingSegment,
     Segment,
     SegmentModel,
-    Shape,
     SplineSegment,
     SplineThrough,
     TurnSegment,
+)
+from brachis.task.settings import (
+    BoundarySettings,
+    FrictionSettings,
+    InertiaMatrix,
+    Payload,
+    Placement,
+    RefinementSettings,
+    RobotSettings,
+    SearchSettings,
+    SolverSettings,
+    SplineSettings,
 )
 
 __all__ = [
@@ -81,14 +76,12 @@ __all__ = [
     "BSplineCurve",
     "BSplineSegment",
     "BoundarySettings",
-    "Circle",
     "CircleSegment",
     "CsvSegment",
     "FileUnits",
     "FitReport",
     "FitTolerance",
     "FrictionSettings",
-    "Helix",
     "HelixSegment",
     "InertiaMatrix",
     "LimitKeywords",
@@ -112,7 +105,6 @@ __all__ = [
     "SearchSettings",
     "Segment",
     "SegmentModel",
-    "Shape",
     "SolverSettings",
     "Source",
     "SpeedTable",

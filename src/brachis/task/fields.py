@@ -7,10 +7,25 @@ written ``<like this>`` because they appear in pydantic's error locations; `brac
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass
+from operator import attrgetter
+from types import NoneType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Final,
+    Literal,
+    Self,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
 from pydantic import (
     BaseModel,
@@ -18,10 +33,12 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    GetCoreSchemaHandler,
     Strict,
+    Tag,
     WithJsonSchema,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from brachis.common.summary import show_value
 from brachis.errors import MissingAttributeError
@@ -54,37 +71,50 @@ class Model(BaseModel):
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
+    def check(self, *rules: tuple[object, str, str, str]) -> Self:
+        """Return the model, unless its keys contradict each other.
+
+        Parameters
+        ----------
+        *rules : tuple of object, str, str, str
+            Whether the rule is broken; the key to blame, such as ``"spline.knots"``; what is wrong; what is allowed.
+        """
+        for broken, key, problem, allowed in rules:
+            if broken:
+                found = attrgetter(key)(self)
+                raise refuse(
+                    problem,
+                    key=key,
+                    found=found,
+                    allowed=allowed,
+                    absent=found is None,
+                )
+        return self
+
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
         """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
-        fields = type(self).model_fields
         given = [
-            (name, getattr(self, name))
-            for name in fields
+            (name, getattr(self, name), field.default)
+            for name, field in type(self).model_fields.items()
             if name in self.model_fields_set
         ]
-        return [
-            (name, _Shown(value))
-            for name, value in given
-            if value != fields[name].default
-        ]
+        return [(name, _Shown(value)) for name, value, usual in given if value != usual]
 
     def __str__(self) -> str:
         """Show it as `repr` does."""
         return repr(self)
 
 
+@dataclass(frozen=True)
 class _Shown:
     """A value that is shown as in summaries."""
 
-    def __init__(self, value: object) -> None:
-        self._value = value
+    value: object
 
     def __repr__(self) -> str:
-        return (
-            repr(self._value)
-            if isinstance(self._value, str | Model)
-            else show_value(self._value)
-        )
+        if isinstance(self.value, str | Model):
+            return repr(self.value)
+        return show_value(self.value)
 
 
 _PERCENT = re.compile(r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$")
@@ -97,7 +127,9 @@ def _from_percent(value: object) -> object:
     percent = _PERCENT.match(value)
     if percent is None:
         raise refuse(
-            "no share", found=value, allowed="from 0 to 100 %, or a number from 0 to 1"
+            "not a share",
+            found=value,
+            allowed="from 0 to 100 %, or a number from 0 to 1",
         )
     return float(percent[1]) / 100.0
 
@@ -124,7 +156,9 @@ Share = Annotated[
 ]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[str, Strict(), Field(min_length=1)]
-Vector = Annotated[tuple[Number, ...], Field(min_length=1)]
+_T = TypeVar("_T")
+NonEmpty = Annotated[tuple[_T, ...], Field(min_length=1)]
+Vector = NonEmpty[Number]
 
 
 def plain(
@@ -156,7 +190,7 @@ def refuse(
     problem : str
         What is wrong.
     key : str, optional
-        Where, below the validated value, for example ``"[2].blend"`` or ``".degree"``.
+        Where, below the validated value, for example ``"[2].blend"`` or ``"degree"``.
     found : object, optional
         What was found; the validated value itself where it is None.
     allowed : str, optional
@@ -165,17 +199,8 @@ def refuse(
         Whether the fault is that nothing was given, so that there is nothing to show.
     """
     # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
-    return PydanticCustomError(
-        REFUSED,
-        "{problem}",
-        {
-            "problem": problem,
-            "key": key,
-            "found": found,
-            "allowed": allowed,
-            "absent": absent,
-        },
-    )
+    facts = {"key": key, "found": found, "allowed": allowed, "absent": absent}
+    return PydanticCustomError(REFUSED, "{problem}", {"problem": problem, **facts})
 
 
 def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
@@ -192,73 +217,120 @@ def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
     return add
 
 
-class _Chooser(Discriminator):
-    """A discriminator that can be hashed, so that the union which it serves can be part of another union."""
+@dataclass(frozen=True)
+class ByForm:
+    """Chooses a union's member by the form of the value: a word, a number, a list, a mapping or null.
 
-    def __hash__(self) -> int:
-        return hash(self.discriminator)
-
-
-def by_form(allowed: str, *words: str) -> Discriminator:
-    """Choose a union's member by the form of the value: a word, a number, a list, a mapping or null.
-
-    Parameters
+    Attributes
     ----------
     allowed : str
         The accepted forms, in words, for the error message.
-    *words : str
-        The strings that select the member tagged ``<word>``; any other string is refused.
     """
 
-    def form(value: object) -> str | None:
-        if isinstance(value, str):
-            return "<word>" if value in words else None
-        if value is None:
-            return "<null>"
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            return "<number>"
-        if isinstance(value, list | tuple):
-            return "<list>"
-        return "<mapping>" if isinstance(value, Mapping | BaseModel) else None
+    allowed: str
 
-    return _Chooser(
-        form,
-        custom_error_type=WRONG_FORM,
-        custom_error_message="must be {allowed}",
-        custom_error_context={"allowed": allowed},
-    )
+    def __get_pydantic_core_schema__(
+        self, union: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Tag every member with its form."""
+        members = {_form_of_type(member): member for member in get_args(union)}
+        words = get_args(members.get("<word>"))
+
+        def choose(value: object) -> str | None:
+            form = _form_of(value)
+            return None if form == "<word>" and value not in words else form
+
+        by_tag = Discriminator(
+            choose,
+            custom_error_type=WRONG_FORM,
+            custom_error_message="must be {allowed}",
+            custom_error_context={"allowed": self.allowed},
+        )
+        return _tagged_union(members, by_tag, handler)
 
 
-def by_key(problem: str, members: Mapping[str, tuple[str, ...]]) -> Discriminator:
-    """Choose a union's member by the keys of the mapping.
+@dataclass(frozen=True)
+class ByKey:
+    """Chooses a union's member, a model, by the keys of the mapping: those that the model requires.
 
-    Parameters
+    Attributes
     ----------
     problem : str
         What to say where the keys select no member, or more than one.
-    members : mapping of str to tuple of str
-        For every member's class name, the keys that select it. Its tag is ``<class name>``.
     """
-    allowed = " | ".join("{" + ", ".join(keys) + "}" for keys in members.values())
-    known = [key for keys in members.values() for key in keys]
 
-    def member(value: object) -> str | None:
-        if isinstance(value, BaseModel):
-            return f"<{type(value).__name__}>"
-        if not isinstance(value, Mapping):
-            return None
-        chosen = [
-            name for name, keys in members.items() if any(key in value for key in keys)
-        ]
-        return f"<{chosen[0]}>" if len(chosen) == 1 else None
+    problem: str
 
-    return _Chooser(
-        member,
-        custom_error_type=WRONG_KEYS,
-        custom_error_message="{problem}",
-        custom_error_context={
-            "problem": problem,
-            "allowed": allowed,
-            "known": " ".join(known),
-        },
-    )
+    def __get_pydantic_core_schema__(
+        self, union: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Tag every model with its name."""
+        members = {f"<{model.__name__}>": model for model in get_args(union)}
+        required = {tag: required_keys(model) for tag, model in members.items()}
+
+        def choose(value: object) -> str | None:
+            if isinstance(value, BaseModel):
+                return f"<{type(value).__name__}>"
+            if not isinstance(value, Mapping):
+                return None
+            chosen = [
+                tag
+                for tag, keys in required.items()
+                if any(key in value for key in keys)
+            ]
+            return chosen[0] if len(chosen) == 1 else None
+
+        forms = (f"{{{', '.join(keys)}}}" for keys in required.values())
+        by_tag = Discriminator(
+            choose,
+            custom_error_type=WRONG_KEYS,
+            custom_error_message="{problem}",
+            custom_error_context={
+                "problem": self.problem,
+                "allowed": " | ".join(forms),
+                "known": " ".join(itertools.chain(*required.values())),
+            },
+        )
+        return _tagged_union(members, by_tag, handler)
+
+
+def required_keys(model: type[BaseModel]) -> tuple[str, ...]:
+    """Return the keys that a model requires, in order."""
+    fields = model.model_fields.items()
+    return tuple(name for name, field in fields if field.is_required())
+
+
+def _tagged_union(
+    members: Mapping[str, Any], by_tag: Discriminator, handler: GetCoreSchemaHandler
+) -> CoreSchema:
+    tagged = tuple(Annotated[member, Tag(tag)] for tag, member in members.items())
+    return handler.generate_schema(Annotated[Union[tagged], by_tag])  # noqa: UP007
+
+
+def _form_of(value: object) -> str | None:
+    if isinstance(value, bool):
+        return None
+    if hasattr(value, "homogeneous"):  # a transform, such as Pinocchio's SE3
+        return "<mapping>"
+    forms = (form for kinds, form in _FORMS.items() if isinstance(value, kinds))
+    return next(forms, None)
+
+
+def _form_of_type(member: Any) -> str:
+    if get_origin(member) is Annotated:
+        return _form_of_type(get_args(member)[0])
+    kind = get_origin(member) or member
+    if kind is Literal:
+        return "<word>"
+    forms = (form for kinds, form in _FORMS.items() if issubclass(kind, kinds))
+    return next(forms, "<mapping>")  # of a union of models
+
+
+_FORMS: Final[dict[Any, str]] = {
+    str: "<word>",
+    NoneType: "<null>",
+    (int, float): "<number>",
+    (list, tuple): "<list>",
+    (Mapping, BaseModel): "<mapping>",
+}
+"""Tags of the forms of values, by their types."""

@@ -5,17 +5,22 @@ Segments from files of points: interpolated by a spline, or fitted by smooth cur
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+from pydantic import ValidationError
 
 from brachis.common.files import read_text
 from brachis.errors import TaskError, write_count
+from brachis.task.fields import Model, plain
+from brachis.task.messages import task_error
 from brachis.task.models import Task
 from brachis.task.orientation import Attitude, OrientationMode, Rotate, TurnTo
-from brachis.task.point_data import FitReport, FitTolerance, PointFile
+from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
 from brachis.task.segments import (
     BSplineCurve,
     BSplineSegment,
@@ -30,6 +35,7 @@ if TYPE_CHECKING:
     from brachis.task.points.points import Points
 
 _QUATERNION = 4
+_M = TypeVar("_M", bound=Model)
 _LISTED = 10
 
 
@@ -83,21 +89,20 @@ def segments_along(
     from brachis.task.points.least_squares import Tolerance
 
     if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
-        problem = "the points' orientations say already how the tool turns"
-        where = f"{wanted.where}.orientation"
         raise TaskError(
-            problem, found="orientations", allowed="no orientation", where=where
+            "the points' orientations say already how the tool turns",
+            found="orientations",
+            allowed="no orientation",
+            where=f"{wanted.where}.orientation",
         )
     if wanted.tolerance is None:
         if points.speed is not None:
-            problem = "feed rates are read along a fitted path alone"
-            hint = "Give a tolerance, or leave the feed rates out"
             raise TaskError(
-                problem,
+                "feed rates are read along a fitted path alone",
                 found="feed rates",
                 allowed="a tolerance beside them",
                 where=wanted.where,
-                hint=hint,
+                hint="Give a tolerance, or leave the feed rates out",
             )
         return [_spline_through(points, check_interpolation(points, told), wanted)]
     position, orientation, corner = (
@@ -174,23 +179,19 @@ def _check_corners(report: FitReport, wanted: Wanted) -> None:
         ]
     )
     if wanted.corner == "refuse":
-        hint = "Set corner: blend to round them within the tolerance"
-        where = f"{wanted.where}.corner"
         raise TaskError(
             f"the points have {write_count(len(found), 'corner')}",
             found=listed,
             allowed="none",
-            where=where,
-            hint=hint,
+            where=f"{wanted.where}.corner",
+            hint="Set corner: blend to round them within the tolerance",
         )
     if isinstance(wanted.orientation, Rotate | TurnTo):
-        hint = "Give an orientation for every point, or orientation: tangent"
-        where = f"{wanted.where}.orientation"
         raise TaskError(
             "the tool cannot turn at a constant rate over corners",
             found=listed,
-            where=where,
-            hint=hint,
+            where=f"{wanted.where}.orientation",
+            hint="Give an orientation for every point, or orientation: tangent",
         )
 
 
@@ -263,9 +264,8 @@ def _points_of(
     )
     if path.suffix.lower() in SUFFIXES:
         if settings.orientation is not None:
-            problem = "G-code has no orientations"
             raise TaskError(
-                problem,
+                "G-code has no orientations",
                 found=settings.orientation,
                 allowed="no csv.orientation",
                 where=where,
@@ -293,8 +293,11 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
     plain = PointFile(file=segment.csv.file)
     for key in ("orientation", "units", "tolerance", "corner"):
         if getattr(settings, key) != getattr(plain, key):
-            problem = "a path of joints passes all rows, which are in rad and m"
-            raise TaskError(problem, allowed=f"no {key}", where=f"{where}.csv.{key}")
+            raise TaskError(
+                "a path of joints passes all rows, which are in rad and m",
+                allowed=f"no {key}",
+                where=f"{where}.csv.{key}",
+            )
     path = folder / settings.file
     text = read_text(
         path,
@@ -324,10 +327,91 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
 
 def _check_count(rows: int, path: Path) -> None:
     if rows < 2:
-        problem = "a path needs its start and at least one waypoint"
         raise TaskError(
-            problem,
+            "a path needs its start and at least one waypoint",
             found=f"{write_count(rows, 'row')} of numbers",
             allowed="2 or more",
             where=str(path),
         )
+
+
+def fit_path(
+    points: Any,
+    *,
+    tolerance: Mapping[str, float | str] | FitTolerance | None = None,
+    orientations: Any = None,
+    speed: Any = None,
+    units: Mapping[str, str] | FileUnits | None = None,
+    corner: Literal["blend", "refuse"] = "blend",
+    orientation: OrientationMode = None,
+    relative: bool = False,
+) -> tuple[SplineSegment | BSplineSegment, ...]:
+    """Return the segments of a path along points, the first one included; for the ``path`` of a task.
+
+    Parameters
+    ----------
+    points : array_like, (n, p) or (n, 4, 4), or sequence of transforms
+        Positions in the rows of the task space; or homogeneous matrices; or objects with such a matrix: Pinocchio's
+        ``SE3``, or SciPy's ``RigidTransform``.
+    tolerance : mapping or FitTolerance, optional
+        ``{"position": "0.05 mm", "orientation": "0.1 deg"}`` as in a task file; without it the path passes all points.
+    orientations : Rotation, or array_like, (n, 3, 3) or (n,), optional
+        Of the tool, beside positions: SciPy's rotations (``Rotation.from_quat(q)`` takes quaternions x, y, z, w);
+        rotation matrices; yaw.
+    speed : array_like, (n,), optional
+        Speed of the tool on the way to each point; NaN where none is prescribed. With a tolerance only.
+    units : mapping or FileUnits, optional
+        ``{"length": "mm", "angle": "deg", "speed": "mm/min"}``; m, rad (of yaw) and m/s unless given.
+    corner : {"blend", "refuse"}, optional
+        As in a task file.
+    orientation : optional
+        How the tool turns along the path where no orientations are given, as in a task file.
+    relative : bool, optional
+        Whether the path may start anywhere, as in a task file.
+
+    Returns
+    -------
+    tuple of SplineSegment or BSplineSegment
+        One, or as many as there are stretches between corners.
+
+    Raises
+    ------
+    TaskError
+        Points are wrong, or no smooth curve lies within the tolerance; the message names the row, from 0 on.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> angle = np.linspace(0.0, 1.5, 500)
+    >>> circle = np.column_stack([200.0 * np.cos(angle), 200.0 * np.sin(angle)])
+    >>> from brachis import fit_path
+    >>> path = fit_path(circle, tolerance={"position": "0.01 mm"}, units={"length": "mm"})
+    >>> path[0].bspline.fit.intervals < 5
+    True
+    """
+    from brachis.task.points.points import points_from
+
+    stated = _validate(FileUnits, units or {}, "units")
+    given = points_from(points, orientations, speed, stated, "points")
+    return tuple(
+        segments_along(
+            given,
+            Wanted(
+                "points",
+                "points",
+                None
+                if tolerance is None
+                else _validate(FitTolerance, tolerance, "tolerance"),
+                corner,
+                relative,
+                orientation,
+            ),
+        )
+    )
+
+
+def _validate(model: type[_M], value: object, key: str) -> _M:
+    try:
+        return model.model_validate(plain(value))
+    except ValidationError as error:
+        raise task_error(error, key, model) from None

@@ -6,22 +6,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
-from brachis.task.constructors import Transform, poses_of
 from brachis.task.fields import Model, plain
 from brachis.task.limit_models import Array, LimitKeywords, LimitSpec, ToolLimits
 from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task
-from brachis.task.orientation import ToolPose
-from brachis.task.planning_models import (
+from brachis.task.orientation import ToolPose, Transform
+from brachis.task.segments import SegmentModel
+from brachis.task.settings import (
     BoundarySettings,
+    Payload,
+    Placement,
     RefinementSettings,
+    RobotSettings,
     SearchSettings,
     SolverSettings,
     SplineSettings,
 )
-from brachis.task.robot_models import Payload, Placement, RobotSettings
-from brachis.task.segments import SegmentModel
 
 Posture = (
     Array
@@ -208,9 +209,6 @@ def _in_full(key: str, value: object) -> object:
     """Write a posture, a solver's name, and a transform for the start of the path as a task file does."""
     if key == "solver" and isinstance(value, str):
         return {"name": value}
-    if key == "path_start" and hasattr(value, "homogeneous"):
-        ((place, turn),) = poses_of([value], key)
-        return {"position": place, **turn}
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
     return (

@@ -12,28 +12,30 @@ Limits on the motion of the tool.
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Final, Literal, Protocol, TypedDict
+from typing import Annotated, Any, Final, Literal, Protocol, TypedDict, Unpack
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
-    Tag,
     field_validator,
     model_validator,
 )
 
-from brachis.errors import write_count
+from brachis.errors import UnknownNameError, write_count
 from brachis.task.fields import (
+    ByForm,
     Model,
     Name,
+    NonEmpty,
     NonNegative,
     Number,
     Positive,
     Share,
-    by_form,
     plain,
     refuse,
 )
@@ -49,18 +51,16 @@ class Array(Protocol):
         """Return plain numbers."""
 
 
-_LIMIT_FORMS = (
-    "a number > 0 for all joints, a list of numbers > 0, "
-    "a mapping of joint name to number > 0 or null, null (no limit)"
-)
-
-
 def _increasing(
     pair: tuple[float | None, float | None],
 ) -> tuple[float | None, float | None]:
-    if None not in pair and not pair[0] < pair[1]:  # type: ignore[operator]
-        problem = "the lower limit must be below the upper one"
-        raise refuse(problem, found=list(pair), allowed="[low, high] with low < high")
+    low, high = pair
+    if low is not None and high is not None and low >= high:
+        raise refuse(
+            "the lower limit must be below the upper one",
+            found=pair,
+            allowed="[low, high] with low < high",
+        )
     return pair
 
 
@@ -69,50 +69,41 @@ Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increa
 
 def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < 0.0 < pair[1]:
-        problem = "a pair of limits lies around zero"
         raise refuse(
-            problem, found=list(pair), allowed="[lower, upper] with lower < 0 < upper"
+            "a pair of limits lies around zero",
+            found=pair,
+            allowed="[lower, upper] with lower < 0 < upper",
         )
     return pair
 
 
-OneNumber = Annotated[Positive, Tag("<number>")]
-_Pair = Annotated[
-    Annotated[tuple[Number, Number], AfterValidator(_around_zero)], Tag("<list>")
-]
+_Pair = Annotated[tuple[Number, Number], AfterValidator(_around_zero)]
 _Entry = Annotated[
-    OneNumber | _Pair, by_form("a number > 0, or a pair [lower, upper] around zero")
+    Positive | _Pair, ByForm("a number > 0, or a pair [lower, upper] around zero")
 ]
 _EntryOrNull = Annotated[
-    OneNumber | _Pair | Annotated[None, Tag("<null>")],
-    by_form("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
+    Positive | _Pair | None,
+    ByForm("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
 ]
-Numbers = Annotated[Annotated[tuple[Positive, ...], Field(min_length=1)], Tag("<list>")]
-_Mapping = Annotated[dict[Name, Positive | None], Tag("<mapping>")]
-Null = Annotated[None, Tag("<null>")]
-UrdfWord = Annotated[Literal["urdf"], Tag("<word>")]
-
 UrdfLimit = Annotated[
-    UrdfWord
-    | OneNumber
-    | Annotated[Annotated[tuple[_Entry, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[dict[Name, _EntryOrNull], Tag("<mapping>")]
-    | Null,
-    by_form(
+    Literal["urdf"] | Positive | NonEmpty[_Entry] | dict[Name, _EntryOrNull] | None,
+    ByForm(
         "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
-        "zero or null; null (no limit), urdf (as in the URDF)",
-        FROM_URDF,
+        "zero or null; null (no limit), urdf (as in the URDF)"
     ),
 ]
-OwnLimit = Annotated[OneNumber | Numbers | _Mapping | Null, by_form(_LIMIT_FORMS)]
+OwnLimit = Annotated[
+    Positive | NonEmpty[Positive] | dict[Name, Positive | None] | None,
+    ByForm(
+        "a number > 0 for all joints, a list of numbers > 0, "
+        "a mapping of joint name to number > 0 or null, null (no limit)"
+    ),
+]
 PositionLimit = Annotated[
-    UrdfWord
-    | Annotated[Annotated[tuple[Interval, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[dict[Name, Interval | None], Tag("<mapping>")]
-    | Null,
-    by_form(
-        "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), urdf (as in the URDF)",
-        FROM_URDF,
+    Literal["urdf"] | NonEmpty[Interval] | dict[Name, Interval | None] | None,
+    ByForm(
+        "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), "
+        "urdf (as in the URDF)"
     ),
 ]
 TorqueCurve = Annotated[
@@ -252,20 +243,7 @@ class LimitSpec:
 
     __pydantic_config__ = Model.model_config
 
-    def __init__(
-        self,
-        torque: StatedLimit = FROM_URDF,
-        velocity: StatedLimit = FROM_URDF,
-        acceleration: StatedLimit = None,
-        position: StatedRange = FROM_URDF,
-        scale: Mapping[str, float] | LimitScale | None = None,
-        power: StatedLimit = None,
-        total_power: float | None = None,
-        rms_torque: StatedLimit = None,
-        torque_speed: StatedCurves = None,
-        jerk: StatedLimit = None,
-        torque_rate: StatedLimit = None,
-    ) -> None:
+    def __init__(self, **stated: Unpack[LimitKeywords]) -> None:
         """Take limits from a program; they are checked when a robot is made with them, where its joints are known.
 
         Parameters
@@ -287,14 +265,17 @@ class LimitSpec:
         jerk, torque_rate : float, sequence, array, mapping or None, optional
             rad/s^3 or m/s^3; Nm/s or N/s. As `acceleration`. They need ``spline.degree`` >= 3 and acceleration at rest.
         """
-        if not isinstance(scale, LimitScale):
-            scale = LimitScale().model_copy(
-                update={kind: plain(factor) for kind, factor in (scale or {}).items()}
+        given: dict[str, Any] = {"scale": None, **stated}
+        if not isinstance(given["scale"], LimitScale):
+            factors = plain(given["scale"] or {})
+            given["scale"] = LimitScale().model_copy(update=factors)  # type: ignore[arg-type]
+        for each in fields(self):
+            value = plain(given.pop(each.name, each.default), tuple)
+            object.__setattr__(self, each.name, value)
+        if given:
+            raise UnknownNameError(
+                "limit", next(iter(given)), LimitKeywords.__annotations__
             )
-        stated = (torque, velocity, acceleration, position, scale)
-        further = (power, total_power, rms_torque, torque_speed, jerk, torque_rate)
-        for each, value in zip(fields(self), (*stated, *further), strict=True):
-            object.__setattr__(self, each.name, plain(value, tuple))
 
 
 _SPEED = {"ge": 1e-6, "le": 1e12}
@@ -321,28 +302,25 @@ class SpeedTable(Model):
     @model_validator(mode="after")
     def _is_a_table(self) -> SpeedTable:
         if len(self.speed) != len(self.s):
-            problem = "there is not one speed for every path coordinate"
             raise refuse(
-                problem,
-                key=".speed",
+                "there is not one speed for every path coordinate",
+                key="speed",
                 found=write_count(len(self.speed), "speed"),
                 allowed=f"{len(self.s)}",
             )
-        for row in range(1, len(self.s)):
-            if self.s[row] < self.s[row - 1]:
-                problem = "the path coordinates do not ascend"
+        for row, (before, place) in enumerate(itertools.pairwise(self.s), 1):
+            if place < before:
                 raise refuse(
-                    problem,
-                    key=f".s[{row}]",
-                    found=self.s[row],
-                    allowed=f">= {self.s[row - 1]:g}",
+                    "the path coordinates do not ascend",
+                    key=f"s[{row}]",
+                    found=place,
+                    allowed=f">= {before:g}",
                 )
-        for place, same in itertools.groupby(self.s):
-            if len(list(same)) > 2:
-                problem = "a place has more than two speeds"
+        for place, times in Counter(self.s).items():
+            if times > 2:
                 raise refuse(
-                    problem,
-                    key=".s",
+                    "a place has more than two speeds",
+                    key="s",
                     found=place,
                     allowed="a place at most twice, which is a step",
                 )
@@ -359,7 +337,7 @@ def _between(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < pair[1]:
         raise refuse(
             "the part of the path is empty",
-            found=list(pair),
+            found=pair,
             allowed="[begin, end] with begin < end",
         )
     return pair
@@ -390,10 +368,8 @@ class ToolLimits(Model):
     """Limits on the motion of the tool frame's origin, and on how fast the tool turns."""
 
     speed: Annotated[
-        Annotated[Speed, Tag("<number>")]
-        | Annotated[SpeedTable, Tag("<mapping>")]
-        | Annotated[None, Tag("<null>")],
-        by_form("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
+        Speed | SpeedTable | None,
+        ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
     ] = Field(
         default=None,
         description="Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. "
@@ -422,16 +398,14 @@ class ToolLimits(Model):
     @field_validator("process_speed")
     @classmethod
     def _apart(cls, parts: tuple[ProcessSpeed, ...]) -> tuple[ProcessSpeed, ...]:
-        for number in range(1, len(parts)):
-            if parts[number].s[0] <= parts[number - 1].s[1]:
-                problem = "the parts of the path overlap, meet or are out of order"
-                end = parts[number - 1].s[1]
-                allowed = f"a begin above {end:g}; the part before ends there, and speeds change in a gap"
+        for number, (before, part) in enumerate(itertools.pairwise(parts), 1):
+            end = before.s[1]
+            if part.s[0] <= end:
                 raise refuse(
-                    problem,
+                    "the parts of the path overlap, meet or are out of order",
                     key=f"[{number}].s",
-                    found=list(parts[number].s),
-                    allowed=allowed,
+                    found=part.s,
+                    allowed=f"a begin above {end:g}; the part before ends there, and speeds change in a gap",
                 )
         return parts
 
@@ -441,13 +415,11 @@ class ToolLimits(Model):
             cap = _least_between(self.speed, part.s)
             slowest = part.speed * (1.0 - part.tolerance)
             if cap is not None and cap < slowest:
-                problem = "the tool's largest speed is below the process speed"
-                allowed = f"at most {cap:g} m/s there, or a higher tool_limits.speed"
                 raise refuse(
-                    problem,
-                    key=f".process_speed[{number}].speed",
+                    "the tool's largest speed is below the process speed",
+                    key=f"process_speed[{number}].speed",
                     found=part.speed,
-                    allowed=allowed,
+                    allowed=f"at most {cap:g} m/s there, or a higher tool_limits.speed",
                 )
         return self
 
@@ -463,15 +435,4 @@ def _least_between(
         for s, speed in zip(cap.s, cap.speed, strict=True)
         if part[0] <= s <= part[1]
     ]
-    return min([*inside, *(_at(cap, place) for place in part)])
-
-
-def _at(table: SpeedTable, place: float) -> float:
-    """Largest speed at a place that may lie between two of the table's."""
-    rows = list(zip(table.s, table.speed, strict=True))
-    if place <= rows[0][0] or place >= rows[-1][0]:
-        return rows[0 if place <= rows[0][0] else -1][1]
-    for (s, speed), (s_next, next_speed) in itertools.pairwise(rows):
-        if s < s_next and s <= place <= s_next:
-            return speed + (next_speed - speed) * (place - s) / (s_next - s)
-    raise AssertionError
+    return float(min([*inside, *np.interp(part, cap.s, cap.speed)]))

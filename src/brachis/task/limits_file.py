@@ -12,15 +12,19 @@ from pydantic import Field, ValidationError, model_validator
 
 from brachis.common.files import check_kind, read_text
 from brachis.errors import TaskError, UnknownNameError
-from brachis.task.fields import Flag, Model, Name, Number, Positive, plain, refuse
+from brachis.task.fields import (
+    Flag,
+    Model,
+    Name,
+    NonEmpty,
+    Number,
+    Positive,
+    plain,
+    refuse,
+)
 from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, task_error
 from brachis.task.yaml_reader import read_yaml
-
-_LARGEST = 100_000
-"""Bytes."""
-_OF_ALL = "total_power"
-"""The limit that is one number for the whole robot."""
 
 
 class LimitsFile(Model):
@@ -28,9 +32,7 @@ class LimitsFile(Model):
 
     brachis_limits: Literal[1] = Field(description="Version of the format.")
     source: Name = Field(description="Where the figures are from.")
-    joints: Annotated[tuple[Name, ...], Field(min_length=1)] = Field(
-        description="The joints that the file limits."
-    )
+    joints: NonEmpty[Name] = Field(description="The joints that the file limits.")
     limits: LimitSpec = Field(
         description="As robot.limits, without scale; a list is in the order of joints, one number holds for all."
     )
@@ -134,11 +136,13 @@ class RosLimitsFile(Model):
         for name, limits in self.joints.items():
             for kind, value in limits.by_kind().items():
                 stated.setdefault(kind, {})[name] = value
-        factors = {"velocity": self.default_velocity_scaling_factor}
-        factors["acceleration"] = self.default_acceleration_scaling_factor
-        return (
-            {**stated, "scale": factors} if set(factors.values()) != {1.0} else stated
-        )
+        factors = {
+            "velocity": self.default_velocity_scaling_factor,
+            "acceleration": self.default_acceleration_scaling_factor,
+        }
+        if set(factors.values()) != {1.0}:
+            stated["scale"] = factors
+        return stated
 
 
 def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
@@ -185,11 +189,7 @@ def with_limits_of_file(
     file = Path(robot["limits_file"])
     own = robot.get("limits") or {}
     if isinstance(own, LimitSpec):
-        own = {
-            each.name: getattr(own, each.name)
-            for each in fields(own)
-            if getattr(own, each.name) != each.default
-        }
+        own = _differences(own)
     if not isinstance(own, Mapping):
         return content
     merged = _by_joint(
@@ -218,14 +218,13 @@ def _by_joint(
     Return its limits by kind and joint, and the one of all joints together.
     """
     check_kind(path, "a limits file", TaskError)
-    text = read_text(path, where=where, folder=folder, found=found, largest=_LARGEST)
+    text = read_text(path, where=where, folder=folder, found=found, largest=100_000)
     content = read_yaml(text, str(path))
     if not isinstance(content, Mapping):
-        allowed = ", ".join(LimitsFile.model_fields)
         raise TaskError(
             "a limits file is a mapping",
             found=show(content),
-            allowed=allowed,
+            allowed=", ".join(LimitsFile.model_fields),
             where=str(path),
         )
     model = RosLimitsFile if "joint_limits" in content else LimitsFile
@@ -243,15 +242,19 @@ def _by_joint(
             where=f"{path}: limits.scale",
             allowed="robot.limits.scale of the task",
         )
-    kinds = [each for each in fields(LimitSpec) if each.name != "scale"]
-    stated = {each.name: getattr(file.limits, each.name) for each in kinds}
     return {
-        each.name: stated[each.name]
-        if each.name == _OF_ALL
-        else _spread(stated[each.name], file.joints, f"{path}: limits.{each.name}")
-        for each in kinds
-        if stated[each.name] != each.default
+        kind: value
+        if kind == "total_power"  # of the whole robot
+        else _spread(value, file.joints, f"{path}: limits.{kind}")
+        for kind, value in _differences(file.limits).items()
+        if kind != "scale"
     }
+
+
+def _differences(limits: LimitSpec) -> dict[str, Any]:
+    """Return what differs from the defaults."""
+    values = ((each, getattr(limits, each.name)) for each in fields(limits))
+    return {each.name: value for each, value in values if value != each.default}
 
 
 def _check_joints(
@@ -263,14 +266,11 @@ def _check_joints(
     ------
     UnknownNameError, TaskError
     """
-    tool, base, locked = (
-        robot.get(key) for key in ("tool_frame", "base_frame", "locked_joints")
-    )
-    if not (
-        isinstance(tool, str | None)
-        and isinstance(base, str | None)
-        and isinstance(locked, Mapping | None)
-    ):
+    tool = robot.get("tool_frame")
+    base = robot.get("base_frame")
+    locked = robot.get("locked_joints") or {}
+    words = all(isinstance(name, str | None) for name in (tool, base))
+    if not words or not isinstance(locked, Mapping):
         return  # the robot's model says so
     names, moving = _joints_of(folder / robot["urdf"], tool, base)
     for name in sorted(limited if names else ()):
@@ -278,27 +278,18 @@ def _check_joints(
             raise UnknownNameError(
                 "joint of the URDF", name, names, where=f"{where}: joint_limits"
             )
-    own = robot["limits"]
-    own_names = {
-        name
-        for kind, each in own.items()
-        if kind != "scale" and isinstance(each, Mapping)
-        for name in each
-    }
-    stated = {*limited, *(locked or ()), *own_names}
-    for_all = any(
-        kind != "scale" and isinstance(each, int | float | list | tuple)
-        for kind, each in own.items()
-    )
-    missing = [] if for_all else [name for name in moving if name not in stated]
+    own = [each for kind, each in robot["limits"].items() if kind != "scale"]
+    if any(isinstance(each, int | float | list | tuple) for each in own):
+        return  # of all joints
+    by_name = [each for each in own if isinstance(each, Mapping)]
+    stated = set(limited).union(locked, *by_name)
+    missing = [name for name in moving if name not in stated]
     if missing:
-        hint = f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}"
-        problem = f"joint {missing[0]!r}, which moves the tool, has no entry"
         raise TaskError(
-            problem,
+            f"joint {missing[0]!r}, which moves the tool, has no entry",
             found=", ".join(sorted(limited)),
             where=f"{where}: joint_limits",
-            hint=hint,
+            hint=f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",
         )
 
 
@@ -349,12 +340,11 @@ def _spread(value: object, joints: tuple[str, ...], where: str) -> dict[str, Any
         return dict(value)
     if isinstance(value, tuple):
         if len(value) != len(joints):
-            allowed = f"{len(joints)}, one for each of {', '.join(joints)}"
             raise TaskError(
                 "has the wrong number of values",
                 where=where,
                 found=len(value),
-                allowed=allowed,
+                allowed=f"{len(joints)}, one for each of {', '.join(joints)}",
             )
         return dict(zip(joints, value, strict=True))
     return dict.fromkeys(joints, value)

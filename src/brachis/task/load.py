@@ -20,7 +20,7 @@ from brachis.task.fitted import expand_csv_files
 from brachis.task.limits_file import with_limits_of_file
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
-from brachis.task.robot_models import RobotSettings
+from brachis.task.settings import RobotSettings
 from brachis.task.yaml_reader import read_yaml
 
 _INDEX = re.compile(r"\[(\d+)\]")
@@ -76,21 +76,21 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
         return part
     where = ".".join(before)
     if not isinstance(place, list):
-        hint = f"Set {where} itself"
         raise TaskError(
-            f"{where} has no keys of its own", where=key, found=show(place), hint=hint
+            f"{where} has no keys of its own",
+            where=key,
+            found=show(place),
+            hint=f"Set {where} itself",
         )
     if not part.isdecimal() or int(part) >= len(place):
-        allowed = (
-            f"{where}.0" + (f" to {where}.{len(place) - 1}" if len(place) > 1 else "")
-            if place
-            else "none"
-        )
         raise TaskError(
             f"{where} is a list of {len(place)}",
             where=key,
             found=f"{where}.{part}",
-            allowed=allowed,
+            allowed=f"{where}.0"
+            + (f" to {where}.{len(place) - 1}" if len(place) > 1 else "")
+            if place
+            else "none",
         )
     return int(part)
 
@@ -185,18 +185,16 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     if isinstance(source, Mapping):
         return task_from(source, "task", Path.cwd(), changes or {})
     if not isinstance(source, str | os.PathLike):
-        problem = "a task is loaded from a file or a mapping"
         raise TaskError(
-            problem,
+            "a task is loaded from a file or a mapping",
             found=type(source).__name__,
             allowed="a file name, a mapping, or a Task",
         )
     if isinstance(source, str) and "\n" in source:
-        allowed = (
-            "a file name; of the text of a URDF Robot.from_urdf(name, urdf_text=text)"
-        )
         raise TaskError(
-            "a text is not the name of a file", found=show(source), allowed=allowed
+            "a text is not the name of a file",
+            found=show(source),
+            allowed="a file name; of the text of a URDF Robot.from_urdf(name, urdf_text=text)",
         )
     path = Path(source)
     check_kind(path, Kind.TASK, TaskError)
@@ -209,20 +207,17 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     except TaskError as error:
         if path.suffix.lower() in TASK_SUFFIXES:
             raise
-        allowed = f"a YAML file ({' or '.join(TASK_SUFFIXES)})"
-        hint = "brachis new writes a first task"
         raise TaskError(
             "the file is not a task",
             where=str(path),
             found=str(error),
-            allowed=allowed,
-            hint=hint,
+            allowed=f"a YAML file ({' or '.join(TASK_SUFFIXES)})",
+            hint="brachis new writes a first task",
         ) from error
     task = task_from(content, str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
-        problem = "this key is required in a task file, and missing"
         raise TaskError(
-            problem,
+            "this key is required in a task file, and missing",
             where=f"{path}: robot.urdf",
             hint="Give the URDF's path, relative to the task file",
         )
@@ -265,9 +260,8 @@ def task_from(
         See `load_task`.
     """
     if not isinstance(content, Mapping):
-        problem = "a task is a mapping"
         raise TaskError(
-            problem,
+            "a task is a mapping",
             found=show(content),
             allowed=", ".join(Task.model_fields),
             where=source,
@@ -280,8 +274,10 @@ def task_from(
     except ValidationError as error:
         raise task_error(error, source, Task) from None
     except RecursionError:
-        problem = "the task contains itself (a YAML alias inside its own anchor)"
-        raise TaskError(problem, where=source) from None
+        raise TaskError(
+            "the task contains itself (a YAML alias inside its own anchor)",
+            where=source,
+        ) from None
     task = _with_start(expand_csv_files(task, source, folder), source)
     if task.robot.urdf is None:
         return task

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, is_dataclass, replace
-from typing import Any, Final, get_args, get_type_hints
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
+from typing import Final, get_args, get_type_hints
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from brachis.errors import TaskError, nearest
 from brachis.task.fields import REFUSED, WRONG_FORM, WRONG_KEYS, Model
-
-_LONGEST_VALUE = 60
-_DEEPEST = 3
-"""Parts of a dotted key."""
-_MAPPING = "a mapping"
-
-
-@dataclass(frozen=True)
-class _Complaint:
-    """One mistake: the fields of a `TaskError` before the file's name is known."""
-
-    problem: str
-    found: str | None = None
-    allowed: str | None = None
-    hint: str | None = None
-    key: str = ""
 
 
 def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskError:
@@ -51,34 +35,33 @@ def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskE
 
 def show(value: object) -> str:
     """Return a value as a task file would write it, shortened, with its type where that is the question."""
+    if isinstance(value, Model):
+        value = value.model_dump()
     if value is None:
         return "null"
     if isinstance(value, bool):
         return f"{str(value).lower()} (a boolean)"
     if isinstance(value, str):
-        return f"{_short(repr(value))} (a string)"
+        return f"{_shorten(repr(value))} (a string)"
     if isinstance(value, Mapping):
-        return f"a mapping with the keys {_short(', '.join(map(str, value)) or 'none')}"
+        keys = ", ".join(map(str, value)) or "none"
+        return f"a mapping with the keys {_shorten(keys)}"
     if isinstance(value, list | tuple):
-        return f"{_short(repr(list(value)))} (a list)"
-    return _short(repr(value))
+        return f"{_shorten(repr(list(value)))} (a list)"
+    return _shorten(repr(value))
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+def _shorten(text: str) -> str:
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
-    describe = _DESCRIPTIONS.get(detail["type"], _unforeseen)
-    complaint = describe(detail, model)
-    key = _write_location(detail["loc"]) + complaint.key
-    where = f"{source}: {key}" if key else source
+    problem, *parts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
+    key = _write_location(detail["loc"], detail.get("ctx", {}).get("key", ""))
     return TaskError(
-        complaint.problem,
-        found=complaint.found,
-        allowed=complaint.allowed,
-        where=where,
-        hint=complaint.hint,
+        problem,
+        where=f"{source}: {key}" if key else source,
+        **dict(zip(("found", "allowed", "hint"), parts, strict=False)),
     )
 
 
@@ -86,23 +69,25 @@ def _is_tag(part: str | int) -> bool:
     return isinstance(part, str) and part.startswith("<") and part.endswith(">")
 
 
-def _write_location(location: tuple[str | int, ...]) -> str:
-    """Return a location as ``path[0].line.to``, without the tags of unions."""
-    text = ""
-    for part in location:
-        if _is_tag(part) or part == "[key]":
-            continue
-        text += f"[{part}]" if isinstance(part, int) else f".{part}"
-    return text.removeprefix(".")
+def _write_location(location: tuple[str | int, ...], key: str) -> str:
+    """Return a location, and a key below it, as ``path[0].line.to``, without the tags of unions."""
+    text = "".join(
+        f"[{part}]" if isinstance(part, int) else f".{part}"
+        for part in location
+        if not _is_tag(part) and part != "[key]"
+    )
+    below = key if key.startswith(("[", ".")) or not key else f".{key}"
+    return f"{text}{below}".removeprefix(".")
 
 
-def _models_in(annotation: object) -> Iterator[type]:
+def models_in(annotation: object) -> Iterator[type]:
+    """Yield the models, and dataclasses, that an annotation names."""
     if isinstance(annotation, type) and (
         issubclass(annotation, Model) or is_dataclass(annotation)
     ):
         yield annotation
     for part in get_args(annotation):
-        yield from _models_in(part)
+        yield from models_in(part)
 
 
 def _fields_of(model: type) -> Mapping[str, object]:
@@ -117,15 +102,12 @@ def _models_at(location: tuple[str | int, ...], model: type[Model]) -> list[type
     models: list[type] = [model]
     for part in location:
         if _is_tag(part):
-            chosen = [one for one in models if f"<{one.__name__}>" == part]
-            models = chosen or models
-        elif isinstance(part, str) and any(
-            part in _fields_of(one) for one in models
-        ):  # else a name in a mapping
-            fields = [_fields_of(one).get(part) for one in models]
-            models = [
-                found for annotation in fields for found in _models_in(annotation)
-            ]
+            models = [one for one in models if f"<{one.__name__}>" == part] or models
+            continue
+        fields = [_fields_of(one) for one in models]
+        if any(part in each for each in fields):  # else a name in a mapping
+            annotations = [each.get(str(part)) for each in fields]
+            models = [inner for each in annotations for inner in models_in(each)]
     return models
 
 
@@ -135,21 +117,17 @@ def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
 
 
 def key_paths(name: str, model: type[Model]) -> list[str]:
-    """Return the dotted keys, of the fewest parts, that end in a name: ``refinement.tolerance``."""
+    """Return the shortest dotted keys, of up to three parts, that end in a name: ``refinement.tolerance``."""
     level: list[tuple[str, type]] = [("", model)]
-    for _ in range(_DEEPEST):
+    for _ in range(3):
         found = [f"{path}{name}" for path, one in level if name in _fields_of(one)]
         if found:
             return list(dict.fromkeys(found))
-        inside = (
-            (f"{path}{key}.", kind)
-            for path, one in level
-            for key, kind in _fields_of(one).items()
-        )
         level = [
-            (path, each)
-            for path, annotation in inside
-            for each in _models_in(annotation)
+            (f"{path}{key}.", inner)
+            for path, one in level
+            for key, annotation in _fields_of(one).items()
+            for inner in models_in(annotation)
         ]
     return []
 
@@ -174,124 +152,96 @@ def _is_echo(detail: ErrorDetails) -> bool:
     )
 
 
-def _missing(detail: ErrorDetails, model: type[Model]) -> _Complaint:
+_Parts = tuple[str, *tuple[str | None, ...]]
+"""What is wrong, what was found, what is allowed, what to try; the last ones may be absent."""
+
+
+def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
     if isinstance(detail["loc"][-1], int):
-        return _Complaint(
-            "the list is too short: this item is missing", show(detail["input"])
-        )
-    hint = (_description_at(detail["loc"], model) or "").partition("; ")[0]
-    return _Complaint("this key is required, and missing", hint=hint or None)
+        problem = "the list is too short: this item is missing"
+        return problem, show(detail["input"])
+    about = _description_at(detail["loc"], model) or ""
+    problem = "this key is required, and missing"
+    return problem, None, None, about.partition("; ")[0] or None
 
 
-def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
+def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
     name = str(detail["loc"][-1])
     keys = _keys_at(detail["loc"][:-1], model)
-    elsewhere = key_paths(name, model)
-    near = nearest(name, keys)
-    hint = (
-        f"It is a key of its own: {' or '.join(elsewhere)}"
-        if elsewhere
-        else near and f"Did you mean {near!r}?"
-    )
-    return _Complaint("unknown key", name, ", ".join(keys), hint)
+    elsewhere = " or ".join(key_paths(name, model))
+    hint = f"It is a key of its own: {elsewhere}" if elsewhere else _meant([name], keys)
+    return "unknown key", name, ", ".join(keys), hint
 
 
-def _describe_refusal(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+def _meant(names: Iterable[object], keys: Sequence[str]) -> str | None:
+    near = next(filter(None, (nearest(str(name), keys) for name in names)), None)
+    return f"Did you mean {near!r}?" if near else None
+
+
+def _refusal(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     facts = detail["ctx"]
     found = detail["input"] if facts["found"] is None else facts["found"]
     shown = None if facts["absent"] else show(found)
-    return _Complaint(
-        facts["problem"], shown, facts["allowed"] or None, key=facts["key"]
-    )
+    return facts["problem"], shown, facts["allowed"] or None
 
 
-def _wrong_form(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
-    return _Complaint("wrong form", show(detail["input"]), detail["ctx"]["allowed"])
-
-
-def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     facts = detail["ctx"]
     found = detail["input"]
     known = facts["known"].split()
-    near = None
+    hint = None
     if isinstance(found, Mapping) and not any(key in found for key in known):
-        near = next(filter(None, (nearest(str(key), known) for key in found)), None)
-    return _Complaint(
-        facts["problem"],
-        show(found),
-        facts["allowed"],
-        f"Did you mean {near!r}?" if near else None,
-    )
+        hint = _meant(found, known)
+    return facts["problem"], show(found), facts["allowed"], hint
 
 
-def _unforeseen(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
-    return _Complaint(detail["msg"], show(detail["input"]))
+def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
+    """Describe a mistake by the table; a wrong type by the keys of the mapping and what the key is for as well."""
+    found = show(detail["input"])
+    location = detail["loc"]
+    if location and location[-1] == "[key]":
+        return "a name must be a string", found, "a string, in quotes if need be"
+    if detail["type"] in _TYPES:
+        allowed = _TYPES[detail["type"]]
+        keys = _keys_at(location, model) if allowed == _MAPPING else []
+        if keys:
+            allowed += f" with keys out of {', '.join(keys)}"
+        return "wrong type", found, allowed, _description_at(location, model)
+    problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
+    return problem, found, form.format(**detail.get("ctx", {})) or None
 
 
-def _plain(
-    problem: str, allowed: str | None = None
-) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
-    """Return a description whose texts may name pydantic's facts in braces, such as ``{gt}``."""
-
-    def describe(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
-        facts: dict[str, Any] = detail.get("ctx", {})
-        if detail["loc"] and detail["loc"][-1] == "[key]":
-            return _Complaint(
-                "a name must be a string",
-                show(detail["input"]),
-                "a string, in quotes if need be",
-            )
-        return _Complaint(
-            problem.format(**facts),
-            show(detail["input"]),
-            allowed and allowed.format(**facts),
-        )
-
-    return describe
-
-
-def _wrong_type(form: str) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
-    """Return a description that names the form, the keys of a mapping, and what the key is for."""
-    plainly = _plain("wrong type", form)
-
-    def describe(detail: ErrorDetails, model: type[Model]) -> _Complaint:
-        complaint = plainly(detail, model)
-        keys = _keys_at(detail["loc"], model) if form == _MAPPING else []
-        allowed = (
-            f"{form} with keys out of {', '.join(keys)}" if keys else complaint.allowed
-        )
-        return replace(
-            complaint, allowed=allowed, hint=_description_at(detail["loc"], model)
-        )
-
-    return describe
-
-
-_DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]]] = {
-    REFUSED: _describe_refusal,
-    WRONG_FORM: _wrong_form,
+_MAPPING = "a mapping"
+_TYPES: Final = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "a string",
+    "tuple_type": "a list",
+    "dict_type": _MAPPING,
+    "model_type": _MAPPING,
+    "dataclass_type": _MAPPING,
+    "none_required": "null",
+}
+"""What is expected, by pydantic's names of errors about types."""
+_PROBLEMS: Final = {
+    "finite_number": ("not a finite number", "a finite number"),
+    "greater_than": ("out of range", "> {gt:g}"),
+    "greater_than_equal": ("out of range", ">= {ge:g}"),
+    "less_than": ("out of range", "< {lt:g}"),
+    "less_than_equal": ("out of range", "<= {le:g}"),
+    "literal_error": ("not one of the allowed values", "{expected}"),
+    "too_short": ("too few items", "at least {min_length}"),
+    "too_long": ("too many items", "at most {max_length}"),
+    "string_too_short": ("the string is empty", "a string of at least one character"),
+    WRONG_FORM: ("wrong form", "{allowed}"),
+}
+"""What is wrong, and what is allowed with pydantic's facts in braces, by the names of errors."""
+_DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Parts]]] = {
+    REFUSED: _refusal,
     WRONG_KEYS: _wrong_keys,
     "missing": _missing,
     "extra_forbidden": _unknown,
     "unexpected_keyword_argument": _unknown,
-    "float_type": _wrong_type("a number"),
-    "int_type": _wrong_type("a whole number"),
-    "bool_type": _wrong_type("true or false"),
-    "string_type": _wrong_type("a string"),
-    "tuple_type": _wrong_type("a list"),
-    "dict_type": _wrong_type(_MAPPING),
-    "model_type": _wrong_type(_MAPPING),
-    "dataclass_type": _wrong_type(_MAPPING),
-    "none_required": _wrong_type("null"),
-    "finite_number": _plain("not a finite number", "a finite number"),
-    "greater_than": _plain("out of range", "> {gt:g}"),
-    "greater_than_equal": _plain("out of range", ">= {ge:g}"),
-    "less_than": _plain("out of range", "< {lt:g}"),
-    "less_than_equal": _plain("out of range", "<= {le:g}"),
-    "literal_error": _plain("not one of the allowed values", "{expected}"),
-    "too_short": _plain("too few items", "at least {min_length}"),
-    "too_long": _plain("too many items", "at most {max_length}"),
-    "string_too_short": _plain(
-        "the string is empty", "a string of at least one character"
-    ),
 }
+"""Mistakes that need more than the tables."""

@@ -7,46 +7,46 @@ and answers mistakes with a `brachis.errors.TaskError` that names the key.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal
+from operator import attrgetter
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
     JsonValue,
-    Tag,
     field_validator,
     model_validator,
 )
 
 from brachis.task.fields import (
+    ByForm,
     Model,
     Name,
+    NonEmpty,
     Number,
-    by_form,
     or_form,
     plain,
     refuse,
 )
 from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import ToolPose
-from brachis.task.planning_models import (
+from brachis.task.point_data import FitReport
+from brachis.task.points.units import choices
+from brachis.task.segments import (
+    CsvSegment,
+    Segment,
+    SegmentModel,
+)
+from brachis.task.settings import (
     BoundarySettings,
+    Placement,
     RefinementSettings,
+    RobotSettings,
     SearchSettings,
     SolverSettings,
     SplineSettings,
     expand_solver_name,
-)
-from brachis.task.point_data import FitReport
-from brachis.task.points.units import choices
-from brachis.task.robot_models import Placement, RobotSettings
-from brachis.task.segments import (
-    BSplineCurve,
-    CsvSegment,
-    Segment,
-    SegmentModel,
-    SplineThrough,
 )
 
 Row = Literal["x", "y", "z", "yaw"]
@@ -62,31 +62,38 @@ def _expand_position(space: _Space) -> _Space:
     return POSITION_ROWS if space == "position" else space
 
 
-def _check_rows(rows: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(rows)) < len(rows):
-        problem = "a row occurs twice in the task space"
-        raise refuse(problem, found=list(rows), allowed="each row once")
-    if "yaw" in rows and (len(rows) != len(POSITION_ROWS) or rows[-1] != "yaw"):
-        problem = "yaw needs exactly two position rows, and comes last"
-        raise refuse(problem, found=list(rows), allowed="for example [x, y, yaw]")
+def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        raise refuse("a name occurs twice", found=names, allowed="each name once")
+    return names
+
+
+def _yaw_last(rows: tuple[str, ...]) -> tuple[str, ...]:
+    if "yaw" in rows and (len(rows) != 3 or rows[-1] != "yaw"):
+        raise refuse(
+            "yaw needs exactly two position rows, and comes last",
+            found=rows,
+            allowed="for example [x, y, yaw]",
+        )
     return rows
 
 
 TaskSpace = Annotated[
-    Annotated[Literal["position", "pose", "pose_free_roll", "joints"], Tag("<word>")]
+    Literal["position", "pose", "pose_free_roll", "joints"]
     | Annotated[
-        Annotated[tuple[Row, ...], Field(min_length=1), AfterValidator(_check_rows)],
-        Tag("<list>"),
+        tuple[Row, ...],
+        Field(min_length=1),
+        AfterValidator(_each_once),
+        AfterValidator(_yaw_last),
     ],
-    by_form(_SPACE_FORMS, "position", "pose", "pose_free_roll", "joints"),
+    ByForm(_SPACE_FORMS),
     AfterValidator(_expand_position),
 ]
 
 
 JointValues = Annotated[
-    Annotated[Annotated[tuple[Number, ...], Field(min_length=1)], Tag("<list>")]
-    | Annotated[Annotated[dict[Name, Number], Field(min_length=1)], Tag("<mapping>")],
-    by_form(
+    NonEmpty[Number] | Annotated[dict[Name, Number], Field(min_length=1)],
+    ByForm(
         "a list of numbers in the order of the chain, or a mapping of joint name to number"
     ),
 ]
@@ -101,31 +108,20 @@ class Posture(Model):
 
 
 PathStart = Annotated[
-    Annotated[tuple[Number, ...], Tag("<list>")]
-    | Annotated[ToolPose, Tag("<mapping>")]
-    | Annotated[None, Tag("<null>")],
-    by_form(
+    tuple[Number, ...] | ToolPose | None,
+    ByForm(
         "a list of the rows of the task space, or of a pose a mapping {position: [x, y, z], rpy_deg: [...]}"
     ),
 ]
 FreePosture = Annotated[
-    Annotated[Literal["free"], Tag("<word>")] | Annotated[Posture, Tag("<mapping>")],
-    by_form("free, or a mapping {joints: [...]}", "free"),
+    Literal["free"] | Posture,
+    ByForm("free, or a mapping {joints: [...]}"),
 ]
 
 
-def _each_once(joints: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(joints)) < len(joints):
-        raise refuse(
-            "a joint occurs twice", found=list(joints), allowed="each joint once"
-        )
-    return joints
-
-
 RedundantJoints = Annotated[
-    Annotated[Literal["auto"], Tag("<word>")]
-    | Annotated[Annotated[tuple[Name, ...], AfterValidator(_each_once)], Tag("<list>")],
-    by_form("auto, or a list of joint names", "auto"),
+    Literal["auto"] | Annotated[tuple[Name, ...], AfterValidator(_each_once)],
+    ByForm("auto, or a list of joint names"),
 ]
 
 
@@ -247,43 +243,38 @@ class Task(Model):
     def _version_is_a_number(cls, version: object) -> object:
         # Python holds true == 1, so that the literal alone would accept `brachis: true`.
         if type(version) is not int:
-            problem = "the version of the task format must be a whole number"
-            raise refuse(problem, found=version, allowed="1")
+            raise refuse(
+                "the version of the task format must be a whole number",
+                found=version,
+                allowed="1",
+            )
         return version
 
     @model_validator(mode="before")
     @classmethod
-    def _a_path_of_joints_has_its_start(cls, content: object) -> object:
-        if isinstance(content, Mapping) and content.get("task_space") == "joints":
-            return {"start": "free", **content}
-        return content
-
-    @model_validator(mode="before")
-    @classmethod
-    def _a_path_may_say_its_frame(cls, content: object) -> object:
-        path = content.get("path") if isinstance(content, Mapping) else None
-        if (
-            not isinstance(path, Mapping)
-            or "frame" not in path
-            or not isinstance(content, Mapping)
-        ):
+    def _expand(cls, content: object) -> object:
+        """Give a path of joints a free start, and take a path apart that says its frame."""
+        if not isinstance(content, Mapping):
+            return content
+        if content.get("task_space") == "joints":
+            content = {"start": "free", **content}
+        path = content.get("path")
+        if not isinstance(path, Mapping) or "frame" not in path:
             return content
         if set(path) != {"frame", "segments"}:
-            problem = "a path in a frame is the frame's name and the segments"
             raise refuse(
-                problem,
+                "a path in a frame is the frame's name and the segments",
                 key="path",
                 found=path,
                 allowed="{frame: NAME, segments: [...]}",
             )
         other = content.get("path_frame")
         if other not in (None, path["frame"]):
-            allowed = f"{path['frame']}, or one of both keys"
             raise refuse(
                 "another frame than in path.frame",
                 key="path_frame",
                 found=other,
-                allowed=allowed,
+                allowed=f"{path['frame']}, or one of both keys",
             )
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
@@ -293,83 +284,31 @@ class Task(Model):
         if isinstance(path, SegmentModel | Mapping):
             return (path,)
         if callable(path):
-            problem = "a curve is not a segment"
-            allowed = "brachis.bspline_segment(curve, (first, last)), or the curve's points as an array"
-            raise refuse(problem, found=path, allowed=allowed)
+            raise refuse(
+                "a curve is not a segment",
+                found=path,
+                allowed="brachis.bspline_segment(curve, (first, last)), or the curve's points as an array",
+            )
         rows = plain(path)
         if not isinstance(rows, list) or any(
             isinstance(row, SegmentModel | Mapping) for row in rows
         ):
             return path
         if any(hasattr(row, "homogeneous") or _is_matrix(row) for row in rows):
-            allowed = "brachis.Spline(through=poses), or brachis.fit_path(poses)"
-            raise refuse("poses are not segments", found=rows, allowed=allowed)
+            raise refuse(
+                "poses are not segments",
+                found=rows,
+                allowed="brachis.Spline(through=poses), or brachis.fit_path(poses)",
+            )
         if len(rows) > 1 and all(isinstance(row, list) for row in rows):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
         if rows and all(isinstance(row, list | int | float) for row in rows):
-            allowed = "two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}"
             raise refuse(
-                "a path cannot be made of these numbers", found=rows, allowed=allowed
+                "a path cannot be made of these numbers",
+                found=rows,
+                allowed="two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}",
             )
         return path
-
-    @field_validator("path")
-    @classmethod
-    def _no_blend_at_the_end(cls, path: tuple[Segment, ...]) -> tuple[Segment, ...]:
-        if path[-1].blend is not None:
-            problem = "the last segment has no corner to blend"
-            raise refuse(
-                problem,
-                key=f"[{len(path) - 1}].blend",
-                found=path[-1].blend,
-                allowed="no blend on the last segment",
-            )
-        return path
-
-    @model_validator(mode="after")
-    def _free_start_needs_a_place(self) -> Task:
-        first = self.path[0]
-        unread = isinstance(first, CsvSegment) and not first.csv.relative
-        if (
-            self.start == "free"
-            and self.path_start is None
-            and not unread
-            and self.start_place is None
-        ):
-            problem = "a free start posture leaves open where the path begins"
-            if self.task_space == "joints":
-                problem = "a path of joints that does not begin with a waypoint needs a start posture"
-                raise refuse(
-                    problem, key="start", absent=True, allowed="{joints: [...]}"
-                )
-            raise refuse(
-                problem, key="path_start", absent=True, allowed=self._start_forms
-            )
-        if self.start == "free" and self.search.guesses == "numeric":
-            problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
-            raise refuse(
-                problem, key="search.guesses", found="numeric", allowed="lattice"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _check_path_frame(self) -> Task:
-        if self.path_frame is not None and self.path_frame not in self.frames:
-            problem = "this frame is not among frames"
-            missing = f"frames: {{{self.path_frame}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
-            allowed = ", ".join(self.frames) or missing
-            raise refuse(
-                problem, key="path_frame", found=self.path_frame, allowed=allowed
-            )
-        if self.path_frame is not None and self.task_space == "joints":
-            problem = "a path of joints is in no frame"
-            raise refuse(
-                problem,
-                key="path_frame",
-                found=self.path_frame,
-                allowed="null, with task_space: joints",
-            )
-        return self
 
     @property
     def path_placement(self) -> Placement | None:
@@ -381,85 +320,119 @@ class Task(Model):
         """How ``path_start`` is written in this task space."""
         if self.of_poses:
             return f"{{position: [x, y, z], ...}} with one of {choices(suffix='_deg')}"
-        return (
-            f"[{', '.join(self.task_space)}]"
-            if isinstance(self.task_space, tuple)
-            else "a list of all joints"
+        if isinstance(self.task_space, tuple):
+            return f"[{', '.join(self.task_space)}]"
+        return "a list of all joints"
+
+    @model_validator(mode="after")
+    def _start_fits(self) -> Self:
+        first = self.path[0]
+        unread = isinstance(first, CsvSegment) and not first.csv.relative
+        free = self.start == "free"
+        open_start = free and self.path_start is None and self.start_place is None
+        joints = self.task_space == "joints"
+        given = self.path_start is not None
+        of_pose = isinstance(self.path_start, ToolPose)
+        return self.check(
+            (
+                open_start and joints and not unread,
+                "start",
+                "a path of joints that does not begin with a waypoint needs a start posture",
+                "{joints: [...]}",
+            ),
+            (
+                open_start and not unread,
+                "path_start",
+                "a free start posture leaves open where the path begins",
+                self._start_forms,
+            ),
+            (
+                free and self.search.guesses == "numeric",
+                "search.guesses",
+                "numeric inverse kinematics needs a posture to begin with, and start is free",
+                "lattice",
+            ),
+            (
+                given and self.of_poses and not of_pose,
+                "path_start",
+                "a list does not say how an orientation is meant, as whether w of a quaternion is first or last",
+                self._start_forms,
+            ),
+            (
+                of_pose and not self.of_poses,
+                "path_start",
+                "a position with an orientation is for task spaces of poses",
+                self._start_forms,
+            ),
         )
 
     @model_validator(mode="after")
-    def _path_start_fits(self) -> Task:
-        if (
-            self.path_start is not None
-            and isinstance(self.path_start, ToolPose) != self.of_poses
-        ):
-            problem = "a list does not say how an orientation is meant, as whether w of a quaternion is first or last"
-            if not self.of_poses:
-                problem = "a position with an orientation is for task spaces of poses"
-            found = (
-                self.path_start.model_dump()
-                if isinstance(self.path_start, ToolPose)
-                else list(self.path_start)
-            )
+    def _path_fits(self) -> Self:
+        name = self.path_frame
+        frame = f"frames: {{{name}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
+        joints = self.task_space == "joints"
+        no_choice = "a path of joints leaves no choice of postures"
+        if self.path[-1].blend is not None:
             raise refuse(
-                problem, key="path_start", found=found, allowed=self._start_forms
+                "the last segment has no corner to blend",
+                key=f"path[{len(self.path) - 1}].blend",
+                found=self.path[-1].blend,
+                allowed="no blend on the last segment",
             )
-        return self
+        return self.check(
+            (
+                name is not None and name not in self.frames,
+                "path_frame",
+                "this frame is not among frames",
+                ", ".join(self.frames) or frame,
+            ),
+            (
+                name is not None and joints,
+                "path_frame",
+                "a path of joints cannot be in a frame",
+                "null, with task_space: joints",
+            ),
+            *(
+                (
+                    joints and attrgetter(key)(self) != default,
+                    key,
+                    no_choice,
+                    f"{default}, with task_space: joints",
+                )
+                for key, default in (
+                    ("redundant_joints", "auto"),
+                    ("branch", "auto"),
+                    ("search.guesses", "lattice"),
+                )
+            ),
+        )
 
     @model_validator(mode="after")
-    def _ends_in_motion(self) -> Task:
-        if self.boundary.in_motion and self.spline.knots == "free":
-            problem = "ends in motion tie control points by the knots, which may not move then"
-            raise refuse(
-                problem,
-                key="spline.knots",
-                found="free",
-                allowed="uniform, or a boundary at rest",
-            )
-        if self.boundary.periodic and self.end != "free":
-            problem = "the end posture of a periodic motion is its start posture"
-            raise refuse(
-                problem, key="end", found=self.end.model_dump(), allowed="free"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _splines_are_free_between_their_ends(self) -> Task:
+    def _splines_fit(self) -> Self:
         spline = self.spline
-        least = (
-            2 * spline.vanishing + 3 - spline.degree
-        )  # both ends fix a value and the derivatives that vanish
-        if (
-            not self.boundary.periodic
-            and spline.intervals != "auto"
-            and spline.intervals < least
-        ):
-            problem = f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals"
-            raise refuse(
-                problem,
-                key="spline.intervals",
-                found=spline.intervals,
-                allowed=f">= {least}, or auto",
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _a_path_of_joints_leaves_no_choice(self) -> Task:
-        if self.task_space == "joints":
-            for key, given, default in (
-                ("redundant_joints", self.redundant_joints, "auto"),
-                ("branch", self.branch, "auto"),
-                ("search.guesses", self.search.guesses, "lattice"),
-            ):
-                if given != default:
-                    problem = "a path of joints leaves no choice of postures"
-                    raise refuse(
-                        problem,
-                        key=key,
-                        found=given,
-                        allowed=f"{default}, with task_space: joints",
-                    )
-        return self
+        # Both ends fix a value and the derivatives that vanish.
+        least = 2 * spline.vanishing + 3 - spline.degree
+        few = spline.intervals != "auto" and spline.intervals < least
+        return self.check(
+            (
+                self.boundary.in_motion and spline.knots == "free",
+                "spline.knots",
+                "ends in motion tie control points by the knots, which may not move then",
+                "uniform, or a boundary at rest",
+            ),
+            (
+                self.boundary.periodic and self.end != "free",
+                "end",
+                "the end posture of a periodic motion is its start posture",
+                "free",
+            ),
+            (
+                few and not self.boundary.periodic,
+                "spline.intervals",
+                f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals",
+                f">= {least}, or auto",
+            ),
+        )
 
     @property
     def of_poses(self) -> bool:
@@ -480,13 +453,8 @@ class Task(Model):
     @property
     def fits(self) -> tuple[FitReport, ...]:
         """Where the path comes from points, one for each file or array: what they were, and how near it is to them."""
-        shapes = (getattr(segment, segment.kind) for segment in self.path)
-        curves = (
-            shape.fit
-            for shape in shapes
-            if isinstance(shape, SplineThrough | BSplineCurve)
-        )
-        return tuple(fit for fit in curves if fit is not None)
+        fits = (getattr(segment.shape, "fit", None) for segment in self.path)
+        return tuple(fit for fit in fits if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the task as plain mappings, lists, numbers and strings.

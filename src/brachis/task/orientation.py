@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import (
     AfterValidator,
@@ -17,12 +17,11 @@ from pydantic import (
     Field,
     JsonValue,
     SerializerFunctionWrapHandler,
-    Tag,
     model_serializer,
     model_validator,
 )
 
-from brachis.task.fields import Model, Number, by_form, by_key, refuse
+from brachis.task.fields import ByForm, ByKey, Model, Number, refuse
 from brachis.task.points.units import CONVENTIONS, choices
 
 Vector3 = tuple[Number, Number, Number]
@@ -30,9 +29,8 @@ Vector3 = tuple[Number, Number, Number]
 
 def _check_direction(vector: Vector3) -> Vector3:
     if math.hypot(*vector) < 1e-9:
-        problem = "a direction cannot have zero length"
         raise refuse(
-            problem,
+            "a direction cannot have zero length",
             found=list(vector),
             allowed="any other vector; its length is of no importance",
         )
@@ -52,8 +50,11 @@ Profile = Annotated[
 def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | None:
     length = 1.0 if quaternion is None else math.hypot(*quaternion)
     if abs(length - 1.0) > 0.01:
-        problem = f"the quaternion's length is {length:.6g}"
-        raise refuse(problem, found=quaternion, allowed="a quaternion of length 1")
+        raise refuse(
+            f"the quaternion's length is {length:.6g}",
+            found=quaternion,
+            allowed="a quaternion of length 1",
+        )
     return quaternion
 
 
@@ -100,8 +101,11 @@ class Attitude(Model):
         given = value if isinstance(value, Mapping) else {}
         stated = [key for key in Attitude.model_fields if given.get(key) is not None]
         if not isinstance(value, Attitude) and len(stated) != 1:
-            problem = "an orientation needs exactly one convention"
-            raise refuse(problem, found=value, allowed=choices(suffix=_DEGREES))
+            raise refuse(
+                "an orientation needs exactly one convention",
+                found=value,
+                allowed=choices(suffix=_DEGREES),
+            )
         return value
 
     @model_serializer(mode="wrap")
@@ -138,6 +142,35 @@ class ToolPose(Attitude):
     """A place of the tool: its position, and its orientation in exactly one of these conventions."""
 
     position: Vector3 = Field(description="x, y, z, m.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_transform(cls, given: object) -> object:
+        """Take a transform such as Pinocchio's SE3 too."""
+        if not hasattr(given, "homogeneous"):
+            return given
+        ((position, turn),) = poses_of([given], "transform")
+        return {"position": position, **turn}
+
+
+def poses_of(
+    transforms: Any, source: str, orientations: Any = None
+) -> list[tuple[list[float], dict[str, Any]]]:
+    """Return positions, m, and orientations as a task file writes them; `source` names the transforms in messages."""
+    from brachis.task.point_data import FileUnits
+    from brachis.task.points.points import points_from
+
+    points = points_from(transforms, orientations, None, FileUnits(), source, least=1)
+    turns = [{"quaternion_wxyz": turn} for turn in points.turning.tolist()]
+    return list(zip(points.position.tolist(), turns, strict=True))
+
+
+class Transform(Protocol):
+    """A pose such as Pinocchio's ``SE3``."""
+
+    @property
+    def homogeneous(self) -> Any:
+        """Return the homogeneous matrix, (4, 4)."""
 
 
 class Rotation(Model):
@@ -185,34 +218,15 @@ class AlongTangent(Model):
 
 
 Turning = Annotated[
-    Annotated[Rotate, Tag("<Rotate>")] | Annotated[TurnTo, Tag("<TurnTo>")],
-    by_key(
-        "a turn needs exactly one of its forms",
-        {"Rotate": ("rotate",), "TurnTo": ("to",)},
-    ),
+    Rotate | TurnTo,
+    ByKey("a turn needs exactly one of its forms"),
 ]
 OrientationMode = Annotated[
-    Annotated[Literal["fixed", "tangent"], Tag("<word>")]
-    | Annotated[None, Tag("<null>")]
+    Literal["fixed", "tangent"]
     | Annotated[
-        Annotated[
-            Annotated[Rotate, Tag("<Rotate>")]
-            | Annotated[TurnTo, Tag("<TurnTo>")]
-            | Annotated[AlongTangent, Tag("<AlongTangent>")],
-            by_key(
-                "an orientation along a segment needs exactly one of its forms",
-                {
-                    "Rotate": ("rotate",),
-                    "TurnTo": ("to",),
-                    "AlongTangent": ("tangent",),
-                },
-            ),
-        ],
-        Tag("<mapping>"),
-    ],
-    by_form(
-        "fixed | tangent | {rotate: ...} | {to: ...} | {tangent: ...}",
-        "fixed",
-        "tangent",
-    ),
+        Rotate | TurnTo | AlongTangent,
+        ByKey("an orientation along a segment needs exactly one of its forms"),
+    ]
+    | None,
+    ByForm("fixed | tangent | {rotate: ...} | {to: ...} | {tangent: ...}"),
 ]

@@ -145,11 +145,8 @@ class PointFile(Model):
     @classmethod
     def _no_stops(cls, corner: object) -> object:
         if corner == "stop":
-            problem = (
-                "a path cannot stop at a corner: it is one motion from rest to rest"
-            )
             raise refuse(
-                problem,
+                "a path cannot stop at a corner: it is one motion from rest to rest",
                 found=corner,
                 allowed="blend or refuse; or two tasks, one to the corner and one from it",
             )

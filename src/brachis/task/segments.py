@@ -6,29 +6,36 @@ start posture. Lengths are in metres, angles in degrees except the yaw coordinat
 therefore in radians. Coordinates are those of all rows of the task space; of a pose they are x, y, z. Whether their
 number fits the task space is for the path to say (`brachis.path.build_path`), which knows both.
 
-The curves that segments of a path are made of, as the task file writes them; see `brachis.task.segments`.
-
-Curves that a task gives as B-splines; fits to points become such curves.
+A kind of segment is a model here, in the union `Segment`, and the function in `brachis.path` that makes its curve.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections import Counter
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    model_validator,
+)
 
 from brachis.task.fields import (
+    ByKey,
     Count,
     Flag,
     Model,
     Name,
+    NonEmpty,
     NonNegative,
     Number,
     Positive,
     Vector,
-    by_key,
     refuse,
+    required_keys,
 )
 from brachis.task.orientation import (
     Attitude,
@@ -36,6 +43,7 @@ from brachis.task.orientation import (
     OrientationMode,
     ToolPose,
     Turning,
+    poses_of,
 )
 from brachis.task.point_data import FitReport, PointFile
 
@@ -79,45 +87,50 @@ class BSplineCurve(Model):
         default=None, description="What the curve was fitted to; written by brachis."
     )
 
+    @property
+    def has_quaternions(self) -> bool:
+        """Whether the control points say how the tool turns."""
+        return len(self.control_points[0]) == 7
+
     @model_validator(mode="after")
-    def _knots_fit(self) -> BSplineCurve:
+    def _knots_fit(self) -> Self:
         knots = self.knots
         outer = self.degree + 1
-        if len({len(point) for point in self.control_points}) > 1:
+        needed = len(self.control_points) + outer
+        if len(knots) != needed:
             raise refuse(
+                "wrong number of knots",
+                key="knots",
+                found=len(knots),
+                allowed=f"{needed}: control points + degree + 1",
+            )
+        times = Counter(knots)
+        ends = (knots[0], knots[-1])
+        clamped = ends == (knots[outer - 1], knots[-outer]) and ends[0] < ends[1]
+        inner = [count for knot, count in times.items() if knot not in ends]
+        most = max(inner, default=0)
+        allowed = self.degree - _SMOOTH
+        often = most > allowed or any(times[end] > outer for end in ends)
+        return self.check(
+            (
+                len({len(point) for point in self.control_points}) > 1,
+                "control_points",
                 "control points differ in their number of coordinates",
-                key=".control_points",
-                allowed="one",
-            )
-        if len(knots) != len(self.control_points) + outer:
-            allowed = f"{len(self.control_points) + outer}: control points + degree + 1"
-            raise refuse(
-                "wrong number of knots", key=".knots", found=len(knots), allowed=allowed
-            )
-        ends = set(knots[:outer]), set(knots[-outer:])
-        inner = knots[outer:-outer]
-        most = max((inner.count(knot) for knot in inner), default=0)
-        if (
-            list(knots) != sorted(knots)
-            or any(len(end) > 1 for end in ends)
-            or ends[0] == ends[1]
-        ):
-            allowed = "ascending knots, the first and the last one degree + 1 times"
-            raise refuse(
+                "one",
+            ),
+            (
+                not clamped or list(knots) != sorted(knots),
+                "knots",
                 "the B-spline is not clamped",
-                key=".knots",
-                found=list(knots),
-                allowed=allowed,
-            )
-        if most > self.degree - _SMOOTH or {*inner} & (ends[0] | ends[1]):
-            problem = "a knot occurs so often that a derivative up to the third jumps"
-            raise refuse(
-                problem,
-                key=".knots",
-                found=most,
-                allowed=f"{self.degree - _SMOOTH} times at most",
-            )
-        return self
+                "ascending knots, the first and the last one degree + 1 times",
+            ),
+            (
+                often,
+                "knots",
+                f"a knot occurs {most} times, so often that a derivative up to the third jumps",
+                f"{allowed} times at most",
+            ),
+        )
 
 
 Yaw = Annotated[
@@ -127,7 +140,7 @@ Yaw = Annotated[
     ),
 ]
 Normal = Annotated[
-    tuple[Number, Number, Number] | None,
+    Direction | None,
     Field(
         description="Axis of rotation, for three position rows; right-hand rule. Any length but zero."
     ),
@@ -137,17 +150,28 @@ Centre = Annotated[
 ]
 
 
+def _as_list(value: object) -> object:
+    """Take a number for the one coordinate that it is."""
+    return [value] if isinstance(value, int | float) else value
+
+
+Coordinates = Annotated[Vector, BeforeValidator(_as_list)]
+
+
 def _not_zero(turns: float) -> float:
     if turns == 0:
-        problem = "a circle without turns has zero length"
-        raise refuse(problem, found=turns, allowed="a number other than 0")
+        raise refuse(
+            "a circle without turns has zero length",
+            found=turns,
+            allowed="a number other than 0",
+        )
     return turns
 
 
 class LineTo(Model):
     """A straight line to a point."""
 
-    to: Vector = Field(
+    to: Coordinates = Field(
         description="End point: all rows of the task space (m, yaw in rad)."
     )
 
@@ -155,7 +179,7 @@ class LineTo(Model):
 class LineBy(Model):
     """A straight line by a displacement."""
 
-    by: Vector = Field(
+    by: Coordinates = Field(
         description="Displacement: all rows of the task space (m, yaw in rad)."
     )
 
@@ -191,7 +215,7 @@ class ArcVia(Model):
     yaw: Yaw = "fixed"
 
 
-class Circle(Model):
+class CircleTurns(Model):
     """Whole or fractional turns about a centre."""
 
     center: Centre
@@ -202,7 +226,7 @@ class Circle(Model):
     yaw: Yaw = "fixed"
 
 
-class Helix(Model):
+class HelixTurns(Model):
     """Turns about an axis that climb along it, in three position rows."""
 
     center: Centre
@@ -213,14 +237,15 @@ class Helix(Model):
         description="Climb of each turn along the normal, m; negative: against it."
     )
     normal: Direction = Field(
-        description="Axis of rotation; right-hand rule. Any length but zero."
+        default=(0.0, 0.0, 1.0),
+        description="Axis of rotation; right-hand rule. Any length but zero.",
     )
 
 
 class SplineThrough(Model):
     """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
-    through: Annotated[tuple[Vector, ...], Field(min_length=1)] = Field(
+    through: NonEmpty[Coordinates] = Field(
         description="Waypoints: all rows of the task space each (m, yaw in rad)."
     )
     orientations: tuple[Attitude, ...] | None = Field(
@@ -247,57 +272,52 @@ class SplineThrough(Model):
     )
     joints: JointOrder = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _of_poses(cls, content: object) -> object:
+        if not isinstance(content, Mapping):
+            return content
+        through = content.get("through")
+        orientations = content.get("orientations")
+        if not (_are_matrices(through) or _are_matrices(orientations)):
+            return content
+        poses = poses_of(through, "spline.through", orientations)
+        places = [position for position, _ in poses]
+        turns = [turn for _, turn in poses]
+        return {**content, "through": places, "orientations": turns}
+
     @model_validator(mode="after")
-    def _orientations_fit(self) -> SplineThrough:
-        if self.orientations is None:
-            if self.starts_oriented is not None:
-                problem = "the orientation at the start stands beside the orientations at the waypoints"
-                raise refuse(
-                    problem, key=".starts_oriented", allowed="orientations as well"
-                )
-        elif len(self.orientations) != len(self.through):
-            problem = "a spline needs an orientation for each of its waypoints, or none"
-            allowed = f"{len(self.through)}, as there are waypoints in through"
+    def _orientations_fit(self) -> Self:
+        count = len(self.through)
+        if self.orientations is not None and len(self.orientations) != count:
             raise refuse(
-                problem,
-                key=".orientations",
+                "a spline needs an orientation for each of its waypoints, or none",
+                key="orientations",
                 found=len(self.orientations),
-                allowed=allowed,
+                allowed=f"{count}, as there are waypoints in through",
             )
-        return self
+        return self.check(
+            (
+                self.orientations is None and self.starts_oriented is not None,
+                "starts_oriented",
+                "the orientation at the start stands beside the orientations at the waypoints",
+                "orientations as well",
+            )
+        )
 
 
-Line = Annotated[
-    Annotated[LineTo, Tag("<LineTo>")]
-    | Annotated[LineBy, Tag("<LineBy>")]
-    | Annotated[LineHeading, Tag("<LineHeading>")],
-    by_key(
-        "a line needs exactly one of its forms",
-        {"LineTo": ("to",), "LineBy": ("by",), "LineHeading": ("length", "angle_deg")},
-    ),
+def _are_matrices(values: Any) -> bool:
+    """Tell transforms, rotations and their matrices from coordinates and from what a task file has."""
+    first = values[0] if isinstance(values, list) and values else values
+    return any(hasattr(first, name) for name in ("homogeneous", "as_matrix")) or (
+        isinstance(first, list) and isinstance(first[0] if first else None, list)
+    )
+
+
+LineForm = Annotated[
+    LineTo | LineBy | LineHeading, ByKey("a line needs exactly one of its forms")
 ]
-Arc = Annotated[
-    Annotated[ArcCenter, Tag("<ArcCenter>")] | Annotated[ArcVia, Tag("<ArcVia>")],
-    by_key(
-        "an arc needs exactly one of its forms",
-        {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
-    ),
-]
-Shape = (
-    LineTo
-    | LineBy
-    | LineHeading
-    | ArcCenter
-    | ArcVia
-    | Circle
-    | Helix
-    | SplineThrough
-    | BSplineCurve
-    | PointFile
-)
-
-
-_POSE_COLUMNS = 7
+ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its forms")]
 _POSITIONS = 3
 
 
@@ -323,13 +343,9 @@ class SegmentModel(Model):
 
     def __repr__(self) -> str:
         """Show it as a program makes it."""
-        shape = getattr(self, self.kind)
-        rest = [
-            (name, value) for name, value in self.__repr_args__() if name != self.kind
-        ]
-        given = ", ".join(
-            f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest)
-        )
+        rest = [pair for pair in self.__repr_args__() if pair[0] != self.kind]
+        pairs = [*self.shape.__repr_args__(), *rest]
+        given = ", ".join(f"{name}={value!r}" for name, value in pairs)
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
@@ -342,11 +358,12 @@ class SegmentModel(Model):
     @property
     def kind(self) -> str:
         """The key that names the segment in the task file: ``line``, ``arc``, ``circle``, ``spline``, ..."""
-        return next(
-            name
-            for name in type(self).model_fields
-            if name not in {"blend", "orientation"}
-        )
+        return required_keys(type(self))[0]
+
+    @property
+    def shape(self) -> Any:
+        """What stands below the key that names the segment: a `LineTo`, an `ArcCenter`, ..."""
+        return getattr(self, self.kind)
 
 
 class MovingSegment(SegmentModel):
@@ -358,35 +375,44 @@ class MovingSegment(SegmentModel):
         "{to: ...} or {tangent: ...}. Null: fixed, or as a spline's `orientations` say.",
     )
 
-    @property
-    def shape(self) -> Shape:
-        """What stands below the key that names the segment."""
-        shape: Shape = getattr(self, self.kind)
-        return shape
-
 
 class LineSegment(MovingSegment):
     """A straight line."""
 
-    line: Line
+    line: LineForm
+
+    @model_validator(mode="before")
+    @classmethod
+    def _to_transform(cls, content: object) -> object:
+        if not isinstance(content, Mapping):
+            return content
+        line = content.get("line")
+        if not isinstance(line, Mapping) or not hasattr(line.get("to"), "homogeneous"):
+            return content
+        ((position, turn),) = poses_of([line["to"]], "line.to")
+        return {
+            "orientation": {"to": turn},
+            **content,
+            "line": {**line, "to": position},
+        }
 
 
 class ArcSegment(MovingSegment):
     """A circular arc."""
 
-    arc: Arc
+    arc: ArcForm
 
 
 class CircleSegment(MovingSegment):
     """A circle."""
 
-    circle: Circle
+    circle: CircleTurns
 
 
 class HelixSegment(MovingSegment):
     """A helix."""
 
-    helix: Helix
+    helix: HelixTurns
 
 
 class SplineSegment(MovingSegment):
@@ -395,7 +421,7 @@ class SplineSegment(MovingSegment):
     spline: SplineThrough
 
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
-        """See `SegmentModel.start_place`."""
+        """Return `starts_at`, or else the first waypoint; None where the waypoints are relative."""
         spline = self.spline
         if spline.relative:
             return None
@@ -409,15 +435,15 @@ class SplineSegment(MovingSegment):
         return ToolPose.model_validate({"position": place, **oriented.model_dump()})
 
     @model_validator(mode="after")
-    def _one_word_on_orientation(self) -> SplineSegment:
-        if self.orientation is not None and self.spline.orientations is not None:
-            problem = "the spline's orientations say already how the tool turns"
-            raise refuse(
-                problem,
-                key=".orientation",
-                allowed="orientation or spline.orientations, not both",
+    def _one_word_on_orientation(self) -> Self:
+        return self.check(
+            (
+                self.orientation is not None and self.spline.orientations is not None,
+                "orientation",
+                "the spline's orientations say already how the tool turns",
+                "orientation or spline.orientations, not both",
             )
-        return self
+        )
 
 
 class TurnSegment(SegmentModel):
@@ -432,9 +458,9 @@ class BSplineSegment(MovingSegment):
     bspline: BSplineCurve
 
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
-        """See `SegmentModel.start_place`."""
+        """Return the first control point; None where the curve is relative."""
         first = self.bspline.control_points[0]
-        if self.bspline.relative or not of_poses or len(first) != _POSE_COLUMNS:
+        if self.bspline.relative or not of_poses or not self.bspline.has_quaternions:
             return None if self.bspline.relative else first
         length = math.hypot(*first[_POSITIONS:]) or 1.0
         turn = [number / length for number in first[_POSITIONS:]]
@@ -443,18 +469,15 @@ class BSplineSegment(MovingSegment):
         )
 
     @model_validator(mode="after")
-    def _one_word_on_orientation(self) -> BSplineSegment:
-        if (
-            self.orientation is not None
-            and len(self.bspline.control_points[0]) == _POSE_COLUMNS
-        ):
-            problem = "the curve's quaternions say already how the tool turns"
-            raise refuse(
-                problem,
-                key=".orientation",
-                allowed="orientation or control points with quaternions, not both",
+    def _one_word_on_orientation(self) -> Self:
+        return self.check(
+            (
+                self.orientation is not None and self.bspline.has_quaternions,
+                "orientation",
+                "the curve's quaternions say already how the tool turns",
+                "orientation or control points with quaternions, not both",
             )
-        return self
+        )
 
 
 class CsvSegment(MovingSegment):
@@ -464,25 +487,13 @@ class CsvSegment(MovingSegment):
 
 
 Segment = Annotated[
-    Annotated[LineSegment, Tag("<LineSegment>")]
-    | Annotated[ArcSegment, Tag("<ArcSegment>")]
-    | Annotated[CircleSegment, Tag("<CircleSegment>")]
-    | Annotated[HelixSegment, Tag("<HelixSegment>")]
-    | Annotated[SplineSegment, Tag("<SplineSegment>")]
-    | Annotated[BSplineSegment, Tag("<BSplineSegment>")]
-    | Annotated[TurnSegment, Tag("<TurnSegment>")]
-    | Annotated[CsvSegment, Tag("<CsvSegment>")],
-    by_key(
-        "a segment needs exactly one kind",
-        {
-            "LineSegment": ("line",),
-            "ArcSegment": ("arc",),
-            "CircleSegment": ("circle",),
-            "HelixSegment": ("helix",),
-            "SplineSegment": ("spline",),
-            "BSplineSegment": ("bspline",),
-            "TurnSegment": ("turn",),
-            "CsvSegment": ("csv",),
-        },
-    ),
+    LineSegment
+    | ArcSegment
+    | CircleSegment
+    | HelixSegment
+    | SplineSegment
+    | BSplineSegment
+    | TurnSegment
+    | CsvSegment,
+    ByKey("a segment needs exactly one kind"),
 ]

@@ -91,9 +91,11 @@ def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
     try:
         return float(text) * _UNITS[node.tag]
     except ValueError:
-        problem = f"{node.tag} stands before a number, and not before {text!r}"
         raise yaml.constructor.ConstructorError(
-            None, None, problem, node.start_mark
+            None,
+            None,
+            f"{node.tag} stands before a number, and not before {text!r}",
+            node.start_mark,
         ) from None
 
 
@@ -131,5 +133,4 @@ def read_yaml(text: str, source: str) -> object:
     except _BROKEN as error:
         where = source
         message = (str(error) or type(error).__name__).splitlines()[0]
-    problem = f"not valid YAML: {message}"
-    raise TaskError(problem, where=where)
+    raise TaskError(f"not valid YAML: {message}", where=where)

@@ -13,20 +13,19 @@ from pydantic import (
     AfterValidator,
     Field,
     JsonValue,
-    Tag,
     field_validator,
     model_validator,
 )
 
 from brachis.errors import TaskError
 from brachis.task.fields import (
+    ByForm,
+    ByKey,
     Count,
     Model,
     Name,
     Number,
     Positive,
-    by_form,
-    by_key,
     refuse,
 )
 
@@ -69,16 +68,9 @@ class Logarithmic(Model):
         return np.geomspace(*self.logarithmic).tolist()
 
 
-_SPACED = {"Linear": ("linear",), "Logarithmic": ("logarithmic",)}
 GridValues = Annotated[
-    Annotated[_Values, Tag("<list>")]
-    | Annotated[
-        Annotated[Linear, Tag("<Linear>")]
-        | Annotated[Logarithmic, Tag("<Logarithmic>")],
-        by_key("values are spaced in one way", _SPACED),
-        Tag("<mapping>"),
-    ],
-    by_form(
+    _Values | Annotated[Linear | Logarithmic, ByKey("values are spaced in one way")],
+    ByForm(
         "a list of values, {linear: [first, last, count]} or {logarithmic: [first, last, count]}"
     ),
 ]
@@ -132,18 +124,9 @@ class Choice(Model):
         ]
 
 
-_DISTRIBUTIONS = {
-    "Uniform": ("uniform",),
-    "LogUniform": ("log_uniform",),
-    "Normal": ("normal",),
-    "Choice": ("choice",),
-}
 Distribution = Annotated[
-    Annotated[Uniform, Tag("<Uniform>")]
-    | Annotated[LogUniform, Tag("<LogUniform>")]
-    | Annotated[Normal, Tag("<Normal>")]
-    | Annotated[Choice, Tag("<Choice>")],
-    by_key("a distribution has one of these keys", _DISTRIBUTIONS),
+    Uniform | LogUniform | Normal | Choice,
+    ByKey("a distribution has one of these keys"),
 ]
 
 

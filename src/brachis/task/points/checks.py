@@ -30,20 +30,17 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
     turned = angles_between(points.turning[again], points.turning[again - 1])
     if np.any(turned > SAME):
         i = int(again[np.argmax(turned > SAME)])
-        problem = f"the position stands still from {points.name_row(i - 1)} on while the tool turns"
-        hint = "A path that stops and turns on the spot is for segments of its own: csv, turn, csv"
         raise points.wrong(
             i,
-            problem,
+            f"the position stands still from {points.name_row(i - 1)} on while the tool turns",
             found=points.describe(i),
             allowed="a motion of the position",
-            hint=hint,
+            hint="A path that stops and turns on the spot is for segments of its own: csv, turn, csv",
         )
     kept = points.only(np.setdiff1d(np.arange(len(points)), again))
     if len(kept) < 2:
-        problem = "the position does not move"
         raise TaskError(
-            problem,
+            "the position does not move",
             found=f"{len(points)} times the same",
             allowed="a motion",
             where=points.source,
@@ -74,11 +71,12 @@ def refuse_repetitions(points: Points) -> None:
         steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
     if np.any(steps < SAME):
         i = 1 + int(np.argmax(steps < SAME))
-        problem = f"the row repeats {points.name_row(i - 1)}"
-        allowed = f"rows that differ from their predecessors in {'orientation' if still else 'position'}"
-        hint = "With a tolerance repeated rows are left out"
         raise points.wrong(
-            i, problem, found=points.describe(i), allowed=allowed, hint=hint
+            i,
+            f"the row repeats {points.name_row(i - 1)}",
+            found=points.describe(i),
+            allowed=f"rows that differ from their predecessors in {'orientation' if still else 'position'}",
+            hint="With a tolerance repeated rows are left out",
         )
 
 
@@ -112,16 +110,13 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
     allowed = np.maximum(4.0 * usual, max(15.0 * scatter.deviation, 2.0 * tolerance))
     i = int(np.argmax(off / allowed))
     if off[i] > allowed[i]:
-        problem = "the point is a spike, far off its neighbours"
         away = f"{1e3 * off[i]:.4g} mm off the line between its neighbours; points are {1e3 * usual[i]:.3g} mm apart"
-        found = f"{points.describe(i + 1)}, {away}"
-        hint = "Correct or remove the row"
         raise points.wrong(
             i + 1,
-            problem,
-            found=found,
+            "the point is a spike, far off its neighbours",
+            found=f"{points.describe(i + 1)}, {away}",
             allowed=f"at most {1e3 * allowed[i]:.3g} mm",
-            hint=hint,
+            hint="Correct or remove the row",
         )
 
 
@@ -150,11 +145,13 @@ def _refuse_factors(points: Points) -> None:
         small, large = (one, other) if ratios[i] > 1.0 else (other, one)
         if np.linalg.norm(large / 1e3 - small) < 0.1 * np.linalg.norm(small):
             word = "larger" if ratios[i] > 1.0 else "smaller"
-            problem = f"the coordinates are a thousand times {word} than in {points.name_row(i)}"
-            hint = "mm and m, or a lost decimal point? Write all rows in one unit"
-            found = points.describe(i + 1)
-            allowed = f"near {points.describe(i)}"
-            raise points.wrong(i + 1, problem, found=found, allowed=allowed, hint=hint)
+            raise points.wrong(
+                i + 1,
+                f"the coordinates are a thousand times {word} than in {points.name_row(i)}",
+                found=points.describe(i + 1),
+                allowed=f"near {points.describe(i)}",
+                hint="mm and m, or a lost decimal point? Write all rows in one unit",
+            )
 
 
 def _list_rows(points: Points, indices: np.ndarray) -> str:

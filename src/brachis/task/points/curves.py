@@ -89,15 +89,12 @@ def fit_between(
     """
     for sharp in corners:
         if sharp.angle > _SHARPEST:
-            problem = f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees"
-            found = points.describe(sharp.index)
-            hint = "A path that stops there is for two tasks"
             raise points.wrong(
                 sharp.index,
-                problem,
-                found=found,
+                f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees",
+                found=points.describe(sharp.index),
                 allowed="corners up to 150 degrees",
-                hint=hint,
+                hint="A path that stops there is for two tasks",
             )
     starts = [None, *corners]
     ends = [*corners, None]
@@ -141,11 +138,12 @@ def _measure_deviations(
         i = int(np.argmax(found))
         # `deviations` may overestimate by a thousandth of the tolerance and by 1e-8.
         if found[i] > allowed * (1.0 + 1e-3) + 1e-8:
-            problem = "the fitted curve does not pass the points within the tolerance"
-            hint = "Raise the tolerance, or cut the path into several"
-            away = f"{points.describe(i)}, {found[i] / per:.4g} {unit} off"
             raise points.wrong(
-                i, problem, found=away, allowed=f"{allowed / per:.4g} {unit}", hint=hint
+                i,
+                "the fitted curve does not pass the points within the tolerance",
+                found=f"{points.describe(i)}, {found[i] / per:.4g} {unit} off",
+                allowed=f"{allowed / per:.4g} {unit}",
+                hint="Raise the tolerance, or cut the path into several",
             )
     return distances, angles
 
@@ -170,15 +168,12 @@ def blend_between(
     )
     left = tolerance.corner - taken
     if left < 0.05 * tolerance.corner:
-        problem = f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance"
-        found = f"points {1e3 * taken:.3g} mm from the fit at {corner_at}"
-        hint = "Give a larger tolerance.corner"
         raise wrong(
             -1,
-            problem,
-            found=found,
+            f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance",
+            found=f"points {1e3 * taken:.3g} mm from the fit at {corner_at}",
             allowed=f"{1e3 * tolerance.corner:.3g} mm",
-            hint=hint,
+            hint="Give a larger tolerance.corner",
         )
     return blend_size(corner.angle, left, shortest)
 
@@ -195,15 +190,12 @@ def _fit_one(
     try:
         fit = fit_points(points, tolerance, scatter)
     except ValueError as error:
-        problem = "no smooth curve follows these points"
-        allowed = "points that move on from each to the next"
-        hint = doubt or "Does the path turn back, or stand still, near there?"
         raise points.wrong(
             0,
-            problem,
+            "no smooth curve follows these points",
             found=f"{error}, from {points.describe(0)}",
-            allowed=allowed,
-            hint=hint,
+            allowed="points that move on from each to the next",
+            hint=doubt or "Does the path turn back, or stand still, near there?",
         ) from error
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
@@ -227,10 +219,9 @@ def _fit_one(
             else ""
         )
         hint = f"The data are {scatter}{more}" if scatter.deviation else hint
-    problem = f"no smooth curve is within the tolerance of {'orientation' if of_turning else 'position'}"
     raise points.wrong(
         i,
-        problem,
+        f"no smooth curve is within the tolerance of {'orientation' if of_turning else 'position'}",
         found=f"{found} at {points.describe(i)}",
         allowed=allowed,
         hint=doubt or hint,
@@ -422,12 +413,12 @@ def check_interpolation(points: Points, told: tuple[str, ...] = ()) -> FitReport
     refuse_spikes(points, scatter, 0.0)
     length = float(np.linalg.norm(np.diff(points.position, axis=0), axis=1).sum())
     if scatter.curvature * length > _ROUGH:
-        problem = "the points are too rough for a curve through all of them: its curvature would be noise"
-        hint = f"Give a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}"
-        found = f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves"
-        allowed = f"less than {_ROUGH / length:.2g} 1/m"
         raise TaskError(
-            problem, found=found, allowed=allowed, where=points.source, hint=hint
+            "the points are too rough for a curve through all of them: its curvature would be noise",
+            found=f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves",
+            allowed=f"less than {_ROUGH / length:.2g} 1/m",
+            where=points.source,
+            hint=f"Give a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}",
         )
     return FitReport(
         source=points.source,

@@ -9,54 +9,59 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from math import acos, atan2, ceil, cos, hypot, pi, sin, sqrt
+from math import acos, atan2, ceil, hypot, pi, sqrt
 from typing import Final
 
 import numpy as np
 
 from brachis.errors import TaskError, write_count
-from brachis.task.points.points import Points
+from brachis.task.points.points import Array, Points
 from brachis.task.points.tables import POSITION
 
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _COMMENT = re.compile(r"\([^)]*\)|;.*$|%")
-_MOTIONS: Final = {"0", "1", "2", "3"}
-_PLANES: Final = {"17": (0, 1, 2), "18": (2, 0, 1), "19": (1, 2, 0)}
-"""Of an arc, the axes of its plane, then the one along its normal."""
+_PLANES: Final = {"17": [0, 1, 2], "18": [2, 0, 1], "19": [1, 2, 0]}
+"""Axes of the plane of arcs, then the one along its normal, by G code."""
 _UNITS: Final = {"20": 0.0254, "21": 1e-3}
 _IGNORED: Final = {"40", "49", "61", "64", "80", "91.1", "94"}
 _OFFSETS: Final = {"54", "55", "56", "57", "58", "59"}
-_ENDS: Final = {"2", "30"}
-_CALLS: Final = {"97", "98", "99"}
 _PIECES = 4
+"""Fewest points on a move."""
 _ROUND = 2e-3
 """How much the radii of an arc at its start and end may differ, as a fraction of it."""
 
 
 @dataclass
 class _Machine:
-    """What the words so far have set."""
+    """What the words so far have set; `at` has NaN where an axis has not been stated yet."""
 
+    source: str
+    at: Array
+    line: int = 0
     motion: str | None = None
-    plane: tuple[int, int, int] = _PLANES["17"]
+    plane: list[int] = field(default_factory=lambda: _PLANES["17"])
     unit: float = 1e-3
     unit_stated: bool = False
     offset: str = "54"
     ended: bool = False
     absolute: bool = True
     feed: float = float("nan")
-    at: list[float | None] = field(default_factory=lambda: [None, None, None])
     skipped: set[str] = field(default_factory=set)
-    points: list[tuple[float, float, float]] = field(default_factory=list)
+    points: list[Array] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
+
+    def wrong(self, problem: str, found: str, allowed: str) -> TaskError:
+        """Return the error that the line is wrong."""
+        where = f"{self.source}: line {self.line}"
+        return TaskError(problem, found=found, allowed=allowed, where=where)
 
 
 def read_gcode(
     text: str, rows: tuple[str, ...] | str, source: str
 ) -> tuple[Points, tuple[str, ...]]:
-    """Return the points of a program, and what was skipped.
+    """Return the points of a program, and notes on what was skipped.
 
     Parameters
     ----------
@@ -80,26 +85,25 @@ def read_gcode(
             allowed="x, y, z",
             where=source,
         )
-    machine = _Machine(at=[None if name in names else 0.0 for name in POSITION])
+    unknown = [float("nan") if name in names else 0.0 for name in POSITION]
+    machine = _Machine(source, np.array(unknown))
     for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
-        code = _COMMENT.sub("", line.upper()).strip()
-        if code:
-            _block(machine, code, f"{source}: line {number}", number)
+        machine.line = number
+        _obey(machine, _COMMENT.sub("", line.upper()).strip())
         if machine.ended:
             break
     if len(machine.points) < 2:
-        never = [
+        missing = [
             name.upper()
             for name, place in zip(POSITION, machine.at, strict=True)
-            if place is None
+            if np.isnan(place)
         ]
-        hint = f"{', '.join(never)} is never stated" if never else None
         raise TaskError(
             "no motion",
             found=write_count(len(machine.points), "place"),
             allowed="2 or more",
             where=source,
-            hint=hint,
+            hint=f"{', '.join(missing)} is never stated" if missing else None,
         )
     chosen = [POSITION.index(name) for name in names]
     speed = np.array(machine.speeds)
@@ -110,78 +114,62 @@ def read_gcode(
         np.array(machine.lines),
         source,
     )
-    told = (f"skipped {', '.join(sorted(machine.skipped))}",) if machine.skipped else ()
-    unit = (
-        ()
-        if machine.unit_stated
-        else ("millimetres, as neither G20 nor G21 says otherwise",)
-    )
-    return points, ("G-code", *unit, *told)
+    notes = ["G-code"]
+    if not machine.unit_stated:
+        notes.append("millimetres, as neither G20 nor G21 says otherwise")
+    if machine.skipped:
+        notes.append(f"skipped {', '.join(sorted(machine.skipped))}")
+    return points, tuple(notes)
 
 
-def _block(machine: _Machine, code: str, where: str, number: int) -> None:
-    """Obey one line."""
-    words = _WORD.findall(code)
+def _obey(machine: _Machine, code: str) -> None:
+    """Obey one line, without its comments."""
     rest = _WORD.sub("", code).strip()
     if rest:
-        raise TaskError(
-            "not understood",
-            found=repr(rest[:40]),
-            allowed="G-code words, such as G1 X10 F600",
-            where=where,
+        raise machine.wrong(
+            "not understood", repr(rest[:40]), "G-code words, such as G1 X10 F600"
         )
     values: dict[str, float] = {}
-    for letter, text in words:
+    for letter, text in _WORD.findall(code):
         if letter == "G":
-            _mode(machine, _plain(text), where)
+            _set_mode(machine, f"{float(text):g}")
         elif letter in "XYZIJKRF":
             values[letter] = float(text)
         elif letter in "ABCUVW":
-            problem = "axes other than X, Y, Z are not read"
-            raise TaskError(
-                problem,
-                found=letter + text,
-                allowed="X, Y, Z, I, J, K, R, F",
-                where=where,
+            raise machine.wrong(
+                "axes other than X, Y, Z are not read",
+                letter + text,
+                "X, Y, Z, I, J, K, R, F",
             )
         elif letter == "M":
-            _miscellaneous(machine, _plain(text), where)
+            _switch(machine, f"{float(text):g}")
         elif letter != "N":
             machine.skipped.add(letter)
     if "F" in values:
-        _feed(machine, values["F"], where)
-    if any(axis in values for axis in "XYZIJKR"):
-        _move(machine, values, where, number)
+        _set_feed(machine, values.pop("F"))
+    if values:
+        _move(machine, values)
 
 
-def _plain(text: str) -> str:
-    """Write a code without needless zeros."""
-    return f"{float(text):g}"
+def _set_feed(machine: _Machine, feed: float) -> None:
+    if not feed > 0.0:
+        raise machine.wrong("a feed rate must be positive", f"F{feed:g}", "more than 0")
+    machine.feed = feed * machine.unit / 60.0
 
 
-def _feed(machine: _Machine, value: float, where: str) -> None:
-    machine.feed = value * machine.unit / 60.0
-    if not machine.feed > 0.0:
-        raise TaskError(
-            "a feed rate must be positive",
-            found=f"F{value:g}",
-            allowed="more than 0",
-            where=where,
+def _switch(machine: _Machine, code: str) -> None:
+    """Obey a miscellaneous function, such as M30."""
+    if code in {"97", "98", "99"}:
+        raise machine.wrong(
+            "subprograms are not read", f"M{code}", "a program without calls"
         )
-
-
-def _miscellaneous(machine: _Machine, code: str, where: str) -> None:
-    if code in _CALLS:
-        problem = "subprograms are not read"
-        raise TaskError(
-            problem, found=f"M{code}", allowed="a program without calls", where=where
-        )
-    machine.ended = code in _ENDS
+    machine.ended = code in {"2", "30"}
     machine.skipped.add(f"M{code}")
 
 
-def _mode(machine: _Machine, code: str, where: str) -> None:
-    if code in _MOTIONS:
+def _set_mode(machine: _Machine, code: str) -> None:
+    """Obey a preparatory function, such as G1."""
+    if code in {"0", "1", "2", "3"}:
         machine.motion = code
     elif code in _PLANES:
         machine.plane = _PLANES[code]
@@ -192,133 +180,105 @@ def _mode(machine: _Machine, code: str, where: str) -> None:
         machine.absolute = code == "90"
     elif code in _OFFSETS:
         if machine.points and machine.offset != code:
-            problem = "the work offset changes within the program: where the tool goes is not known"
-            raise TaskError(
-                problem, found=f"G{code}", allowed="one work offset", where=where
+            raise machine.wrong(
+                "the work offset changes within the program: where the tool goes is not known",
+                f"G{code}",
+                "one work offset",
             )
         machine.offset = code
         machine.skipped.add(f"G{code}")
     elif code in _IGNORED:
         machine.skipped.add(f"G{code}")
     else:
-        allowed = (
-            "G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94"
-        )
-        raise TaskError(
-            "this code is not read", found=f"G{code}", allowed=allowed, where=where
+        raise machine.wrong(
+            "this code is not read",
+            f"G{code}",
+            "G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94",
         )
 
 
-def _move(machine: _Machine, values: dict[str, float], where: str, number: int) -> None:
+def _move(machine: _Machine, values: dict[str, float]) -> None:
     """Go on to the place that a line names."""
     start = machine.at
-    end = list(machine.at)
+    end = start.copy()
     for i, axis in enumerate("XYZ"):
         if axis in values:
-            base = 0.0 if machine.absolute else start[i] or 0.0
+            base = 0.0 if machine.absolute else np.nan_to_num(start[i])
             end[i] = base + values[axis] * machine.unit
     if machine.motion is None:
-        raise TaskError(
-            "a move before G0, G1, G2 or G3",
-            found="coordinates",
-            allowed="a motion first",
-            where=where,
+        raise machine.wrong(
+            "a move before G0, G1, G2 or G3", "coordinates", "a motion first"
         )
     machine.at = end
-    if None in end:
+    if np.isnan(end).any():
         return
-    speed = float("nan") if machine.motion == "0" else machine.feed
-    if None in start:
-        places = [end]
+    if np.isnan(start).any():
+        places = end[None]
     elif machine.motion in {"0", "1"}:
-        places = _line(start, end)
+        length = float(np.linalg.norm(end - start))
+        count = max(_PIECES, ceil(length / max(1e-3, length / 200.0))) if length else 0
+        places = start + _shares(count) * (end - start)
     else:
-        places = _arc(machine, start, end, values, where)
-    for x, y, z in places:
-        machine.points.append((x, y, z))  # type: ignore[arg-type]
-        machine.speeds.append(speed)
-        machine.lines.append(number)
+        places = _arc(machine, start, end, values)
+    machine.points.extend(places)
+    speed = float("nan") if machine.motion == "0" else machine.feed
+    machine.speeds.extend([speed] * len(places))
+    machine.lines.extend([machine.line] * len(places))
 
 
-def _line(
-    start: list[float | None], end: list[float | None]
-) -> list[list[float | None]]:
-    one = np.array(start, dtype=float)
-    other = np.array(end, dtype=float)
-    length = float(np.linalg.norm(other - one))
-    count = max(_PIECES, ceil(length / max(1e-3, length / 200.0))) if length else 0
-    return [list(one + (other - one) * (k / count)) for k in range(1, count + 1)]
+def _shares(count: int) -> Array:
+    """Return the ends of the parts of a move, (count, 1), from 0 to 1."""
+    return (np.arange(1, count + 1) / max(count, 1))[:, None]
 
 
 def _arc(
-    machine: _Machine,
-    start: list[float | None],
-    end: list[float | None],
-    values: dict[str, float],
-    where: str,
-) -> list[list[float | None]]:
-    one = np.array(start, dtype=float)
-    other = np.array(end, dtype=float)
-    a, b, c = machine.plane
+    machine: _Machine, start: Array, end: Array, values: dict[str, float]
+) -> Array:
+    """Return places on an arc, (k, 3)."""
+    *plane, normal = machine.plane
+    one = start[plane]
+    other = end[plane]
     clockwise = machine.motion == "2"
     if "R" in values:
-        centre = _centre(
-            one[[a, b]],
-            other[[a, b]],
-            values["R"] * machine.unit,
-            clockwise=clockwise,
-            where=where,
-        )
+        centre = _centre(machine, one, other, values["R"] * machine.unit)
     else:
-        offsets = [values.get("IJK"[axis], 0.0) * machine.unit for axis in (a, b)]
-        centre = one[[a, b]] + offsets
-    radius = hypot(*(one[[a, b]] - centre))
-    at_end = hypot(*(other[[a, b]] - centre))
+        offsets = [values.get("IJK"[axis], 0.0) * machine.unit for axis in plane]
+        centre = one + offsets
+    radius = hypot(*(one - centre))
+    at_end = hypot(*(other - centre))
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
-        found = f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end"
-        raise TaskError(
+        raise machine.wrong(
             "invalid arc: its start and end are at different radii",
-            found=found,
-            allowed="one radius; I, J, K from the start",
-            where=where,
+            f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end",
+            "one radius; I, J, K from the start",
         )
-    first = atan2(one[b] - centre[1], one[a] - centre[0])
-    swept = (atan2(other[b] - centre[1], other[a] - centre[0]) - first) % (2.0 * pi)
+    first, last = (atan2(*(point - centre)[::-1]) for point in (one, other))
+    swept = (last - first) % (2.0 * pi)
     if clockwise:
         swept -= 2.0 * pi
     if abs(abs(swept) - 2.0 * pi) < 1e-9 or abs(swept) < 1e-9:
         swept = -2.0 * pi if clockwise else 2.0 * pi
     count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - 1e-6 / radius, 0.5)))))
-    places = []
-    for k in range(1, count + 1):
-        share = k / count
-        place = other.copy()
-        place[a] = centre[0] + (radius + (at_end - radius) * share) * cos(
-            first + swept * share
-        )
-        place[b] = centre[1] + (radius + (at_end - radius) * share) * sin(
-            first + swept * share
-        )
-        place[c] = one[c] + (other[c] - one[c]) * share
-        places.append(list(place))
+    shares = _shares(count)
+    angle = first + swept * shares
+    radii = radius + (at_end - radius) * shares
+    places = np.empty((count, 3))
+    places[:, plane] = centre + radii * np.hstack([np.cos(angle), np.sin(angle)])
+    places[:, [normal]] = start[normal] + (end[normal] - start[normal]) * shares
     return places
 
 
-def _centre(
-    one: np.ndarray, other: np.ndarray, radius: float, *, clockwise: bool, where: str
-) -> np.ndarray:
+def _centre(machine: _Machine, one: Array, other: Array, radius: float) -> Array:
     """Return the centre, (2,), of an arc of given radius; a negative one is that of more than half a turn."""
     chord = other - one
     length = hypot(*chord)
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
-        found = f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart"
-        raise TaskError(
+        raise machine.wrong(
             "invalid arc: no circle of this radius passes both ends",
-            found=found,
-            allowed="ends at most 2 R apart, and not the same",
-            where=where,
+            f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart",
+            "ends at most 2 R apart, and not the same",
         )
     away = sqrt(max(radius**2 - length**2 / 4.0, 0.0))
     left = np.array([-chord[1], chord[0]]) / length
-    side = -1.0 if clockwise != (radius < 0.0) else 1.0
+    side = -1.0 if (machine.motion == "2") != (radius < 0.0) else 1.0
     return np.asarray((one + other) / 2.0 + side * away * left)

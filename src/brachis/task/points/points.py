@@ -141,13 +141,10 @@ def points_from(
         orientations = values[:, :3, :3]
         values = values[:, :3, 3]
     if values.ndim != 2 or not 1 <= values.shape[1] <= 3 or len(values) < least:
-        allowed = (
-            f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
-        )
         raise TaskError(
             "points of the wrong shape",
             found=values.shape,
-            allowed=allowed,
+            allowed=f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more",
             where=source,
         )
     turning = (
@@ -223,8 +220,12 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     problem = "orientations of the wrong shape"
     if values.shape[1:] == (QUATERNION,):
         problem = "an array of quaternions does not say whether w is first or last"
-    allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
-    raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
+    raise TaskError(
+        problem,
+        found=values.shape,
+        allowed="SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw",
+        where=where,
+    )
 
 
 def _array(values: Any, where: str, source: str) -> Array:

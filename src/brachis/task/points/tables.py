@@ -118,8 +118,10 @@ def _cells(
         for (number, _), cells in zip(lines, reader, strict=False):
             yield number, [cell.strip() for cell in cells]
     except csv.Error as error:
-        where = f"{source}: line {lines[reader.line_num - 1][0]}"
-        raise TaskError(f"not a CSV file: {error}", where=where) from None
+        raise TaskError(
+            f"not a CSV file: {error}",
+            where=f"{source}: line {lines[reader.line_num - 1][0]}",
+        ) from None
 
 
 def _numbers(
@@ -144,27 +146,27 @@ def _refuse(
     for number, cells in rows:
         where = f"{source}: line {number}"
         if len(cells) != len(header):
-            problem = "wrong number of values"
-            hint = (
-                "Decimal commas need columns separated by semicolons or tabs"
-                if len(cells) > len(header)
-                else None
-            )
-            allowed = f"{len(header)}: {', '.join(header)}"
             raise TaskError(
-                problem, found=len(cells), allowed=allowed, where=where, hint=hint
+                "wrong number of values",
+                found=len(cells),
+                allowed=f"{len(header)}: {', '.join(header)}",
+                where=where,
+                hint="Decimal commas need columns separated by semicolons or tabs"
+                if len(cells) > len(header)
+                else None,
             )
         for column, cell in zip(header, cells, strict=True):
             value = _number(cell)
             if not math.isfinite(value):
-                problem = f"the value of column {column} is not a finite number"
                 raise TaskError(
-                    problem, found=repr(cell), allowed="a number", where=where
+                    f"the value of column {column} is not a finite number",
+                    found=repr(cell),
+                    allowed="a number",
+                    where=where,
                 )
             if abs(value) > LARGEST:
-                problem = f"the value of column {column} is out of range"
                 raise TaskError(
-                    problem,
+                    f"the value of column {column} is out of range",
                     found=repr(cell),
                     allowed=f"{-LARGEST:g} to {LARGEST:g}",
                     where=where,
@@ -183,13 +185,11 @@ def _refuse_points_and_commas(lines: list[tuple[int, str]], source: str) -> None
     """Refuse numbers with both: one of them would separate thousands, and nobody knows which."""
     for number, line in lines:
         if "," in line and "." in line:
-            problem = "decimal points and commas in one line"
-            hint = "Write numbers without separators of thousands"
             raise TaskError(
-                problem,
+                "decimal points and commas in one line",
                 found=repr(line.strip()[:60]),
                 where=f"{source}: line {number}",
-                hint=hint,
+                hint="Write numbers without separators of thousands",
             )
 
 
@@ -277,15 +277,11 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
     if stated is None and len(possible) < 2:
         return possible[0] if possible else None
     if stated is None:
-        problem = (
-            f"the columns {', '.join(columns)} do not say how the orientation is meant"
-        )
-        hint = "State it in the task, csv: {file: ..., orientation: ...}; another choice gives another motion"
         raise TaskError(
-            problem,
+            f"the columns {', '.join(columns)} do not say how the orientation is meant",
             allowed=f"csv.orientation: {choices(possible)}",
             where=where,
-            hint=hint,
+            hint="State it in the task, csv: {file: ..., orientation: ...}; another choice gives another motion",
         )
     if stated not in possible:
         usual = [
@@ -293,17 +289,15 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
             for each, conventions in _ORIENTATIONS.items()
             if stated in conventions
         ]
-        problem = (
-            f"csv.orientation is {stated}, which the columns of the file do not have"
-        )
-        found = ", ".join(names)
-        allowed = f"columns {' | '.join(usual)} for {stated}"
-        hint = (
-            f"Or csv.orientation: {choices(possible)}"
+        raise TaskError(
+            f"csv.orientation is {stated}, which the columns of the file do not have",
+            found=", ".join(names),
+            allowed=f"columns {' | '.join(usual)} for {stated}",
+            where=where,
+            hint=f"Or csv.orientation: {choices(possible)}"
             if possible
-            else "Leave csv.orientation away"
+            else "Leave csv.orientation away",
         )
-        raise TaskError(problem, found=found, allowed=allowed, where=where, hint=hint)
     return stated
 
 
@@ -340,11 +334,21 @@ def points_of(
 
     def column(name: str, kind: str, factors: dict[str, float]) -> Array:
         index, unit = headings[name]
-        default = None if kind == "angle" and need_angle else getattr(_DEFAULTS, kind)
         return (
             table.values[:, index]
             * factors[
-                _unit(name, unit, kind, factors, units, default, in_header, where)
+                _unit(
+                    name,
+                    unit,
+                    kind,
+                    factors,
+                    units,
+                    None
+                    if kind == "angle" and need_angle
+                    else getattr(_DEFAULTS, kind),
+                    in_header,
+                    where,
+                )
             ]
         )
 
@@ -423,12 +427,11 @@ def _unit(
         return unit
     if asked is None and default is None:
         usual = {"speed": "mm/min", "angle": "deg"}[kind]
-        hint = f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task"
         raise TaskError(
             f"the unit of {name} is not stated",
             allowed=", ".join(factors),
             where=where,
-            hint=hint,
+            hint=f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task",
         )
     return str(asked or default)
 
@@ -439,13 +442,11 @@ def _quaternions(values: Array, convention: str, table: Table, source: str) -> A
     off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
     if quaternions and np.any(off > _UNIT_LENGTH):
         i = int(np.argmax(off > _UNIT_LENGTH))
-        problem = f"the quaternion's length is {np.linalg.norm(values[i]):.6g}"
-        where = f"{source}: line {table.lines[i]}"
         raise TaskError(
-            problem,
+            f"the quaternion's length is {np.linalg.norm(values[i]):.6g}",
             found=values[i].tolist(),
             allowed="a quaternion of length 1",
-            where=where,
+            where=f"{source}: line {table.lines[i]}",
         )
     return with_like_signs(
         np.roll(rotation_by(convention, values).as_quat(), 1, axis=1)
@@ -458,7 +459,9 @@ def _check_speeds(points: Points) -> None:
     wrong = np.flatnonzero(points.speed <= 0.0)
     if wrong.size:
         i = int(wrong[0])
-        problem = "a feed rate must be positive"
         raise points.wrong(
-            i, problem, found=f"{points.speed[i]:g} m/s", allowed="more than 0"
+            i,
+            "a feed rate must be positive",
+            found=f"{points.speed[i]:g} m/s",
+            allowed="more than 0",
         )

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import PathError
+from brachis.path.protocol import Array, Curve
 from brachis.robot.task_map.protocol import position_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from brachis.path.protocol import Array, Curve
 
 ZERO_LENGTH = 1e-9
 """Lengths (m) and angles (rad) below are rounding of the start posture's coordinates, not a motion."""
 
 
 @dataclass(frozen=True, eq=False)
-class Site:
-    """Place of one segment.
+class SegmentContext:
+    """What the builder of a segment's curve knows beside the segment itself.
 
     Attributes
     ----------
@@ -53,15 +49,6 @@ class Site:
         """The start in the position rows."""
         return self.start[: len(self.positions)]
 
-    @property
-    def has_yaw(self) -> bool:
-        """Whether yaw is a row of the task space."""
-        return "yaw" in self.rows
-
-    def describe(self) -> str:
-        """Return the start in words."""
-        return place(self.rows, self.start)
-
     def coordinates(
         self, values: Sequence[float], key: str, rows: Sequence[str]
     ) -> Array:
@@ -73,42 +60,50 @@ class Site:
             The number of values differs.
         """
         if len(values) != len(rows):
-            problem = "wrong number of coordinates"
-            raise PathError(
-                problem,
+            raise self.wrong(
+                "wrong number of coordinates",
+                f".{key}",
                 found=f"{len(values)}: {list(values)}",
                 allowed=f"{len(rows)}: [{', '.join(rows)}]",
-                where=f"{self.key}.{key}",
             )
         return np.asarray(values, dtype=float)
 
-    def need_plane(self, what: str, counts: tuple[int, ...] = (2, 3)) -> None:
-        """Refuse a form of segment that the number of position rows does not allow.
+    def need_rows(self, what: str, *counts: int) -> None:
+        """Refuse a form of segment for which the task space has another number of position rows than `counts`.
 
         Raises
         ------
         PathError
-            The task space has another number of position rows than `counts`.
         """
         if len(self.positions) not in counts:
-            problem = f"{what} needs {' or '.join(map(str, counts))} position rows"
-            raise PathError(
-                problem,
+            raise self.wrong(
+                f"{what} needs {' or '.join(map(str, counts))} position rows",
                 found=f"the position rows [{', '.join(self.positions)}]",
-                where=self.key,
                 hint="Use line: {to: [...]}, line: {by: [...]} or a spline",
             )
 
-    def zero_length(self, *, key: str, found: object) -> PathError:
+    def zero_length(self, key: str, found: object) -> PathError:
         """Return the error that the segment has zero length."""
-        problem = "the segment has zero length"
-        return PathError(
-            problem,
+        return self.wrong(
+            "the segment has zero length",
+            key,
             found=found,
             allowed="a motion away from the segment's start",
-            where=f"{self.key}{key}",
             hint=self.to_turn,
         )
+
+    def wrong(
+        self,
+        problem: str,
+        key: str = "",
+        *,
+        found: object = None,
+        allowed: object = None,
+        hint: str | None = None,
+    ) -> PathError:
+        """Return the error that a key of the segment, such as ``.normal``, is wrong."""
+        where = f"{self.key}{key}"
+        return PathError(problem, found=found, allowed=allowed, where=where, hint=hint)
 
 
 def place(rows: Sequence[str], point: Array) -> str:
