@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
-from brachis.apps.plots.motion import dense_samples, joint_lines
-from brachis.apps.plots.overview import draw_holding
+from brachis.apps.plots.motion import draw_holding, lines_of
 from brachis.apps.plots.postures import (
     add_posture_axes,
     draw_postures,
@@ -72,7 +72,7 @@ def frames(
     ax: Any = add_posture_axes(figure, trajectory, grid[0])
     draw_postures(ax, trajectory, samples)
     panels = draw_holding(figure, grid[1], trajectory, samples)
-    lines = joint_lines(panels, trajectory)
+    lines = lines_of(panels, trajectory)
     style.legend_below(figure, _WIDTH - 10.0, lines)
     view = list(plane_of(trajectory) or (0, 1, 2))
     bones = skeleton(trajectory.robot, trajectory.position(times)).bones[:, :, view]

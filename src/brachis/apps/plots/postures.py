@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
-from brachis.apps.plots.motion import dense_samples
 from brachis.robot import Robot, task_map_of
 from brachis.trajectory import Samples, Trajectory, of_motion
 

@@ -18,9 +18,10 @@ from lxml import etree
 
 from brachis.common.files import mesh_file
 from brachis.errors import InputError
-from brachis.robot import Robot
+from brachis.path import path_of
+from brachis.robot import Robot, task_map_of
 from brachis.robot.urdf_elements import Element, read_tree
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
     import trimesh
@@ -414,3 +415,58 @@ def _block(size: float, colour: tuple[int, ...]) -> list[trimesh.Trimesh]:
     import trimesh
 
     return [with_colour(trimesh.creation.box((size, size, size)), colour)]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A trajectory at even times.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    samples : Samples
+        At K times from start to end.
+    frames : Placements
+        At the same times.
+    path : (K, 3) ndarray
+        The prescribed path at the motion's own s, m; what it does not prescribe is the tool's.
+    ghosts : Placements
+        At a few even times from start to end.
+    """
+
+    trajectory: Trajectory
+    samples: Samples
+    frames: Placements
+    path: np.ndarray
+    ghosts: Placements
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> Motion:
+        """Evaluate a trajectory."""
+        samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
+        frames = placements(trajectory.robot, samples.q)
+        ghosts = placements(
+            trajectory.robot,
+            trajectory.position(np.linspace(0.0, trajectory.t_end, 6)),
+        )
+        return cls(
+            trajectory,
+            samples,
+            frames,
+            _path(trajectory, samples.s, frames.tool),
+            ghosts,
+        )
+
+
+def _path(trajectory: Trajectory, s: np.ndarray, tool: np.ndarray) -> np.ndarray:
+    """Positions that the task prescribes, (K, 3), m."""
+    task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
+    axes = list(task_map.axes)
+    points = tool.copy()
+    if axes:
+        points[:, axes] = (
+            path_of(task_map, trajectory.task)
+            .sample(np.clip(s, 0.0, 1.0))
+            .target[:, : len(axes)]
+        )
+    return points

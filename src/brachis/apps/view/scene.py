@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.apps.plots.postures import drawing_plane
-from brachis.apps.view.bodies import Bodies, Placements, placements
-from brachis.apps.view.curves import Motion
+from brachis.apps.view.bodies import Bodies, Motion, Placements, placements
 from brachis.robot import task_map_of
 
 if TYPE_CHECKING:

@@ -11,9 +11,8 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from brachis.apps.view.bodies import bodies_of
-from brachis.apps.view.curves import Motion
-from brachis.apps.view.panel import Panel, Playback, first_rate
+from brachis.apps.view.bodies import Motion, bodies_of
+from brachis.apps.view.panel import Controls, Playback, first_rate
 from brachis.apps.view.scene import Scene
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
 from brachis.common import interrupts
@@ -104,7 +103,7 @@ class Viewer:
         self._lock = threading.RLock()
         self._scene = Scene(self._server, motion, bodies)
         notes = [f"not shown: {reason}" for reason in bodies.unread]
-        self._panel = Panel(
+        self._panel = Controls(
             self._server,
             motion,
             self._scene,
