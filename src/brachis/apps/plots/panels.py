@@ -148,6 +148,8 @@ class Row:
         Title and symbol for prismatic joints if they differ.
     ratio_title : str
         Title of the values over their limits if it is not ``... / limit``.
+    ranges : callable or None
+        Of the robot's limits: lower and upper ends of ranges, (2, n), whose middle uses nothing of them.
     only_if_limited : bool
         Whether the row is of interest only if the robot limits it.
     unit : str or None
@@ -162,6 +164,7 @@ class Row:
     symbol: str
     prismatic: tuple[str, str] | None = None
     ratio_title: str = ""
+    ranges: Callable[[Limits], np.ndarray] | None = None
     only_if_limited: bool = False
     unit: str | None = None
     largest: Callable[[Trajectory, Samples], np.ndarray] | None = None
@@ -178,7 +181,10 @@ def _allowed_tool_speed(trajectory: Trajectory, samples: Samples) -> np.ndarray:
 
 PANELS = {
     "position": Row(
-        lambda _, samples: samples.q, "$q$", ratio_title="position in its range"
+        lambda _, samples: samples.q,
+        "$q$",
+        ratio_title="position in its range",
+        ranges=lambda limits: np.array([limits.position_lower, limits.position_upper]),
     ),
     "velocity": Row(lambda _, samples: samples.qdot, r"$\dot{q}$"),
     "acceleration": Row(lambda _, samples: samples.qddot, r"$\ddot{q}$"),
@@ -270,7 +276,7 @@ def _joint_panels(
     robot = trajectory.robot
     lower, upper = _limits_of(robot.limits, name)
     middle = np.zeros(robot.n)
-    if name == "position":
+    if row.ranges:
         is_range = np.isfinite(lower) & np.isfinite(upper)
         middle[is_range] = 0.5 * lower[is_range] + 0.5 * upper[is_range]
     values = row.values(trajectory, samples)
@@ -302,9 +308,8 @@ def _joint_panels(
 
 def _limits_of(limits: Limits, name: str) -> np.ndarray:
     """Lower and upper limits of a row of joints, (2, n)."""
-    if name == "position":
-        return np.array([limits.position_lower, limits.position_upper])
-    return limits.both_ways(name)
+    ranges = PANELS[name].ranges
+    return ranges(limits) if ranges else limits.both_ways(name)
 
 
 def select_joint(parts: Sequence[Panel], name: str) -> list[Panel]:
