@@ -20,7 +20,6 @@ from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import draw_holding, lines_of
 from brachis.apps.plots.postures import (
-    add_posture_axes,
     draw_postures,
     plane_of,
     skeleton,
@@ -69,13 +68,12 @@ def frames(
     canvas: Any = FigureCanvasAgg(figure)
     grid = figure.add_gridspec(1, 2)
     samples = dense_samples(trajectory)
-    ax: Any = add_posture_axes(figure, trajectory, grid[0])
-    draw_postures(ax, trajectory, samples)
+    ax: Any = draw_postures(figure, trajectory, samples, grid[0])
     panels = draw_holding(figure, grid[1], trajectory, samples)
     lines = lines_of(panels, trajectory)
     style.legend_below(figure, _WIDTH - 10.0, lines)
     view = list(plane_of(trajectory) or (0, 1, 2))
-    bones = skeleton(trajectory.robot, trajectory.position(times)).bones[:, :, view]
+    bones = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
     look = {"color": "black", "animated": True}
     (links,) = ax.plot(
         *bones[0].T,

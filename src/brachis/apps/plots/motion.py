@@ -22,7 +22,7 @@ from brachis.apps.plots.panels import (
     titles_of,
     torque_panels,
 )
-from brachis.apps.plots.postures import add_posture_axes, draw_postures, legend_postures
+from brachis.apps.plots.postures import draw_postures, legend_postures
 from brachis.limits import Limit
 from brachis.trajectory import Samples, Trajectory, of_motion
 
@@ -130,8 +130,7 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     heights = [74.0, *(1.2 * _height(panel) for panel in columns[0])]
     figure = style.new_figure(style.PAGE_WIDTH, sum(heights) + 11.0)
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
-    postures = add_posture_axes(figure, trajectory, grid[0, 0])
-    draw_postures(postures, trajectory, samples)
+    postures = draw_postures(figure, trajectory, samples, grid[0, 0])
     legend_postures(postures, trajectory, 0.5 * style.PAGE_WIDTH - 10.0)
     draw_holding(figure, grid[0, 1], trajectory, samples)
     joints = []

@@ -231,7 +231,7 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         "t": encode(samples.t),
         "s": encode(samples.s),
         "speed": encode(samples.tool_speed),
-        "bones": encode(skeleton(robot, samples.q).bones),
+        "bones": encode(skeleton(robot, samples.q)),
         "plane": plane_of(trajectory),
         "joints": joints,
         "kinds": rows,

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.plots.postures import drawing_plane
+from brachis.apps.plots.postures import plane_of
 from brachis.apps.view.bodies import Bodies, Motion, Placements, placements
-from brachis.robot import task_map_of
 
 if TYPE_CHECKING:
     import viser
@@ -237,8 +236,7 @@ class Scene:
     def _direction(self) -> np.ndarray:
         """Return the unit vector from the scene to the camera, (3,)."""
         trajectory = self._motion.trajectory
-        axes = task_map_of(self._robot, trajectory.task.task_space).axes
-        plane = drawing_plane(self._robot, trajectory.q[0], axes)
+        plane = plane_of(trajectory)
         if plane is None:
             base = self._motion.frames.positions[:, 1].mean(axis=0)
             tool = self._motion.frames.tool.mean(axis=0)
