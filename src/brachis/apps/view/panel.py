@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,34 +75,17 @@ class Chart:
 
     def __init__(self, gui: viser.GuiApi, panel: Panel) -> None:
         self._t_end = float(panel.t[-1])
-        hidden: uplot.Series_Points = {"show": False}
-        series: list[uplot.Series] = [{"label": "time (s)"}]
         data = [panel.t]
+        series: list[uplot.Series] = [{"label": "time (s)"}]
         for limit, _ in panel.near_limits():
             data.append(np.broadcast_to(limit, panel.t.shape))
-            series.append(
-                {
-                    "label": "limit",
-                    "stroke": style.GREY,
-                    "width": 1.0,
-                    "dash": (5.0, 4.0),
-                    "points": hidden,
-                }
-            )
+            series.append(_series("limit", style.GREY, 1.0, (5.0, 4.0)))
         for name, number, values in zip(
             panel.names, panel.styles.tolist(), panel.values.T, strict=True
         ):
             colour, dash = look(number)
             data.append(values)
-            series.append(
-                {
-                    "label": name,
-                    "stroke": colour,
-                    "width": 1.6,
-                    "dash": dash,
-                    "points": hidden,
-                }
-            )
+            series.append(_series(name, colour, 1.6, dash))
         gui.add_html(_heading(panel))
         gui.add_uplot(
             tuple(data),
@@ -127,6 +111,19 @@ class Chart:
     def mark(self, t: float) -> None:
         """Draw the line at time `t`, s."""
         self._line.content = _line(t / self._t_end)
+
+
+def _series(
+    label: str, colour: str, width: float, dash: tuple[float, ...]
+) -> uplot.Series:
+    """Describe a line without points."""
+    return {
+        "label": label,
+        "stroke": colour,
+        "width": width,
+        "dash": dash,
+        "points": {"show": False},
+    }
 
 
 def _line(part: float) -> str:
@@ -173,15 +170,11 @@ def _heading(panel: Panel) -> str:
 
 RATES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 """Speeds at which a motion can be played, as parts of the real one."""
-_WATCHED = 3.0
-"""Least time that a motion is played in at first, s."""
-_PAUSE = 0.7
-"""How long the end is shown before a motion begins again, s."""
 
 
 def first_rate(t_end: float) -> float:
-    """Return the largest of `RATES`, at most the real one, at which a motion of `t_end` s can be watched."""
-    slow = [rate for rate in RATES if rate <= 1.0 and t_end / rate >= _WATCHED]
+    """Return the largest of `RATES`, no more than the real one, at which a motion of `t_end` s takes 3 s or more."""
+    slow = [rate for rate in RATES if rate <= 1.0 and t_end / rate >= 3.0]
     return max(slow, default=RATES[0])
 
 
@@ -224,7 +217,7 @@ class Playback:
             self.playing = False
             return self.time
         self._waited += elapsed
-        if self.loops or self._waited >= _PAUSE:
+        if self.loops or self._waited >= 0.7:  # s
             self.time = 0.0
         return self.time
 
@@ -253,7 +246,7 @@ class Controls:
     show : callable
         Called when the user has chosen another instant.
     candidates : sequence of mapping
-        What the search looked at, as `Attempt.to_dict` gives it.
+        What the search looked at, as `Candidate.to_dict` gives it.
     notes : sequence of str
         What else the user should know.
     verified : bool or None
@@ -324,18 +317,14 @@ class Controls:
         self._button = self._gui.add_button("Pause")
         self._button.on_click(self._toggle)
         self._rates = {f"{rate:g} x real time": rate for rate in RATES}
-        current = next(
-            name for name, rate in self._rates.items() if rate == self._playback.rate
-        )
-        self._gui.add_dropdown(
-            "speed", tuple(self._rates), initial_value=current
-        ).on_update(self._set_rate)
-        self._gui.add_checkbox("again and again", self._playback.repeats).on_update(
-            self._set_repeats
-        )
-        self._gui.add_button(
-            "Download the report", hint="The motion as one HTML page"
-        ).on_click(self._send_report)
+        rate = f"{self._playback.rate:g} x real time"
+        rates = self._gui.add_dropdown("speed", tuple(self._rates), initial_value=rate)
+        rates.on_update(self._set_rate)
+        repeats = self._gui.add_checkbox("again and again", self._playback.repeats)
+        repeats.on_update(self._set_repeats)
+        hint = "The motion as one HTML page"
+        download = self._gui.add_button("Download the report", hint=hint)
+        download.on_click(self._send_report)
 
     def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         """Show what the user chose with the slider, and stay there."""
@@ -362,7 +351,7 @@ class Controls:
         try:
             page = make_report(self._motion.trajectory, degrees=self._degrees)
         except BrachisError as error:
-            event.client.add_notification("There is no report", str(error))
+            event.client.add_notification("The report cannot be made", str(error))
             return
         event.client.send_file_download(
             "report.html", page.content, save_immediately=True
@@ -376,7 +365,7 @@ class Controls:
             for name, handles in scene.layers.items():
                 if handles:
                     box = self._gui.add_checkbox(name, handles[0].visible)
-                    box.on_update(_switch(scene, name))
+                    box.on_update(partial(_switch, scene, name))
 
     def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> list[Chart]:
         """Add a panel with the plots and the list of candidates."""
@@ -401,11 +390,7 @@ class Controls:
 
 
 def _switch(
-    scene: Scene, name: str
-) -> Callable[[viser.GuiEvent[viser.GuiCheckboxHandle]], None]:
-    """Return what shows or hides a layer."""
-
-    def switch(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
-        scene.set_visible(name, visible=event.target.value)
-
-    return switch
+    scene: Scene, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]
+) -> None:
+    """Show or hide a layer of the scene."""
+    scene.set_visible(name, visible=event.target.value)
