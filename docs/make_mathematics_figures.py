@@ -45,9 +45,7 @@ def self_motion() -> Figure:
         for k, bend in enumerate(q_r):
             if np.isnan(q_nr[k, branch]).any():
                 continue
-            bones = skeleton(robot, np.array([[*q_nr[k, branch], bend]])).bones[
-                0, :, :2
-            ]
+            bones = skeleton(robot, np.array([[*q_nr[k, branch], bend]]))[0, :, :2]
             shade = (k / (POSTURES - 1), 0.35, 1.0 - k / (POSTURES - 1))
             ax.plot(
                 *bones.T,

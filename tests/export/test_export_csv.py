@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from brachis.apps.export import export_csv
+from brachis import export
 from brachis.errors import InputError
 
 HEADER = "t,q_j1,q_j2,q_j3,qd_j1,qd_j2,qd_j3,qdd_j1,qdd_j2,qdd_j3,tau_j1,tau_j2,tau_j3"
@@ -15,7 +15,7 @@ DT = 0.004
 @pytest.fixture(scope="module")
 def table(line_trajectory, tmp_path_factory):
     path = tmp_path_factory.mktemp("csv") / "motion.csv"
-    export_csv(line_trajectory, path, DT)
+    export.write(line_trajectory, path, dt=DT)
     return path
 
 
@@ -58,7 +58,7 @@ def test_joint_names_with_commas_stay_one_column(
     line_trajectory, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(type(line_trajectory), "joint_names", ("a,b", 'c"d', "e"))
-    export_csv(line_trajectory, tmp_path / "motion.csv", 0.5)
+    export.write(line_trajectory, tmp_path / "motion.csv", dt=0.5)
     with (tmp_path / "motion.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.reader(stream))
     assert rows[0][1:4] == ["q_a,b", 'q_c"d', "q_e"]
@@ -68,7 +68,7 @@ def test_joint_names_with_commas_stay_one_column(
 def test_a_missing_folder_is_named(line_trajectory, tmp_path):
     path = tmp_path / "nowhere" / "motion.csv"
     with pytest.raises(InputError, match="No such file") as caught:
-        export_csv(line_trajectory, path, DT)
+        export.write(line_trajectory, path, dt=DT)
     assert caught.value.where == str(path)
     assert caught.value.exit_code == 2
 
@@ -78,18 +78,18 @@ def test_an_unusable_period_leaves_the_old_file(line_trajectory, tmp_path, dt):
     path = tmp_path / "motion.csv"
     path.write_text("old")
     with pytest.raises(InputError, match="period"):
-        export_csv(line_trajectory, path, dt)
+        export.write(line_trajectory, path, dt=dt)
     assert path.read_text() == "old"
 
 
 TOO_LARGE = """
 import resource, sys
 from brachis import InputError, Trajectory
-from brachis.apps.export import export_csv
+from brachis import export
 trajectory = Trajectory.load(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.RLIM_INFINITY))
 try:
-    export_csv(trajectory, sys.argv[2], 0.004)
+    export.write(trajectory, sys.argv[2], dt=0.004)
 except InputError as error:
     print(error)
 """

@@ -117,14 +117,14 @@ def test_postures_in_space_fill_their_frame_and_nothing_is_cut_off(spatial_traje
 
 def test_a_prismatic_joint_is_drawn_from_its_rest_to_where_it_is(spatial_trajectory):
     q = spatial_trajectory.q[-1:]
-    figures = skeleton(spatial_trajectory.robot, q)
+    bones = skeleton(spatial_trajectory.robot, q)
     np.testing.assert_allclose(
-        figures.bones[0, :3],
+        bones[0, :3],
         [[0.0, 0.0, 0.0], [0.0, 0.0, 0.2], [0.0, q[0, 0], 0.2]],
         atol=1e-12,
     )
-    np.testing.assert_allclose(figures.joints[0, 0], [0.0, q[0, 0], 0.2], atol=1e-12)
-    assert figures.bones.shape == (1, 16, 3)
+    np.testing.assert_allclose(bones[0, 2], [0.0, q[0, 0], 0.2], atol=1e-12)
+    assert bones.shape == (1, 16, 3)
 
 
 TURN = {axis: ("revolute", axis, "0.5 0 0.1") for axis in ("1 0 0", "0 1 0", "0 0 1")}

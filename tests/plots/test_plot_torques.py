@@ -121,7 +121,8 @@ def test_torques_are_measured_by_the_limit_of_their_direction(
     trajectory = with_limits(line_trajectory, torque_lower=lower, torque_upper=upper)
     t, ratio = lines(plot_torques(trajectory).axes[0])["j1"].get_data()
     tau = trajectory.torque(t)[:, 0]
-    np.testing.assert_allclose(ratio, np.where(tau > 0.0, tau / 10.0, tau / 20.0))
+    expected = np.where(tau > 0.0, tau / 10.0, tau / 20.0)
+    np.testing.assert_allclose(ratio, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])

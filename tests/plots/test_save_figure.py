@@ -8,7 +8,14 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from brachis.apps.plots import PLOTS, SUFFIXES, plot_torques, save_figure, style
+from brachis.apps.plots import (
+    PLOTS,
+    SUFFIXES,
+    plot_motion,
+    plot_torques,
+    save_figure,
+    style,
+)
 from brachis.errors import InputError
 
 MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
@@ -118,7 +125,7 @@ def test_joints_are_told_apart():
 
 def test_a_dollar_in_a_joint_name_is_no_mathematics(line_trajectory, monkeypatch):
     monkeypatch.setattr(type(line_trajectory), "joint_names", ("a$\\x", "b$", "c"))
-    figure = plot_torques(line_trajectory)
+    figure = plot_motion(line_trajectory)
     figure.draw_without_rendering()
     assert figure.axes[0].get_lines()[0].get_label() == r"a\$\x"
 

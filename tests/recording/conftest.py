@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis.apps.export import export_csv
+from brachis import export
 from brachis.apps.recording import import_motion
 from brachis.planner import plan
 from support.effort import QUICK
@@ -39,7 +39,7 @@ def table(motion):
 @pytest.fixture(scope="package")
 def file(motion, tmp_path_factory):
     path = tmp_path_factory.mktemp("today") / "today.csv"
-    export_csv(motion, path, DT)
+    export.write(motion, path, dt=DT)
     return path
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis import Trajectory, verify_trajectory
-from brachis.apps.export import export_csv
+from brachis import Trajectory, export, verify_trajectory
 from support.effort import QUICK
 from support.spatial import START, rail_arm
 
@@ -72,7 +71,7 @@ def test_saved_motions_come_back(motion, tmp_path):
     again = Trajectory.load(tmp_path / "motion.npz")
     assert again.joint_names == motion.joint_names
     assert verify_trajectory(again).passed
-    export_csv(again, tmp_path / "motion.csv", 0.01)
+    export.write(again, tmp_path / "motion.csv", dt=0.01)
     assert "q_j7" in (tmp_path / "motion.csv").read_text().splitlines()[0]
 
 

@@ -39,8 +39,8 @@ def test_a_rail_is_part_of_what_stands_still_and_the_arm_is_not(motion_of):
     bodies = bodies_of(motion_of(Robot.from_urdf(tx90l)))
     assert bodies.shows_links
     assert set(bodies.links) == set(range(8))
-    assert bodies.upper[1] - bodies.lower[1] > 4.0
-    assert bodies.moving_upper[1] - bodies.moving_lower[1] < 2.0
+    assert bodies.box[1][1] - bodies.box[0][1] > 4.0
+    assert bodies.moving_box[1][1] - bodies.moving_box[0][1] < 2.0
 
 
 def test_a_robot_without_shapes_gets_a_skeleton_from_base_to_tool(
@@ -67,8 +67,8 @@ def test_the_box_holds_every_robot(urdf, motion_of):
     vertices = np.vstack(
         list(placed(bodies.links, placements(motion.robot, motion.q[:1])).values())
     )
-    assert (vertices >= bodies.lower - 1e-9).all()
-    assert (vertices <= bodies.upper + 1e-9).all()
+    assert (vertices >= bodies.box[0] - 1e-9).all()
+    assert (vertices <= bodies.box[1] + 1e-9).all()
 
 
 @pytest.mark.skipif(PANDA is None, reason="example-robot-data is not installed")

@@ -84,7 +84,8 @@ def test_a_port_that_somebody_takes_in_between_is_refused_as_well(server, monkey
 @pytest.mark.parametrize("port", [-1, 65536])
 def test_what_is_no_port_is_refused(port):
     with pytest.raises(
-        InputError, match=rf"--port: is no port; found {port}; allowed: 0 to 65535"
+        InputError,
+        match=rf"--port: the port does not exist; found {port}; allowed: 0 to 65535",
     ):
         start_server(LOOPBACK, port)
 

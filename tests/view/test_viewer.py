@@ -157,7 +157,7 @@ def test_the_report_button_sends_the_page_to_whoever_asks(
     assert f"{line_result.t_end:.4f} s" in page
     monkeypatch.setitem(sys.modules, "jinja2", None)
     shown._panel._send_report(SimpleNamespace(client=Client()))
-    assert told == [("There is no report", ANY)]
+    assert told == [("The report cannot be made", ANY)]
     assert "Jinja2" in told[0][1]
 
 

@@ -12,9 +12,7 @@ from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.robot import bind
-from brachis.trajectory import Trajectory
-
-_POINTS_PER_INTERVAL = 40
+from brachis.trajectory import Samples, Trajectory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +39,20 @@ class LimitRatios(Summary):
         freeze(self, "t", "values")
 
 
+def knot_times(trajectory: Trajectory) -> np.ndarray:
+    """Return the times of the knots of the splines from 0 to t_end, (N + 1,), s."""
+    return np.unique(trajectory.knots) * trajectory.t_end
+
+
+def dense_samples(trajectory: Trajectory, per_interval: int = 16) -> Samples:
+    """Evaluate the trajectory at its knots, at its nodes and at some points in every knot interval."""
+    knots = knot_times(trajectory)
+    steps = np.arange(per_interval) / per_interval
+    grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
+    times = np.union1d(grid, trajectory.times)
+    return trajectory.at(np.clip(times, 0.0, trajectory.t_end))
+
+
 def limit_ratios(
     trajectory: Trajectory, limits: Sequence[Limit] | None = None
 ) -> LimitRatios:
@@ -59,12 +71,7 @@ def limit_ratios(
     if limits is None:
         robot, _ = bind(trajectory.robot, trajectory.task.task_space)
         limits = limits_of(robot, trajectory.task)
-    knots = np.unique(trajectory.knots) * trajectory.t_end
-    steps = np.arange(_POINTS_PER_INTERVAL) / _POINTS_PER_INTERVAL
-    grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
-    samples = trajectory.at(
-        np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end)
-    )
+    samples = dense_samples(trajectory, 40)
     behind = (
         samples.t,
         samples.q,
@@ -75,15 +82,16 @@ def limit_ratios(
     )
     before = _just_before(trajectory)
     jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
-    if trajectory.degree <= max(limit.order for limit in limits):
-        jumps[:-1] |= np.isin(trajectory.times[1:-1], knots)
+    if trajectory.degree <= max((limit.order for limit in limits), default=0):
+        jumps[:-1] |= np.isin(trajectory.times[1:-1], knot_times(trajectory))
     t, *motion = (
         np.concatenate([first[jumps], then])
         for first, then in zip(before, behind, strict=True)
     )
     order = np.argsort(t, kind="stable")
     moments = Moments(*(part[order] for part in motion))
-    values = [limit.ratios(moments, t[order]) for limit in limits]
+    values = [np.empty((len(order), 0))]
+    values += [limit.ratios(moments, t[order]) for limit in limits]
     return LimitRatios(
         t[order],
         tuple(label for limit in limits for label in limit.labels),
@@ -144,6 +152,11 @@ class Saturation(Summary):
     share: float
     peak: float
     active: tuple[ActiveInterval, ...]
+
+    @property
+    def is_half_used(self) -> bool:
+        """Whether the motion ever uses more than half of the limit; others are not drawn."""
+        return self.peak > 0.5
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""

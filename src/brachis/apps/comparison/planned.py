@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.apps.bottleneck import limit_ratios
+from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.comparison.comparison import Comparison, bound_ratios
 from brachis.apps.plots import style
-from brachis.apps.plots.motion import dense_samples
 from brachis.apps.recording import import_motion
 from brachis.common.arguments import check_callable, check_keywords, file_name
 from brachis.common.progress import Listener

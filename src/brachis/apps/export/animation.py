@@ -6,38 +6,31 @@ here only what moves is drawn anew, and a GIF has one palette.
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
-from brachis.apps.plots.motion import dense_samples, joint_lines
-from brachis.apps.plots.overview import draw_holding
+from brachis.apps.plots.motion import draw_holding, lines_of
 from brachis.apps.plots.postures import (
-    add_posture_axes,
     draw_postures,
     plane_of,
     skeleton,
 )
-from brachis.common.files import atomic_write
 from brachis.errors import InputError
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-DPI = 100
-_WIDTH = 183.0
-_HEIGHT = 88.0
-"""mm."""
-MOST = 5000
-"""Frames."""
 
 
 def frame_times(trajectory: Trajectory, dt: float) -> np.ndarray:
@@ -64,18 +57,17 @@ def frames(
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure = style.new_figure(_WIDTH, _HEIGHT)
-    figure.set_dpi(DPI)
+    figure = style.new_figure(style.PAGE_WIDTH, 88.0)
+    figure.set_dpi(100)
     canvas: Any = FigureCanvasAgg(figure)
     grid = figure.add_gridspec(1, 2)
     samples = dense_samples(trajectory)
-    ax: Any = add_posture_axes(figure, trajectory, grid[0])
-    draw_postures(ax, trajectory, samples)
+    ax: Any = draw_postures(figure, trajectory, samples, grid[0])
     panels = draw_holding(figure, grid[1], trajectory, samples)
-    lines = joint_lines(panels, trajectory)
-    style.legend_below(figure, _WIDTH - 10.0, lines)
+    lines = lines_of(panels, trajectory)
+    style.legend_below(figure, style.PAGE_WIDTH - 10.0, lines)
     view = list(plane_of(trajectory) or (0, 1, 2))
-    bones = skeleton(trajectory.robot, trajectory.position(times)).bones[:, :, view]
+    bones = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
     look = {"color": "black", "animated": True}
     (links,) = ax.plot(
         *bones[0].T,
@@ -115,14 +107,29 @@ def frames(
         yield figure, np.asarray(canvas.buffer_rgba())
 
 
-def pictures(
+@dataclass(frozen=True, eq=False)
+class Film:
+    """Pictures of a motion.
+
+    Attributes
+    ----------
+    pictures : iterator of (height, width, 3) uint8 ndarray
+    period : float
+        For which each is shown, s.
+    """
+
+    pictures: Iterator[np.ndarray]
+    period: float
+
+
+def film_of(
     trajectory: Trajectory,
     dt: float,
     step: float,
     joints: Sequence[str] | None,
     slower: float,
-) -> Iterator[np.ndarray]:
-    """Yield pictures, (height, width, 3) uint8, of a motion.
+) -> Film:
+    """Make a film of a motion.
 
     Parameters
     ----------
@@ -153,131 +160,80 @@ def pictures(
             found=slower,
             allowed="> 0: 10 is ten times slower",
         )
-    usable = np.isfinite(dt) and dt > 0.0 and slower * trajectory.t_end / dt < MOST
+    most = 5000
+    usable = np.isfinite(dt) and dt > 0.0 and slower * trajectory.t_end / dt < most
     if not usable or abs(dt / step - round(dt / step)) > 1e-6:
-        allowed = f"a multiple of {step:g} s, for at most {MOST} pictures"
         raise InputError(
             "cannot be the period of an animation",
             where="dt",
             found=f"{dt} s",
-            allowed=allowed,
+            allowed=f"a multiple of {step:g} s, for at most {most} pictures",
         )
-    for _, pixels in frames(trajectory, frame_times(trajectory, dt / slower), slower):
-        yield pixels[:, :, :3].copy()
+    found = frames(trajectory, frame_times(trajectory, dt / slower), slower)
+    return Film((pixels[:, :, :3].copy() for _, pixels in found), dt)
 
 
-_STEP = 0.01
-"""s: GIF counts time in hundredths of a second."""
-_COLOURS = 128
-_PAUSE = 1.0
-"""For which the last picture stands, s."""
-
-
-def export_gif(
-    trajectory: Trajectory,
-    path: str | os.PathLike[str],
-    dt: float,
-    *,
-    last: str = "exact",  # noqa: ARG001  (the last picture is the end posture either way)
-    joints: Sequence[str] | None = None,
-    slower: float = 1.0,
-) -> None:
-    """Write the motion, again and again; see `brachis.export.write` for the parameters.
-
-    Raises
-    ------
-    InputError
-        `dt` is not a multiple of 0.01 s, or `joints` are named.
-    """
+def write_gif(film: Film, stream: BinaryIO) -> None:
+    """Write a film that is shown again and again; the last picture stands for 1 s."""
     from PIL import Image
 
-    images = [
-        Image.fromarray(each)
-        for each in pictures(trajectory, dt, _STEP, joints, slower)
-    ]
-    palette = images[len(images) // 2].quantize(_COLOURS)
+    images = [Image.fromarray(picture) for picture in film.pictures]
+    palette = images[len(images) // 2].quantize(128)
     first, *others = (
         image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images
     )
-    period = round(1e3 * dt)
-    durations = [*[period] * len(others), round(1e3 * _PAUSE)]
-    with atomic_write(path) as stream:
-        first.save(
-            stream,
-            format="GIF",
-            save_all=True,
-            append_images=others,
-            duration=durations,
-            loop=0,
-            optimize=True,
-        )
+    first.save(
+        stream,
+        format="GIF",
+        save_all=True,
+        append_images=others,
+        duration=[*[round(1e3 * film.period)] * len(others), 1000],
+        loop=0,
+        optimize=True,
+    )
 
 
-_STEP_MP4 = 1e-3
-_PROGRAM = "ffmpeg"
-
-
-def export_mp4(
-    trajectory: Trajectory,
-    path: str | os.PathLike[str],
-    dt: float,
-    *,
-    last: str = "exact",  # noqa: ARG001  (the last picture is the end posture either way)
-    joints: Sequence[str] | None = None,
-    slower: float = 1.0,
-) -> None:
-    """Write the motion; see `brachis.export.write` for the parameters.
+def write_mp4(film: Film, stream: BinaryIO) -> None:
+    """Let ffmpeg write a film.
 
     Raises
     ------
     InputError
-        There is no ffmpeg, it cannot encode, `dt` is not a multiple of 1 ms, or `joints` are named.
+        There is no ffmpeg, or it cannot encode.
     """
-    program = shutil.which(_PROGRAM)
+    program = shutil.which("ffmpeg")
     if program is None:
         raise InputError(
             "an MP4 file needs ffmpeg, which is not installed",
             hint="Install ffmpeg, or write a GIF",
         )
-    with tempfile.TemporaryDirectory(prefix="brachis-") as folder:
-        film = (
-            Path(folder) / "film.mp4"
-        )  # a file with a name: MP4 is not written from its beginning to its end
-        _encode(program, pictures(trajectory, dt, _STEP_MP4, joints, slower), dt, film)
-        with atomic_write(path) as stream:
-            stream.write(film.read_bytes())
-
-
-def _encode(
-    program: str, all_pictures: Iterator[np.ndarray], dt: float, film: Path
-) -> None:
-    """Let ffmpeg make a film of pictures."""
-    first = next(all_pictures)
-    height, width = (
-        first.shape[0] // 2 * 2,
-        first.shape[1] // 2 * 2,
-    )  # H.264 halves the colours' resolution
-    given = (
-        f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * dt)} -i -"
-    )
-    made = "-an -pix_fmt yuv420p -movflags +faststart"
-    with tempfile.TemporaryFile() as told:
+    first = next(film.pictures)
+    # H.264 halves the colours' resolution, so that width and height are even.
+    height, width = (2 * (size // 2) for size in first.shape[:2])
+    source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * film.period)} -i -"
+    target = "-an -pix_fmt yuv420p -movflags +faststart"
+    with (
+        tempfile.TemporaryDirectory(prefix="brachis-") as folder,
+        tempfile.TemporaryFile() as messages,
+    ):
+        # A file with a name: MP4 is not written from its beginning to its end.
+        file = Path(folder) / "film.mp4"
+        arguments = f"-v error -nostdin {source} {target}".split()
         with subprocess.Popen(  # noqa: S603  (no shell, and nothing of the user's in the arguments)
-            [program, "-v", "error", "-nostdin", *given.split(), *made.split(), film],
+            [program, *arguments, file],
             stdin=subprocess.PIPE,
-            stdout=told,
-            stderr=told,
+            stdout=messages,
+            stderr=messages,
         ) as process:
             assert process.stdin is not None
-            try:
-                for picture in (first, *all_pictures):
+            with suppress(BrokenPipeError):  # the messages say more
+                for picture in chain([first], film.pictures):
                     process.stdin.write(picture[:height, :width].tobytes())
                 process.stdin.close()
-            except BrokenPipeError:  # what ffmpeg says tells more
-                pass
         if process.returncode:
-            told.seek(0)
+            messages.seek(0)
             raise InputError(
                 "ffmpeg cannot make the film",
-                found=told.read().decode(errors="replace").strip(),
+                found=messages.read().decode(errors="replace").strip(),
             )
+        stream.write(file.read_bytes())

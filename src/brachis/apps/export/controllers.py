@@ -6,17 +6,13 @@ URScript program gives Universal Robots' arms one ``servoj`` command a period.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 import numpy as np
 import yaml
 
-from brachis.apps.export.rows import JointRows, require_library, rows_of
-from brachis.common.files import atomic_write
+from brachis.apps.export.rows import JointRows, require_library
 from brachis.errors import InputError
-from brachis.trajectory import Trajectory
 
 MESSAGE: Final = "trajectory_msgs/msg/JointTrajectory"
 
@@ -42,85 +38,55 @@ def message_of(rows: JointRows) -> dict[str, Any]:
     return {"header": header, "joint_names": list(rows.joints), "points": points}
 
 
-def export_ros2_yaml(
-    trajectory: Trajectory,
-    path: str | os.PathLike[str],
-    dt: float,
-    *,
-    last: str = "exact",
-    joints: Sequence[str] | None = None,
-) -> None:
-    """Write one message ``trajectory_msgs/msg/JointTrajectory``; see `brachis.export.write` for the parameters."""
-    rows = rows_of(trajectory, dt, last, joints)
+def write_ros2_yaml(rows: JointRows, stream: BinaryIO) -> None:
+    """Write one message ``trajectory_msgs/msg/JointTrajectory``."""
     comments = "".join(f"# {line}\n" for line in (MESSAGE, *rows.left_out))
     message = yaml.safe_dump(
         message_of(rows), sort_keys=False, default_flow_style=None, width=np.inf
     )
-    with atomic_write(path) as stream:
-        stream.write((comments + message).encode())
+    stream.write((comments + message).encode())
 
 
 TOPIC: Final = "/joint_trajectory_controller/joint_trajectory"
 """Where ros2_control's controller listens."""
 
-_SEPARATOR = "\n" + "=" * 80 + "\n"
-_POINT = """MSG: trajectory_msgs/JointTrajectoryPoint
+_DEFINITION = f"\n{'=' * 80}\n".join(
+    (
+        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points",
+        "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id",
+        """MSG: trajectory_msgs/JointTrajectoryPoint
 float64[] positions
 float64[] velocities
 float64[] accelerations
 float64[] effort
-builtin_interfaces/Duration time_from_start"""
-_DEFINITION = _SEPARATOR.join(
-    (
-        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points",
-        "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id",
-        _POINT,
+builtin_interfaces/Duration time_from_start""",
         "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec",
         "MSG: builtin_interfaces/Duration\nint32 sec\nuint32 nanosec",
     )
 )
 
 
-def export_mcap(
-    trajectory: Trajectory,
-    path: str | os.PathLike[str],
-    dt: float,
-    *,
-    last: str = "exact",
-    joints: Sequence[str] | None = None,
-) -> None:
-    """Write a bag with one message on `TOPIC`, at time zero; see `brachis.export.write` for the parameters.
+def write_mcap(rows: JointRows, stream: BinaryIO) -> None:
+    """Write a bag with one message on `TOPIC`, at time zero.
 
     Its metadata ``brachis`` name joints that move and are left out.
     """
     writers = require_library("mcap_ros2.writer", "an MCAP bag")
-    rows = rows_of(trajectory, dt, last, joints)
-    message = message_of(rows)
-    with atomic_write(path) as stream, writers.Writer(stream) as writer:
+    with writers.Writer(stream) as writer:
         schema = writer.register_msgdef(MESSAGE, _DEFINITION)
+        message = message_of(rows)
         writer.write_message(TOPIC, schema, message, log_time=0, publish_time=0)
         writer.add_metadata("brachis", {"left_out": "; ".join(rows.left_out)})
 
 
-_LOOKAHEAD = 0.03
-"""The shortest lookahead time of servoj, s."""
-_GAIN = 300
-"""Proportional gain of servoj, the default of its manual."""
-_NEAR = 0.005
-"""Distance of a joint from the start posture at which the program still begins, rad."""
+_SERVOJ = {"lookahead": 0.03, "gain": 300}
+"""The shortest lookahead time of servoj, s, and its proportional gain, the default of its manual."""
 
 
-def export_urscript(
-    trajectory: Trajectory,
-    path: str | os.PathLike[str],
-    dt: float,
-    *,
-    last: str = "hold",
-    joints: Sequence[str] | None = None,
-) -> None:
-    """Write a program with one ``servoj`` a period; see `brachis.export.write` for the parameters.
+def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
+    """Write a program with one ``servoj`` a period, which leads to its row's posture.
 
-    The program halts with a message where the arm is not at the start posture, and moves nothing then.
+    The program halts with a message if the arm is not at the start posture, and moves nothing then.
 
     Raises
     ------
@@ -128,39 +94,31 @@ def export_urscript(
         There are other joints than six revolute ones; an arm on a rail is written with its six as `joints`, and the
         rail, which its own controller moves at the same time, in another format.
     """
-    rows = rows_of(trajectory, dt, last, joints)
     if rows.units != ("rad",) * 6:
+        named = zip(rows.joints, rows.units, strict=True)
         raise InputError(
             "servoj takes the angles of six joints",
             where="joints",
-            found=", ".join(
-                f"{name} ({unit})"
-                for name, unit in zip(rows.joints, rows.units, strict=True)
-            ),
+            found=", ".join(f"{name} ({unit})" for name, unit in named),
             allowed="six revolute joints, from the base on",
             hint="Name the arm's six as joints, and write others, such as a rail, in another format",
         )
-    with atomic_write(path) as stream:
-        stream.write(("\n".join(_lines(rows, trajectory.t_end)) + "\n").encode())
-
-
-def _lines(rows: JointRows, t_end: float) -> list[str]:
-    """Return the program's lines; a command leads to its row's posture within the period before it."""
     first, *postures = (f"[{', '.join(map(repr, row))}]" for row in rows.q.tolist())
     periods = np.diff(rows.t).round(12).tolist()
+    settings = f"{_SERVOJ['lookahead']}, {_SERVOJ['gain']}"
     moves = [
-        f"  servoj({posture}, 0, 0, {period!r}, {_LOOKAHEAD}, {_GAIN})"
+        f"  servoj({posture}, 0, 0, {period!r}, {settings})"
         for posture, period in zip(postures, periods, strict=True)
     ]
-    return [
+    lines = [
         "def brachis_motion():",
-        f"  # {len(postures)} periods, {t_end:.6g} s; joints {', '.join(rows.joints)}, rad",
+        f"  # {len(postures)} periods, {rows.t_end:.6g} s; joints {', '.join(rows.joints)}, rad",
         *(f"  # {sentence}" for sentence in rows.left_out),
         f"  start = {first}",
         "  now = get_actual_joint_positions()",
         "  i = 0",
         "  while i < 6:",
-        f"    if norm(now[i] - start[i]) > {_NEAR}:",
+        "    if norm(now[i] - start[i]) > 0.005:",
         '      popup("The arm is not at the start posture of the motion", error=True, blocking=True)',
         "      halt",
         "    end",
@@ -169,5 +127,6 @@ def _lines(rows: JointRows, t_end: float) -> list[str]:
         *moves,
         "  stopj(10)",
         "end",
-        "brachis_motion()",
+        "brachis_motion()\n",
     ]
+    stream.write("\n".join(lines).encode())

@@ -3,36 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, BinaryIO
 
-from brachis.apps.export.animation import export_gif, export_mp4
-from brachis.apps.export.controllers import (
-    export_mcap,
-    export_ros2_yaml,
-    export_urscript,
-)
-from brachis.apps.export.tables import export_csv, export_json, export_parquet
+from brachis.apps.export.animation import film_of, write_gif, write_mp4
+from brachis.apps.export.controllers import write_mcap, write_ros2_yaml, write_urscript
+from brachis.apps.export.rows import rows_of
+from brachis.apps.export.tables import write_csv, write_json, write_parquet
+from brachis.common.files import atomic_write
 from brachis.errors import InputError, UnknownNameError
-from brachis.trajectory import Motion, Trajectory, motion_of
-
-
-class Exporter(Protocol):
-    """Writes samples of a trajectory to one file; for the parameters see `write`."""
-
-    def __call__(
-        self,
-        trajectory: Trajectory,
-        path: str | os.PathLike[str],
-        dt: float,
-        *,
-        last: str = ...,
-        joints: Sequence[str] | None = ...,
-    ) -> None:
-        """Write the file."""
-        ...
+from brachis.trajectory import Motion, motion_of
 
 
 @dataclass(frozen=True)
@@ -45,43 +27,41 @@ class Format:
         What it is, in a few words.
     suffix : str
         By which it is known, with the dot.
-    export : Exporter
+    writer : callable
+        Writes `JointRows`, or the `Film` of an animation, to a binary stream.
     dt : float
         Period unless another one is asked for, s.
     last : {"exact", "hold"}
         Last sample unless another one is asked for; see `Trajectory.sample`.
-    animated : bool
-        Whether it shows the motion, which may go slower than it is.
+    step : float or None
+        Of an animation: periods are multiples of it, s.
     """
 
     about: str
     suffix: str
-    export: Exporter
+    writer: Callable[[Any, BinaryIO], None]
     dt: float = 0.001
     last: str = "exact"
-    animated: bool = False
+    step: float | None = None
 
 
 FORMATS: dict[str, Format] = {
-    "csv": Format("table of t, q_, qd_, qdd_, tau_ of every joint", ".csv", export_csv),
-    "parquet": Format("the same table in binary columns", ".parquet", export_parquet),
-    "json": Format("samples, with a schema", ".json", export_json),
+    "csv": Format("table of t, q_, qd_, qdd_, tau_ of every joint", ".csv", write_csv),
+    "parquet": Format("the same table in binary columns", ".parquet", write_parquet),
+    "json": Format("samples, with a schema", ".json", write_json),
     "ros2": Format(
-        "trajectory_msgs/JointTrajectory as YAML", ".yaml", export_ros2_yaml, dt=0.01
+        "trajectory_msgs/JointTrajectory as YAML", ".yaml", write_ros2_yaml, dt=0.01
     ),
     "mcap": Format(
-        "trajectory_msgs/JointTrajectory in an MCAP bag", ".mcap", export_mcap, dt=0.01
+        "trajectory_msgs/JointTrajectory in an MCAP bag", ".mcap", write_mcap, dt=0.01
     ),
     "urscript": Format(
-        "program of servoj commands", ".script", export_urscript, dt=0.002, last="hold"
+        "program of servoj commands", ".script", write_urscript, dt=0.002, last="hold"
     ),
-    "gif": Format("animation", ".gif", export_gif, dt=0.04, animated=True),
+    # GIF counts time in hundredths of a second.
+    "gif": Format("animation", ".gif", write_gif, dt=0.04, step=0.01),
     "mp4": Format(
-        "animation, where ffmpeg is installed",
-        ".mp4",
-        export_mp4,
-        dt=0.04,
-        animated=True,
+        "animation, where ffmpeg is installed", ".mp4", write_mp4, dt=0.04, step=1e-3
     ),
 }
 """Formats by name."""
@@ -162,19 +142,20 @@ def write(
     >>> export.write(trajectory, "motion.parquet", dt=0.004)  # doctest: +SKIP
     """
     chosen = format_of(path, form)
-    if slower != 1.0 and not chosen.animated:
-        allowed = ", ".join(each.suffix for each in FORMATS.values() if each.animated)
+    motion = motion_of(trajectory)
+    period = chosen.dt if dt is None else dt
+    content: object
+    if chosen.step is not None:
+        content = film_of(motion, period, chosen.step, joints, slower)
+    elif slower != 1.0:
+        animations = [each.suffix for each in FORMATS.values() if each.step]
         raise InputError(
             "only animations may be slower",
             where="slower",
             found=slower,
-            allowed=f"1, or {allowed}",
+            allowed=f"1, or {', '.join(animations)}",
         )
-    chosen.export(
-        motion_of(trajectory),
-        path,
-        chosen.dt if dt is None else dt,
-        last=chosen.last if last is None else last,
-        joints=joints,
-        **({"slower": slower} if chosen.animated else {}),
-    )
+    else:
+        content = rows_of(motion, period, last or chosen.last, joints)
+    with atomic_write(path) as stream:
+        chosen.writer(content, stream)

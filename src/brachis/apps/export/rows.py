@@ -15,9 +15,6 @@ from brachis.robot import ROLL_JOINT
 from brachis.trajectory import Trajectory
 from brachis.trajectory.samples import COLUMNS
 
-_STILL = 1e-9
-"""rad or m: a joint that moves less stands still."""
-
 
 class LeftOutWarning(BrachisWarning):
     """A joint that moves is not written to the exported file."""
@@ -35,6 +32,8 @@ class JointRows:
         Of their positions, ``rad`` or ``m``.
     left_out : tuple of str
         A sentence for every joint that moves and is not among `joints`.
+    t_end, dt : float
+        End time and period, s.
     t, s : (K,) ndarray
         s; path coordinate, dimensionless.
     q, qdot, qddot, tau : (K, joints) ndarray
@@ -44,6 +43,8 @@ class JointRows:
     joints: tuple[str, ...]
     units: tuple[str, ...]
     left_out: tuple[str, ...]
+    t_end: float
+    dt: float
     t: np.ndarray
     s: np.ndarray
     q: np.ndarray
@@ -90,40 +91,36 @@ def rows_of(
         A joint that moves is not among them.
     """
     names = trajectory.joint_names
-    chosen = (
-        tuple(name for name in names if name != ROLL_JOINT)
-        if joints is None
-        else tuple(joints)
-    )
+    chosen = [name for name in names if name != ROLL_JOINT]
+    if joints is not None:
+        chosen = list(joints)
     unknown = [name for name in chosen if name not in names]
     if unknown:
         raise UnknownNameError("joint", unknown[0], names, where="joints")
     index = [names.index(name) for name in chosen]
     samples = trajectory.sample(dt, last=last)
-    parts = (getattr(samples, quantity)[:, index] for quantity in COLUMNS.values())
-    units = tuple(trajectory.robot.position_units[each] for each in index)
-    left_out = tuple(
-        _list_missing(trajectory, np.vstack([trajectory.q, samples.q]), chosen)
-    )
+    left_out = []
+    postures = np.vstack([trajectory.q, samples.q])
+    units = trajectory.robot.position_units
+    for joint, unit, q in zip(names, units, postures.T, strict=True):
+        is_still = np.ptp(q) <= 1e-9  # rad or m
+        if is_still or joint in (*chosen, ROLL_JOINT):
+            continue
+        travel = f"{np.ptp(q):.4g} {unit} ({q.min():.4g} to {q.max():.4g} {unit})"
+        left_out.append(f"joint {joint} moves by {travel} and is not in this file")
     if left_out:
         hint = "Move what is missing by its own controller at the same time, or write all joints"
-        warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=4)
-    return JointRows(chosen, units, left_out, samples.t, samples.s, *parts)
-
-
-def _list_missing(
-    trajectory: Trajectory, q: np.ndarray, chosen: Sequence[str]
-) -> Iterator[str]:
-    """Yield a sentence, with its travel over postures (K, n), for every joint that moves and is not written."""
-    lowest = q.min(axis=0)
-    highest = q.max(axis=0)
-    units = trajectory.robot.position_units
-    for joint, unit, low, high in zip(
-        trajectory.joint_names, units, lowest, highest, strict=True
-    ):
-        if joint not in (*chosen, ROLL_JOINT) and high - low > _STILL:
-            travel = f"{high - low:.4g} {unit} ({low:.4g} to {high:.4g} {unit})"
-            yield f"joint {joint} moves by {travel} and is not in this file"
+        warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=3)
+    return JointRows(
+        tuple(chosen),
+        tuple(units[each] for each in index),
+        tuple(left_out),
+        trajectory.t_end,
+        dt,
+        samples.t,
+        samples.s,
+        *(getattr(samples, quantity)[:, index] for quantity in COLUMNS.values()),
+    )
 
 
 def require_library(name: str, what: str) -> ModuleType:

@@ -16,11 +16,15 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from brachis.apps.plots.comparison import plot_candidates, plot_comparison, plot_fit
-from brachis.apps.plots.limits import plot_limits, plot_timeline
-from brachis.apps.plots.motion import plot_motion, plot_torques
-from brachis.apps.plots.overview import plot_overview
+from brachis.apps.plots.motion import (
+    plot_limits,
+    plot_motion,
+    plot_overview,
+    plot_torques,
+)
 from brachis.apps.plots.postures import plot_postures
 from brachis.apps.plots.style import SUFFIXES, as_html, check_suffix, save_figure
+from brachis.apps.plots.timeline import plot_timeline
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:

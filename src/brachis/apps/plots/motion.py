@@ -1,4 +1,4 @@
-"""Joint quantities, torques, path coordinate and tool speed over time."""
+"""Joint quantities, torques, ratios to limits, path coordinate and tool speed over time; and all on one page."""
 
 from __future__ import annotations
 
@@ -7,34 +7,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.apps.bottleneck.saturation import (
+    dense_samples,
+    knot_times,
+    limit_ratios,
+    saturations_of,
+)
 from brachis.apps.plots import style
-from brachis.apps.plots.quantities import REACH, Quantity, near_tool_speeds, quantities
+from brachis.apps.plots.panels import (
+    BLACK,
+    Panel,
+    panels_of,
+    ratio_panel,
+    titles_of,
+    torque_panels,
+)
+from brachis.apps.plots.postures import draw_postures, legend_postures
+from brachis.limits import Limit
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_POINTS_PER_INTERVAL = 16
-
-
-def knot_times(trajectory: Trajectory) -> np.ndarray:
-    """Return the times of the knots of the splines from 0 to t_end, (N + 1,), s."""
-    return np.unique(trajectory.knots) * trajectory.t_end
-
-
-def dense_samples(trajectory: Trajectory) -> Samples:
-    """Evaluate the trajectory at its knots, at its nodes and between."""
-    knots = knot_times(trajectory)
-    steps = np.arange(_POINTS_PER_INTERVAL) / _POINTS_PER_INTERVAL
-    grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
-    return trajectory.at(
-        np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end)
-    )
-
-
-_PROGRESS_MM = 26.0
+    from matplotlib.gridspec import SubplotSpec
 
 
 @of_motion
@@ -51,115 +47,8 @@ def plot_motion(trajectory: Trajectory) -> Figure:
         One column wide. Thin dashed lines are limits in the colours of their joints, drawn where the motion comes near
         them; the faint ticks are the knots of the splines.
     """
-    samples = dense_samples(trajectory)
-    found = quantities(trajectory, samples, "position", "velocity")
-    heights = [
-        *(38.0 * height_of(part) for part in found),
-        _PROGRESS_MM,
-        _PROGRESS_MM,
-    ]
-    figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + 17.0)
-    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-    panels = [figure.add_subplot(grid[row]) for row in range(len(heights))]
-    for ax, part in zip(panels, found, strict=False):
-        draw_quantity(ax, trajectory, part)
-    draw_progress(panels[-2], trajectory, samples)
-    draw_tool_speed(panels[-1], trajectory, samples)
-    for ax in panels[:-1]:
-        ax.sharex(panels[-1])
-    label_time_once(panels)
-    legend_joints(panels[:-2], trajectory, style.COLUMN_WIDTH - 15.0)
-    style.mark_end(panels[-1], trajectory.t_end)
-    figure.align_ylabels(panels)
-    return figure
-
-
-def height_of(part: Quantity) -> float:
-    """Height of a panel, relative to one with many joints."""
-    return 1.0 if len(part.joints) > 2 else 0.6
-
-
-def draw_quantity(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
-    """Draw one quantity of its joints, with their limits."""
-    draw_joints(ax, trajectory, part)
-    _draw_limits(ax, part)
-    dress(ax, trajectory, f"${part.symbol}$ ({part.unit})")
-
-
-def label_time_once(panels: Sequence[Axes]) -> None:
-    """Leave the labels of time to the last one of panels one below the other."""
-    for ax in panels[:-1]:
-        ax.tick_params(labelbottom=False)
-        ax.set_xlabel("")
-
-
-def draw_joints(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
-    """Draw one labelled line for each joint of a quantity."""
-    for joint, column in zip(part.joints.tolist(), part.values.T, strict=True):
-        ax.plot(
-            part.t,
-            column,
-            label=style.plain(trajectory.joint_names[joint]),
-            **style.joint_style(joint),
-        )
-
-
-def joint_lines(panels: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
-    """Collect one line of every joint that the panels show, in chain order, by its label."""
-    found = style.lines_by_label(panels)
-    names = map(style.plain, trajectory.joint_names)
-    return {name: found[name] for name in names if name in found}
-
-
-def legend_joints(panels: Sequence[Axes], trajectory: Trajectory, width: float) -> None:
-    """Put a legend of all joints above the first panel; `width` is its room, mm."""
-    style.legend_above(panels[0], width, joint_lines(panels, trajectory))
-
-
-def draw_progress(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw the path coordinate."""
-    ax.plot(samples.t, samples.s, color="black", linewidth=style.LINE_WIDTH)
-    dress(ax, trajectory, "$s$")
-    ax.set_ylim(-0.04, 1.04)
-
-
-def draw_tool_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw the tool's speed, and what the task allows where the motion comes near it."""
-    ax.plot(
-        samples.t,
-        samples.tool_speed,
-        label="tool",
-        color="black",
-        linewidth=style.LINE_WIDTH,
-    )
-    for allowed in near_tool_speeds(trajectory, samples):
-        ax.plot(samples.t, allowed, color=style.GREY, **style.LIMIT)
-    dress(ax, trajectory, "tool speed (m/s)")
-    ax.set_ylim(bottom=0.0)
-
-
-def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
-    """Set the labels, with time to the right and the knots of the splines as faint ticks."""
-    style.dress(ax, r"$t$ (s)", ylabel)
-    style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
-
-
-def _draw_limits(ax: Axes, part: Quantity) -> None:
-    """Draw every joint's own limits where it comes near them; joints that share a level share its dashes."""
-    reach = REACH * max(float(np.ptp(part.values)), 1e-9)
-    levels = np.array([part.lower, part.upper])
-    near = (levels >= part.values.min(axis=0) - reach) & (
-        levels <= part.values.max(axis=0) + reach
-    )
-    for level in np.unique(levels[near]):
-        sharing = part.joints[np.any((levels == level) & near, axis=0)].tolist()
-        for place, joint in enumerate(sharing):
-            dashes = style.limit_dashes(place, len(sharing))
-            ax.axhline(
-                level,
-                color=style.joint_style(joint)["color"],
-                **{**style.LIMIT, "linestyle": dashes},
-            )
+    rows = ("position", "velocity", "path coordinate", "tool speed")
+    return _stack(trajectory, panels_of(trajectory, dense_samples(trajectory), *rows))
 
 
 @of_motion
@@ -173,7 +62,7 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide. Joints without a limit are left out; where no joint has one, the torques themselves are shown,
+        One column wide. Joints without a limit are left out; if no joint has one, the torques themselves are shown,
         and the forces of prismatic joints in a panel below. The faint ticks are the knots of the splines.
 
     Examples
@@ -182,43 +71,171 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     >>> from brachis.apps.plots import plot_torques, save_figure
     >>> save_figure(plot_torques(plan("examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
     """
-    found = shown_torques(trajectory, dense_samples(trajectory))
-    figure = style.new_figure(style.COLUMN_WIDTH, 22.0 + 36.0 * len(found))
-    panels = style.stack_panels(figure, len(found))
-    draw_torques(panels, trajectory, found)
-    legend_joints(panels, trajectory, style.COLUMN_WIDTH - 15.0)
+    samples = dense_samples(trajectory)
+    return _stack(
+        trajectory, torque_panels(trajectory, samples, limit_ratios(trajectory))
+    )
+
+
+@of_motion
+def plot_limits(
+    trajectory: Trajectory, limits: Sequence[Limit] | None = None
+) -> Figure:
+    """Plot the ratios to all limits, whatever kinds there are; of positions the places in their ranges.
+
+    Parameters
+    ----------
+    trajectory : Trajectory, Result or path
+        Any one, a saved one for example.
+    limits : sequence of Limit, optional
+        Those of the trajectory's task if left out.
+
+    Returns
+    -------
+    Figure
+        One column wide; a panel for every kind, a line for every joint or whatever else it limits. Dashed: the limits.
+        The faint ticks are the knots of the splines.
+
+    Examples
+    --------
+    >>> from brachis import Trajectory
+    >>> from brachis.apps.plots import plot_limits, save_figure
+    >>> save_figure(plot_limits(Trajectory.load("out/result.npz")), "limits.pdf")  # doctest: +SKIP
+    """
+    ratios = limit_ratios(trajectory, limits)
+    found = [ratio_panel(trajectory, ratios, title) for title in titles_of(ratios)]
+    return _stack(trajectory, found)
+
+
+@of_motion
+def plot_overview(trajectory: Trajectory) -> Figure:
+    """Plot postures, what holds the motion, positions and velocities, progress and tool speed on two columns' width.
+
+    Parameters
+    ----------
+    trajectory : Trajectory, Result or path
+
+    Returns
+    -------
+    Figure
+        What holds the motion are the kinds of limits that are active longest, at most three; torques and forces if
+        they are among these, or no limit is active. See `plot_postures`, `plot_torques`, `plot_limits` and
+        `plot_motion` for what the panels show.
+    """
+    samples = dense_samples(trajectory)
+    columns = [
+        panels_of(trajectory, samples, *rows)
+        for rows in (("position", "path coordinate"), ("velocity", "tool speed"))
+    ]
+    heights = [74.0, *(1.2 * _height(panel) for panel in columns[0])]
+    figure = style.new_figure(style.PAGE_WIDTH, sum(heights) + 11.0)
+    grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
+    postures = draw_postures(figure, trajectory, samples, grid[0, 0])
+    legend_postures(postures, trajectory, 0.5 * style.PAGE_WIDTH - 10.0)
+    draw_holding(figure, grid[0, 1], trajectory, samples)
+    joints = []
+    for column, found in enumerate(columns):
+        cells = [grid[row + 1, column] for row in range(len(found))]
+        joints += draw_panels(figure, cells, trajectory, found)
+    lines = lines_of(joints, trajectory)
+    style.legend_below(figure, style.PAGE_WIDTH - 10.0, lines)
     return figure
 
 
-def shown_torques(trajectory: Trajectory, samples: Samples) -> list[list[Quantity]]:
-    """Torques and forces by panels: those with limits in one, all of them apart by unit where no joint has a limit."""
-    parts = quantities(trajectory, samples, "torque")
-    limited = [ratios for part in parts if (ratios := part.over_limits()) is not None]
-    return [limited] if limited else [[part] for part in parts]
+def draw_holding(
+    figure: Figure, place: SubplotSpec, trajectory: Trajectory, samples: Samples
+) -> list[Axes]:
+    """Draw the limits that hold the motion, one panel below the other; see `plot_overview`."""
+    ratios = limit_ratios(trajectory)
+    shares = dict.fromkeys(titles_of(ratios), 0.0)
+    for found in saturations_of(ratios):
+        shares[found.label.axis] += found.share
+    longest = sorted(shares, key=shares.__getitem__, reverse=True)[:3]
+    active = [title for title in longest if shares[title] > 0.0]
+    torques = torque_panels(trajectory, samples, ratios)
+    others = [title for title in active if title not in torques[0].title.split(", ")]
+    shown = [] if active and others == active else torques
+    shown += [ratio_panel(trajectory, ratios, title) for title in others]
+    cells = place.subgridspec(len(shown), 1)
+    axes = draw_panels(
+        figure, [cells[row] for row in range(len(shown))], trajectory, shown
+    )
+    style.mark_end(axes[0], trajectory.t_end)
+    for ax in axes if len(axes) > 2 else ():
+        ax.set_ylabel(ax.get_ylabel().replace(" / ", " /\n"), fontsize=style.LABEL_SIZE)
+    figure.align_ylabels(axes)
+    return axes
 
 
-def draw_torques(
-    panels: Sequence[Axes], trajectory: Trajectory, found: Sequence[Sequence[Quantity]]
-) -> None:
-    """Draw what `shown_torques` found into as many axes; one labelled line per joint."""
-    for ax, parts in zip(panels, found, strict=True):
-        if not parts[0].is_limited.all():
-            draw_quantity(ax, trajectory, parts[0])
-        else:
-            _draw_ratios(ax, trajectory, parts)
-    label_time_once(panels)
-    style.mark_end(panels[-1], trajectory.t_end)
+def _stack(trajectory: Trajectory, found: Sequence[Panel]) -> Figure:
+    """Draw panels one below the other, one column wide, with one legend."""
+    heights = [_height(panel) for panel in found]
+    figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + 20.0)
+    grid = figure.add_gridspec(len(found), 1, height_ratios=heights)
+    cells = [grid[row] for row in range(len(found))]
+    axes = draw_panels(figure, cells, trajectory, found)
+    style.legend_above(axes[0], style.COLUMN_WIDTH - 15.0, lines_of(axes, trajectory))
+    style.mark_end(axes[-1], trajectory.t_end)
+    return figure
 
 
-def _draw_ratios(ax: Axes, trajectory: Trajectory, parts: Sequence[Quantity]) -> None:
-    """Draw torques and forces over their limits, which may differ in both directions."""
-    for part in parts:
-        draw_joints(ax, trajectory, part)
-    largest = max(float(np.abs(part.values).max()) for part in parts)
-    top = 1.15 * max(1.0, largest)
-    for level in (-1.0, 1.0):
-        style.draw_limit(ax, level, top)
-    ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
-    ax.set_ylim(-top, top)
-    labels = (rf"${part.symbol} / {part.symbol}_\mathrm{{max}}$" for part in parts)
-    dress(ax, trajectory, ", ".join(labels))
+def _height(panel: Panel) -> float:
+    """Height of a panel, mm: less for few curves."""
+    return 38.0 if len(panel.names) > 2 else 24.0
+
+
+def draw_panels(
+    figure: Figure,
+    cells: Sequence[SubplotSpec],
+    trajectory: Trajectory,
+    found: Sequence[Panel],
+) -> list[Axes]:
+    """Draw panels into cells one below the other, over one time axis."""
+    axes = [figure.add_subplot(cell) for cell in cells]
+    for ax, panel in zip(axes, found, strict=True):
+        _draw_panel(ax, panel)
+        dress(ax, trajectory, panel.label)
+    for ax in axes[:-1]:
+        ax.sharex(axes[-1])
+        ax.tick_params(labelbottom=False)
+        ax.set_xlabel("")
+    figure.align_ylabels(axes)
+    return axes
+
+
+def _draw_panel(ax: Axes, panel: Panel) -> None:
+    """Draw one line for each curve, and the limits; curves with the same limit share its dashes."""
+    for name, number, values in zip(
+        panel.names, panel.styles.tolist(), panel.values.T, strict=True
+    ):
+        label = style.plain(name) if number != BLACK else None
+        ax.plot(panel.t, values, label=label, **style.joint_style(number))
+    ends = panel.view()
+    for limit, curves in panel.near_limits():
+        if panel.is_ratio:
+            style.draw_limit(ax, float(limit[0]), ends[1])
+            continue
+        line = np.broadcast_to(limit, panel.t.shape)
+        for place, curve in enumerate(curves):
+            look = {
+                **style.LIMIT,
+                "color": style.joint_style(int(panel.styles[curve]))["color"],
+                "linestyle": style.limit_dashes(place, len(curves)),
+            }
+            ax.plot(panel.t, line, **look)
+    if panel.is_ratio:
+        ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
+    ax.set_ylim(ends)
+
+
+def lines_of(axes: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
+    """Collect one line of each subject that the axes show, by its label; joints first, in chain order."""
+    found = style.lines_by_label(axes)
+    joints = [style.plain(name) for name in trajectory.joint_names]
+    return {name: found[name] for name in (*joints, *found) if name in found}
+
+
+def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
+    """Set the labels, with time to the right and the knots of the splines as faint ticks."""
+    style.dress(ax, r"$t$ (s)", ylabel)
+    style.dress_time(ax, trajectory.t_end, knot_times(trajectory))

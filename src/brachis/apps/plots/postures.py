@@ -4,62 +4,40 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
+from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
-from brachis.apps.plots.motion import dense_samples
 from brachis.robot import Robot, task_map_of
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
-_AXIS_TOLERANCE = 1e-6
 
+def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Postures `q`, (K, n), as polylines in the world frame, (K, 2 n + 2, 3), m.
 
-@dataclass(frozen=True, eq=False)
-class Skeleton:
-    """Postures as polylines in the world frame, m.
-
-    Attributes
-    ----------
-    bones : (K, 2 n + 2, 3) ndarray
-        Base, every joint before and after its motion (the same point for a revolute joint), tool.
-    joints : (K, n, 3) ndarray
-        Origins of the joint frames.
-    tool : (K, 3) ndarray
-        Tool positions.
+    They go through the base, every joint before and after its motion (one point if it is revolute) and the tool.
     """
-
-    bones: np.ndarray
-    joints: np.ndarray
-    tool: np.ndarray
-
-
-def skeleton(robot: Robot, q: np.ndarray) -> Skeleton:
-    """Stick figures of the postures `q`, (K, n)."""
     model = robot.model
-    data = robot.model.createData()
+    data = model.createData()
     base = int(model.getFrameId(robot.base_frame))
-    n = robot.n
-    bones = np.empty((len(q), 2 * n + 2, 3))
+    bones = np.empty((len(q), 2 * robot.n + 2, 3))
     for points, posture in zip(bones, q, strict=True):
         pin.framesForwardKinematics(model, data, posture)
         points[0] = data.oMf[base].translation
-        for joint in range(1, n + 1):
-            points[2 * joint - 1] = (
-                data.oMi[model.parents[joint]] * model.jointPlacements[joint]
-            ).translation
+        for joint in range(1, robot.n + 1):
+            before = data.oMi[model.parents[joint]] * model.jointPlacements[joint]
+            points[2 * joint - 1] = before.translation
             points[2 * joint] = data.oMi[joint].translation
         points[-1] = data.oMf[robot.frame_id].translation
-    return Skeleton(bones, bones[:, 2:-1:2], bones[:, -1])
+    return bones
 
 
 def drawing_plane(
@@ -76,31 +54,26 @@ def drawing_plane(
         World axes of the task space's position rows. Two of them fix the plane; one leaves a choice.
     """
     data = robot.model.createData()
-    columns = np.asarray(pin.computeJointJacobians(robot.model, data, q)).reshape(
-        6, robot.n
-    )  # (6,) for one joint
-    revolute = robot.revolute
-    turning = columns[3:, revolute]
-    sliding = columns[:3, ~revolute]
+    jacobian = pin.computeJointJacobians(robot.model, data, q)
+    columns = np.reshape(jacobian, (6, robot.n))  # it is (6,) for one joint
+    turning = columns[3:, robot.revolute]
+    sliding = columns[:3, ~robot.revolute]
     for normal in (2, 1, 0):
         in_plane = [axis for axis in range(3) if axis != normal]
-        turns_about = np.abs(turning[in_plane]).max(initial=0.0) < _AXIS_TOLERANCE
-        slides_in = np.abs(sliding[normal]).max(initial=0.0) < _AXIS_TOLERANCE
+        turns_about = np.abs(turning[in_plane]).max(initial=0.0) < 1e-6
+        slides_in = np.abs(sliding[normal]).max(initial=0.0) < 1e-6
         if normal not in axes[:2] and turns_about and slides_in:
             return in_plane[0], in_plane[1]
     return None
 
 
-_POSTURES = 7
-_FIRST = np.array([0.72, 0.83, 0.91])
-_LAST = np.array([0.03, 0.23, 0.39])
-_PATH_COLOUR = "#D55E00"
-_REDUNDANT_COLOUR = "#E69F00"
-_SHADOW_COLOUR = "#C8C8C8"
-_GROUND = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
-_WORLD = "xyz"
-_ROOM = 0.78
-"""Part of the frame that the box of axes in space takes; their labels take the rest."""
+_SHADES = [
+    tuple(shade) for shade in np.linspace([0.72, 0.83, 0.91], [0.03, 0.23, 0.39], 7)
+]
+"""Colours of the postures, from the first to the last."""
+_PATH: dict[str, Any] = {"color": style.COLOURS[1], "linewidth": 1.4}
+_JOINT: dict[str, Any] = {"linestyle": "", "markersize": 4.5}
+_REDUNDANT = style.COLOURS[4]
 _VIEWS = tuple(
     itertools.product(
         (15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)
@@ -124,120 +97,83 @@ def plot_postures(trajectory: Trajectory) -> Figure:
         Later postures are darker. Squares are prismatic joints, filled markers redundant ones.
     """
     figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
-    ax = add_posture_axes(figure, trajectory)
-    draw_postures(ax, trajectory, dense_samples(trajectory))
+    ax = draw_postures(figure, trajectory, dense_samples(trajectory))
     legend_postures(ax, trajectory, style.COLUMN_WIDTH - 5.0)
     return figure
 
 
-def add_posture_axes(
-    figure: Figure | SubFigure, trajectory: Trajectory, place: SubplotSpec | None = None
+def draw_postures(
+    figure: Figure,
+    trajectory: Trajectory,
+    samples: Samples,
+    place: SubplotSpec | None = None,
 ) -> Axes:
-    """Add axes that suit the robot: in its plane, or in space."""
-    where = () if place is None else (place,)
-    if plane_of(trajectory) is not None:
-        return figure.add_subplot(*where)
-    axes: Axes = figure.add_subplot(*where, projection="3d", computed_zorder=False)
-    return axes
-
-
-def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw tool path and postures into the axes that `add_posture_axes` made."""
+    """Draw tool path and postures into new axes that suit the robot: in its plane, or in space."""
     plane = plane_of(trajectory)
+    in_space = {} if plane else {"projection": "3d", "computed_zorder": False}
+    ax: Any = figure.add_subplot(*([place] if place else []), **in_space)
     view = list(plane or (0, 1, 2))
-    robot = trajectory.robot
-    tool = skeleton(robot, samples.q).tool[:, view]
-    figures = skeleton(
-        robot, trajectory.position(np.linspace(0.0, trajectory.t_end, _POSTURES))
-    )
-    for k, shade in enumerate(_shades()):
-        _draw_links(ax, figures.bones[k][:, view], tuple(shade), k)
-        _draw_joints(ax, trajectory, figures.joints[k][:, view], tuple(shade), k)
-    ax.plot(*tool.T, color=_PATH_COLOUR, linewidth=1.4, zorder=20.0, gid="tool path")
-    ax.plot(*tool[-1:].T, "o", color=_PATH_COLOUR, markersize=3.0, zorder=21.0)
-    ax.plot(
-        *figures.bones[0, :1][:, view].T,
-        marker=_GROUND,
-        color=style.GREY,
-        markersize=12.0,
-        zorder=0.5,
-    )
-    style.dress(ax, f"${_WORLD[view[0]]}$ (m)", f"${_WORLD[view[1]]}$ (m)")
+    tool = samples.tool_position[:, view]
+    times = np.linspace(0.0, trajectory.t_end, len(_SHADES))
+    postures = skeleton(trajectory.robot, trajectory.position(times))
+    for k, (bones, shade) in enumerate(zip(postures, _SHADES, strict=True)):
+        ax.plot(
+            *bones[:, view].T,
+            color=shade,
+            linewidth=2.2 if k in {0, len(_SHADES) - 1} else 1.0,
+            solid_capstyle="round",
+            solid_joinstyle="round",
+            zorder=2.0 + k,
+            gid=f"posture {k}",
+        )
+        for joint, name in enumerate(trajectory.joint_names):
+            is_redundant = name in trajectory.redundant_joints
+            ax.plot(
+                *bones[2 * joint + 2, view][:, None],
+                marker="o" if trajectory.robot.revolute[joint] else "s",
+                markeredgecolor=shade,
+                markerfacecolor=_REDUNDANT if is_redundant else "white",
+                zorder=2.5 + k,
+                **_JOINT,
+            )
+    ax.plot(*tool.T, zorder=20.0, gid="tool path", **_PATH)
+    ax.plot(*tool[-1:].T, "o", color=_PATH["color"], markersize=3.0, zorder=21.0)
+    ground = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
+    base = postures[0, :1, view]
+    ax.plot(*base, marker=ground, color=style.GREY, markersize=12.0, zorder=0.5)
+    style.dress(ax, *(f"${'xyz'[axis]}$ (m)" for axis in view[:2]))
     if plane is None:
-        _dress_space(ax, figures.bones.reshape(-1, 3), tool)
+        _dress_space(ax, postures.reshape(-1, 3), tool)
     else:
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.06)
+    return ax
 
 
 def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
     """Put the legend above the axes; `width` is its room, mm."""
     from matplotlib.lines import Line2D
 
-    first, *_, last = _shades()
-    lines: dict[str, Artist] = {
-        "start": Line2D([], [], color=tuple(first), linewidth=2.2),
-        "end": Line2D([], [], color=tuple(last), linewidth=2.2),
-        "tool path": Line2D([], [], color=_PATH_COLOUR, linewidth=1.4),
+    looks: dict[str, dict[str, Any]] = {
+        "start": {"color": _SHADES[0], "linewidth": 2.2},
+        "end": {"color": _SHADES[-1], "linewidth": 2.2},
+        "tool path": _PATH,
     }
     if trajectory.redundant_joints:
-        lines["redundant"] = Line2D(
-            [],
-            [],
-            linestyle="",
-            marker="o",
-            markersize=4.5,
-            markerfacecolor=_REDUNDANT_COLOUR,
-            markeredgecolor=tuple(last),
-        )
+        looks["redundant"] = {
+            "marker": "o",
+            "markerfacecolor": _REDUNDANT,
+            "markeredgecolor": _SHADES[-1],
+            **_JOINT,
+        }
+    lines = {name: Line2D([], [], **look) for name, look in looks.items()}
     style.legend_above(ax, width, lines)
 
 
 def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
-    """World axes of the plane in which a motion is drawn; None where it is drawn in space."""
+    """World axes of the plane in which a motion is drawn; None if it is drawn in space."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
     return drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes)
-
-
-def _shades() -> np.ndarray:
-    """Colours (postures, 3) from the first to the last posture."""
-    return np.linspace(_FIRST, _LAST, _POSTURES)
-
-
-def _draw_links(ax: Axes, bones: np.ndarray, shade: tuple[float, ...], k: int) -> None:
-    """Draw the links of posture number `k` as one line; later postures lie on top."""
-    ax.plot(
-        *bones.T,
-        color=shade,
-        linewidth=2.2 if k in {0, _POSTURES - 1} else 1.0,
-        solid_capstyle="round",
-        solid_joinstyle="round",
-        zorder=2.0 + k,
-        gid=f"posture {k}",
-    )
-
-
-def _draw_joints(
-    ax: Axes,
-    trajectory: Trajectory,
-    joints: np.ndarray,
-    shade: tuple[float, ...],
-    k: int,
-) -> None:
-    """Draw the joints of posture number `k`."""
-    units = trajectory.robot.position_units
-    for name, unit, point in zip(trajectory.joint_names, units, joints, strict=True):
-        ax.plot(
-            *point[:, None],
-            linestyle="",
-            marker="s" if unit == "m" else "o",
-            markersize=4.5,
-            markeredgecolor=shade,
-            markerfacecolor=_REDUNDANT_COLOUR
-            if name in trajectory.redundant_joints
-            else "white",
-            zorder=2.5 + k,
-        )
 
 
 def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
@@ -245,30 +181,32 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
 
     The tool's path, (K, 3), has its shadow on the floor.
     """
+    from matplotlib.ticker import MaxNLocator
+
     floor = min(0.0, float(points[:, 2].min()))
-    ax.plot(
-        *tool[:, :2].T,
-        np.full(len(tool), floor),
-        color=_SHADOW_COLOUR,
-        linewidth=1.4,
-        zorder=1.0,
-        gid="shadow",
-    )
+    shadow = {"color": "#C8C8C8", "zorder": 1.0, "gid": "shadow"}
+    ax.plot(*tool[:, :2].T, np.full(len(tool), floor), linewidth=1.4, **shadow)
     ax.set_zlabel("$z$ (m)", fontsize=style.LABEL_SIZE, labelpad=-4.0)
     ax.xaxis.labelpad = ax.yaxis.labelpad = -4.0
     ax.tick_params(pad=-2.0)
     ax.set_proj_type("ortho")
-    spans = [
-        max(np.ptp(limits), 1e-3)
-        for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())
-    ]
+    limits = np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()])
+    spans = np.ptp(limits, axis=1).clip(1e-3)
+    corners = np.array(list(itertools.product(*limits)))
     ax.set_box_aspect(spans)
-    elevation, azimuth = max(_VIEWS, key=lambda view: _fill_factor(ax, points, *view))
-    ax.view_init(elevation, azimuth)
-    ax.set_box_aspect(spans, zoom=_ROOM / _extent(ax))
+
+    def look_from(elevation: float, azimuth: float) -> tuple[float, float]:
+        """Turn the axes; return how much of the frame points take if the box fits into it, and what the box takes."""
+        ax.view_init(elevation, azimuth)
+        extent = float(_spans(ax, corners).max())
+        return float(np.prod(_spans(ax, points))) / extent**2, extent
+
+    best = max(_VIEWS, key=lambda view: look_from(*view)[0])
+    _, extent = look_from(*best)
+    ax.set_box_aspect(spans, zoom=0.78 / extent)  # labels take the rest of the frame
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-        axis.set_major_locator(_few_ticks())
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     ax.grid(visible=False)
     _draw_floor(ax, floor)
 
@@ -277,32 +215,14 @@ def _draw_floor(ax: Any, z: float) -> None:
     """Draw a grid of the ticks on the floor, up to the edges of the axes."""
     x = ax.get_xlim()
     y = ax.get_ylim()
-    inner = [
-        [tick for tick in ticks if low < tick < high]
-        for ticks, (low, high) in ((ax.get_xticks(), x), (ax.get_yticks(), y))
-    ]
     look = {"color": style.FAINT, "linewidth": 0.6, "zorder": 0.1, "gid": "floor"}
-    for at in (*x, *inner[0]):
-        ax.plot([at, at], y, z, **look)
-    for at in (*y, *inner[1]):
-        ax.plot(x, [at, at], z, **look)
+    for tick in (*x, *ax.get_xticks()):
+        if x[0] <= tick <= x[1]:
+            ax.plot([tick, tick], y, z, **look)
+    for tick in (*y, *ax.get_yticks()):
+        if y[0] <= tick <= y[1]:
+            ax.plot(x, [tick, tick], z, **look)
     ax.set(xlim=x, ylim=y)
-
-
-def _fill_factor(
-    ax: Any, points: np.ndarray, elevation: float, azimuth: float
-) -> float:
-    """Tell how much of the frame points take when the axes' box just fits into it; dimensionless."""
-    ax.view_init(elevation, azimuth)
-    return float(np.prod(_spans(ax, points)) / _extent(ax) ** 2)
-
-
-def _extent(ax: Any) -> float:
-    """Part of the axes' frame that the box of 3-D axes takes, in the direction in which it takes more."""
-    corners = np.array(
-        list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()))
-    )
-    return float(_spans(ax, corners).max())
 
 
 def _spans(ax: Any, points: np.ndarray) -> np.ndarray:
@@ -311,9 +231,3 @@ def _spans(ax: Any, points: np.ndarray) -> np.ndarray:
 
     across, up, _ = proj3d.proj_transform(*points.T, ax.get_proj())
     return np.array([np.ptp(across) / ax.viewLim.width, np.ptp(up) / ax.viewLim.height])
-
-
-def _few_ticks() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4, steps=[1, 2, 5, 10])

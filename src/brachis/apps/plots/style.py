@@ -213,17 +213,20 @@ def dress_time(ax: Axes, t_end: float, knots: np.ndarray) -> None:
     ax.tick_params(axis="x", which="minor", length=2.0, color="#A0A0A0", width=0.5)
 
 
+def write(ax: Axes, x: float, y: float, text: str, **look: Any) -> None:
+    """Write text at parts of the axes' width and height."""
+    look = {"va": "center", "fontsize": TICK_SIZE, **look}
+    ax.text(x, y, text, transform=ax.transAxes, **look)
+
+
+def end_text(t_end: float) -> str:
+    """Return the end time, s, as it is written into figures."""
+    return rf"$t_\mathrm{{E}} = {t_end:.3f}$ s"
+
+
 def mark_end(ax: Axes, t_end: float) -> None:
     """Write the end time outside the right edge."""
-    ax.text(
-        1.02,
-        0.5,
-        rf"$t_\mathrm{{E}} = {t_end:.3f}$ s",
-        transform=ax.transAxes,
-        rotation=90.0,
-        fontsize=TICK_SIZE,
-        verticalalignment="center",
-    )
+    write(ax, 1.02, 0.5, end_text(t_end), rotation=90.0)
 
 
 def legend_above(

@@ -3,36 +3,26 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from brachis.apps.bottleneck import THRESHOLD
+from brachis.apps.bottleneck.saturation import knot_times
 from brachis.apps.plots import style
-from brachis.apps.plots.motion import knot_times
-from brachis.apps.plots.postures import plane_of, skeleton
-from brachis.apps.plots.quantities import (
-    REACH,
-    Quantity,
-    joint_quantities,
-    kinds_of,
-    near_tool_speeds,
-    quantities,
+from brachis.apps.plots.panels import (
+    Panel,
+    joint_rows_of,
+    panels_of,
+    select_joint,
+    torque_panels,
 )
+from brachis.apps.plots.postures import plane_of, skeleton
 from brachis.apps.report.motion import ReportedMotion
 from brachis.apps.report.tables import NEAR
 
 Figure = dict[str, Any]
 """``data`` and ``layout`` of Plotly."""
-
-_SMALL_PX = 130
-_FRAME_PX = 110
-_SHOWN = 0.5
-"""Limits that the motion never comes this near to have no row."""
-_MOST = 1.1
-"""Ratio at the upper end of the colours."""
 
 
 def encode(values: np.ndarray) -> dict[str, Any]:
@@ -45,92 +35,95 @@ def encode(values: np.ndarray) -> dict[str, Any]:
 def motion_figure(motion: ReportedMotion) -> Figure:
     """Positions and their derivatives, torques and forces, and the tool's speed, with their limits.
 
-    Joints in rad and joints in m have panels of their own; a joint is hidden in all panels at once.
+    Joints in rad and joints in m have panels of their own; a joint is hidden in all panels at once. Torques and forces
+    are also shown over their limits: those of a wrist are smaller than those of a shoulder.
     """
     trajectory = motion.trajectory
     samples = motion.samples
-    parts = quantities(
-        trajectory, samples, *kinds_of(trajectory), degrees=motion.degrees
-    )
-    panels = [[part] for part in parts]
-    shares = _over_their_limits(quantities(trajectory, samples, "torque"))
-    if shares:
-        panels.append(shares)
-    heights = [210 if len(parts[0].joints) > 2 else _SMALL_PX for parts in panels] + [
-        _SMALL_PX
-    ]
+    rows = joint_rows_of(trajectory)
+    panels = panels_of(trajectory, samples, *rows, degrees=motion.degrees)
+    over_limits = torque_panels(trajectory, samples, motion.ratios)
+    panels += [panel for panel in over_limits if panel.is_ratio]
+    panels += panels_of(trajectory, samples, "tool speed")
+    heights = [210 if len(panel.names) > 2 else 130 for panel in panels]
+    ends = 1.0 - np.cumsum([0, *heights]) / sum(heights)
+    layout = _layout(trajectory.t_end, sum(heights))
     data = []
-    named = set()
-    last = len(heights)
-    layout = _layout(trajectory.t_end, sum(heights) + _FRAME_PX)
-    for row, (parts, domain) in enumerate(
-        zip(panels, _domains(heights), strict=False), start=1
-    ):
-        title = f"{parts[0].name} ({parts[0].unit})"
-        layout[_axis("yaxis", row)] = _value_axis(title, domain, _view(parts))
-        for part in parts:
-            for column, joint in enumerate(part.joints.tolist()):
-                name = trajectory.joint_names[joint]
-                data += _joint_traces(part, column, name, row, shown=name not in named)
-                named.add(name)
-    layout[_axis("yaxis", last)] = _value_axis(
-        "tool speed (m/s)", _domains(heights)[-1], None
-    )
-    speed = _curve(
-        samples.t,
-        samples.tool_speed,
-        last,
-        line={"color": style.COLOURS[-1], "width": 1.6},
-        name="tool",
-        showlegend=False,
-        hovertemplate="%{y:.4g} m/s<extra>tool</extra>",
-    )
-    data.append(speed)
-    for allowed in near_tool_speeds(trajectory, samples):
-        name = "limit of the tool speed"
-        data.append(_limit_line(samples.t, allowed, last, style.GREY, name=name))
-    layout["xaxis"] |= {"anchor": f"y{last}", "title": {"text": "t (s)"}}
-    layout["xaxis"]["minor"] = {
-        "tickvals": knot_times(trajectory).tolist(),
-        "ticks": "inside",
-        "ticklen": 3,
+    named: set[str] = set()
+    for row, panel in enumerate(panels):
+        number = "" if row == 0 else str(row + 1)
+        layout[f"yaxis{number}"] = {
+            "domain": (max(ends[row + 1], 0.0) + 0.012, ends[row] - 0.012),
+            "title": {"text": panel.heading, "standoff": 8},
+            "anchor": "x",
+            "zeroline": True,
+            "range": panel.view(),
+        }
+        for curve, name in enumerate(panel.names):
+            is_new = name in trajectory.joint_names and name not in named
+            data += _traces(panel, curve, f"y{number}", is_named=is_new)
+            named.add(name)
+    layout["xaxis"] |= {
+        "anchor": f"y{len(panels)}",
+        "minor": {
+            "tickvals": knot_times(trajectory).tolist(),
+            "ticks": "inside",
+            "ticklen": 3,
+        },
     }
     return {"data": data, "layout": layout}
 
 
-def _over_their_limits(parts: Sequence[Quantity]) -> list[Quantity]:
-    """Divide torques and forces by their limits: a wrist's are smaller than a shoulder's."""
-    found = [ratios for part in parts if (ratios := part.over_limits()) is not None]
-    names = ", ".join(part.name for part in found)
-    return [replace(part, name=names) for part in found]
-
-
-def _joint_traces(
-    part: Quantity, column: int, name: str, row: int, *, shown: bool
+def _traces(
+    panel: Panel, curve: int, axis: str, *, is_named: bool
 ) -> list[dict[str, Any]]:
-    """Draw one joint's curve, and its limits as thin straight lines."""
-    joint = style.joint_style(int(part.joints[column]))
-    values = part.values[:, column]
-    levels = (part.lower[column], part.upper[column])
-    group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
-    hover = f"%{{y:.4g}} {part.unit}"
-    look: dict[str, Any] = {**group, "showlegend": shown}
-    if np.isfinite(levels).all():
-        look["customdata"] = encode(100.0 * np.abs(part.ratios[:, column]))
-        hover += f", %{{customdata:.1f}} % of {part.of}"
-    look["hovertemplate"] = f"{hover}<extra>{_escape(name)}</extra>"
-    look["line"] = {
-        "color": joint["color"],
-        "width": 1.8,
-        "dash": _dash(joint["linestyle"]),
-        "simplify": False,
+    """Draw one curve, and its limits as thin dashed lines."""
+    name = panel.names[curve]
+    number = int(panel.styles[curve])
+    look = style.joint_style(number)
+    shared = {
+        "type": "scatter",
+        "mode": "lines",
+        "yaxis": axis,
+        "name": name,
+        "legendgroup": name,
+        "legendrank": number,
     }
-    limits = [
-        _limit_line(part.t[[0, -1]], np.full(2, level), row, joint["color"], **group)
-        for level in levels
-        if np.isfinite(level)
-    ]
-    return [_curve(part.t, values, row, **look), *limits]
+    hover = f"%{{y:.4g}} {panel.unit}".rstrip()
+    line = {
+        **shared,
+        "x": encode(panel.t),
+        "y": encode(panel.values[:, curve]),
+        "showlegend": is_named,
+        "line": {
+            "color": look["color"],
+            "width": 1.8,
+            "dash": _dash(look["linestyle"]),
+            "simplify": False,
+        },
+    }
+    if panel.is_limited[curve] and not panel.is_ratio:
+        line["customdata"] = encode(100.0 * np.abs(panel.ratios[:, curve]))
+        hover += f", %{{customdata:.1f}} % ({panel.ratio_title})"
+    line["hovertemplate"] = f"{hover}<extra>{_escape(name)}</extra>"
+    traces = [line]
+    for limits in (panel.lower, panel.upper):
+        limit = limits[:, curve]
+        if not np.isfinite(limit).any():
+            continue
+        t = panel.t if len(limit) > 1 else panel.t[[0, -1]]
+        values = np.where(np.isfinite(limit), limit, np.nan)
+        dashed = {
+            **shared,
+            "x": encode(t),
+            "y": encode(np.broadcast_to(values, t.shape)),
+            "line": {"color": look["color"], "width": 1, "dash": "4px,4px"},
+            "showlegend": False,
+            "hoverinfo": "skip",
+            "meta": "limit",
+        }
+        traces.append(dashed)
+    return traces
 
 
 def timeline_figure(motion: ReportedMotion) -> Figure:
@@ -138,38 +131,37 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     ratios = motion.ratios
     tolerance = motion.trajectory.task.refinement.tolerance
     columns = {label: column for column, label in enumerate(ratios.labels)}
-    entries = [entry for entry in motion.saturations if entry.peak > _SHOWN][::-1]
-    once = np.append(np.diff(ratios.t) > 0.0, True)
-    t = ratios.t[once]
-    values = np.abs(ratios.values[once])
-    part = np.array([values[:, columns[entry.label]] for entry in entries]).reshape(
-        len(entries), len(t)
-    )
+    entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
+    is_last = np.append(np.diff(ratios.t) > 0.0, True)
+    t = ratios.t[is_last]
+    part = np.empty((len(entries), len(t)))
     colours = part.copy()
     for row, entry in enumerate(entries):
-        for stretch in entry.active:  # ripple included
-            inside = (t >= stretch.begin) & (t <= stretch.end)
+        part[row] = np.abs(ratios.values[is_last, columns[entry.label]])
+        colours[row] = part[row]
+        for active in entry.active:  # ripple included
+            inside = (t >= active.begin) & (t <= active.end)
             colours[row, inside] = np.maximum(colours[row, inside], THRESHOLD)
-    active = THRESHOLD / _MOST
-    beyond = (1.0 + tolerance) / _MOST
-    layout = _layout(motion.trajectory.t_end, 26 * max(len(entries), 1) + _FRAME_PX)
-    layout["xaxis"] |= {"title": {"text": "t (s)"}}
+    top = 1.1
+    active_from = THRESHOLD / top
+    beyond = (1.0 + tolerance) / top
+    layout = _layout(motion.trajectory.t_end, 26 * max(len(entries), 1))
     layout["yaxis"] = {"automargin": True, "fixedrange": True, "ticks": ""}
     layout["hovermode"] = "closest"
     heat = {
         "type": "heatmap",
         "x": encode(t),
         "y": [f"{entry.label}" for entry in entries],
-        "z": encode(np.minimum(colours, _MOST)),
+        "z": encode(np.minimum(colours, top)),
         "customdata": encode(100.0 * part),
         "zmin": 0.0,
-        "zmax": _MOST,
+        "zmax": top,
         "ygap": 3,
         "colorscale": [
             [0.0, "#F7FBFF"],
-            [0.5 * active, "#9ECAE1"],
-            [active, "#08306B"],
-            [active, "#E69F00"],
+            [0.5 * active_from, "#9ECAE1"],
+            [active_from, "#08306B"],
+            [active_from, "#E69F00"],
             [beyond, "#E69F00"],
             [beyond, "#C00000"],
             [1.0, "#C00000"],
@@ -184,80 +176,19 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     return {"data": [heat] if entries else [], "layout": layout}
 
 
-def _curve(t: np.ndarray, values: np.ndarray, row: int, **look: Any) -> dict[str, Any]:
-    """Return a curve of the panel with this number."""
+def _layout(t_end: float, height: int) -> dict[str, Any]:
+    """Layout with one time axis and panels of this height together, pixels; the page sets colours."""
     return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": encode(t),
-        "y": encode(values),
-        "yaxis": f"y{row}",
-        **look,
-    }
-
-
-def _limit_line(
-    t: np.ndarray, values: np.ndarray, row: int, colour: str, **look: Any
-) -> dict[str, Any]:
-    """Return a thin dashed line, without an entry in the legend."""
-    line = {"color": colour, "width": 1, "dash": "4px,4px"}
-    look |= {"line": line, "showlegend": False, "hoverinfo": "skip", "meta": "limit"}
-    return _curve(t, values, row, **look)
-
-
-def _layout(t_end: float, height: float) -> dict[str, Any]:
-    """Layout with one time axis; the page sets colours."""
-    return {
-        "height": height,
+        "height": height + 110,
         "margin": {"l": 70, "r": 20, "t": 40, "b": 50},
         "hovermode": "x unified",
-        "xaxis": {"range": [0.0, t_end], "hoverformat": ".4f"},
+        "xaxis": {
+            "range": [0.0, t_end],
+            "hoverformat": ".4f",
+            "title": {"text": "t (s)"},
+        },
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
     }
-
-
-def _value_axis(
-    title: str, domain: tuple[float, float], view: tuple[float, float] | None
-) -> dict[str, Any]:
-    axis: dict[str, Any] = {
-        "domain": domain,
-        "title": {"text": title, "standoff": 8},
-        "anchor": "x",
-        "zeroline": True,
-    }
-    if view is not None:
-        axis["range"] = view
-    return axis
-
-
-def _view(parts: Sequence[Quantity]) -> tuple[float, float]:
-    """Range of values in view: the motion, and the limits that it comes near."""
-    low = min(float(part.values.min()) for part in parts)
-    high = max(float(part.values.max()) for part in parts)
-    reach = REACH * max(high - low, 1e-9)
-    levels = np.concatenate(
-        [level for part in parts for level in (part.lower, part.upper)]
-    )
-    near = levels[(levels > low - reach) & (levels < high + reach)]
-    low = min([low, *near.tolist()])
-    high = max([high, *near.tolist()])
-    room = 0.06 * max(high - low, 1e-9)
-    return low - room, high + room
-
-
-def _domains(heights: list[int]) -> list[tuple[float, float]]:
-    """Parts of the figure's height for panels, from the top down."""
-    whole = float(sum(heights))
-    gap = 0.012
-    ends = 1.0 - np.cumsum([0.0, *heights]) / whole
-    return [
-        (float(low) + gap, float(high) - gap)
-        for high, low in zip(ends[:-1], ends[1:].clip(0.0), strict=True)
-    ]
-
-
-def _axis(name: str, row: int) -> str:
-    return name if row == 1 else f"{name}{row}"
 
 
 def _dash(linestyle: object) -> str:
@@ -285,38 +216,36 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
     trajectory = motion.trajectory
     samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 240))
     robot = trajectory.robot
-    kinds = kinds_of(trajectory)
-    joints: list[dict[str, Any]] = []
-    for name, unit, parts in zip(
-        robot.joint_names,
-        robot.position_units,
-        joint_quantities(trajectory, samples, *kinds, degrees=motion.degrees),
-        strict=True,
-    ):
-        entries = []
-        for part in parts:
-            entry = {"unit": part.unit, "values": encode(part.values[:, 0])}
-            if part.is_limited[0]:
-                entry["ratios"] = encode(np.abs(part.ratios[:, 0]))
-            entries.append(entry)
+    rows = joint_rows_of(trajectory)
+    panels = panels_of(trajectory, samples, *rows, degrees=motion.degrees)
+    joints = []
+    for name, unit in zip(robot.joint_names, robot.position_units, strict=True):
         joint = {
             "name": name,
             "redundant": name in trajectory.redundant_joints,
             "prismatic": unit == "m",
-            "quantities": entries,
+            "quantities": [_quantity(panel) for panel in select_joint(panels, name)],
         }
         joints.append(joint)
     return {
         "t": encode(samples.t),
         "s": encode(samples.s),
         "speed": encode(samples.tool_speed),
-        "bones": encode(skeleton(robot, samples.q).bones),
+        "bones": encode(skeleton(robot, samples.q)),
         "plane": plane_of(trajectory),
         "joints": joints,
-        "kinds": kinds,
+        "kinds": rows,
         "levels": {
             "near": NEAR,
             "at": THRESHOLD,
             "beyond": 1.0 + trajectory.task.refinement.tolerance,
         },
     }
+
+
+def _quantity(panel: Panel) -> dict[str, Any]:
+    """Write the values of one joint, and how much of its limit they use."""
+    entry = {"unit": panel.unit, "values": encode(panel.values[:, 0])}
+    if panel.is_limited[0]:
+        entry["ratios"] = encode(np.abs(panel.ratios[:, 0]))
+    return entry

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from brachis.apps import bottleneck
 from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
-from brachis.apps.bottleneck.saturation import saturations_of
+from brachis.apps.bottleneck.saturation import dense_samples, saturations_of
 from brachis.apps.bottleneck.text import active_in_words
-from brachis.apps.plots.motion import dense_samples
 from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
 from brachis.optimise.candidate import Candidate

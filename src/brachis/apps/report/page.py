@@ -14,7 +14,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from brachis.apps.plots import as_html, plot_candidates, plot_fit, plot_overview
-from brachis.apps.plots.quantities import kinds_of
+from brachis.apps.plots.panels import joint_rows_of
 from brachis.apps.report import tables
 from brachis.apps.report.figures import motion_figure, scene, timeline_figure
 from brachis.apps.report.motion import ReportedMotion, reported_motion
@@ -125,7 +125,7 @@ def make_report(
         remarks=reported.remarks,
         not_completed=reported.not_completed,
         identity=tables.identity(reported),
-        kinds=kinds_of(reported.trajectory),
+        kinds=joint_rows_of(reported.trajectory),
         pictures=list(_pictures(reported)),
         task=tables.task_text(reported.trajectory.task),
         versions=tables.versions(),

@@ -15,7 +15,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD
-from brachis.apps.plots.quantities import Quantity, joint_quantities, kinds_of
+from brachis.apps.plots.panels import Panel, joint_rows_of, panels_of, select_joint
 from brachis.apps.report.motion import ReportedMotion
 from brachis.optimise.candidate import coordinates
 from brachis.robot.from_task import in_use
@@ -198,14 +198,13 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     """List what every joint does, in chain order."""
     trajectory = motion.trajectory
     tolerance = trajectory.task.refinement.tolerance
-    parts_by_joint = joint_quantities(
-        trajectory, motion.samples, *kinds_of(trajectory), degrees=motion.degrees
-    )
-    rows = []
-    for name, parts in zip(trajectory.joint_names, parts_by_joint, strict=True):
-        position = parts[0]
-        q = position.values[:, 0]
-        unit = position.unit
+    rows = joint_rows_of(trajectory)
+    panels = panels_of(trajectory, motion.samples, *rows, degrees=motion.degrees)
+    found = []
+    for name in trajectory.joint_names:
+        parts = select_joint(panels, name)
+        q = parts[0].values[:, 0]
+        unit = parts[0].unit
         row = JointRow(
             name=name,
             redundant=name in trajectory.redundant_joints,
@@ -214,18 +213,18 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
             travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
             peaks=tuple(_peak(part, tolerance) for part in parts),
         )
-        rows.append(row)
-    return rows
+        found.append(row)
+    return found
 
 
-def _peak(part: Quantity, tolerance: float) -> Row:
+def _peak(part: Panel, tolerance: float) -> Row:
     """Find the value of a joint that is nearest to its limit.
 
     Without a limit it is the largest one.
     """
     values = part.values[:, 0]
-    upper = part.upper[0]
-    lower = part.lower[0]
+    upper = part.upper[0, 0]
+    lower = part.lower[0, 0]
     if not part.is_limited[0]:
         largest = values[np.argmax(np.abs(values))]
         return Row(_write_value(largest, part.unit), "", "", "")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,25 +19,23 @@ from lxml import etree
 
 from brachis.common.files import mesh_file
 from brachis.errors import InputError
-from brachis.robot import Robot
+from brachis.path import path_of
+from brachis.robot import Robot, task_map_of
 from brachis.robot.urdf_elements import Element, read_tree
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
     import trimesh
 
-_STEEL = (150, 160, 172, 255)
-"""Colour of a shape without one."""
-_PRIMITIVE = 2000
-"""Faces of a shape that is few enough to be given sharp edges."""
-_SHARP = 0.6
-"""Angle between faces from which on an edge is sharp, rad."""
+_COLOURS = {
+    "shape": (150, 160, 172, 255),  # of a shape without a colour of its own
+    "bone": (72, 101, 129, 255),
+    "joint": (230, 159, 0, 255),
+    "axis": (120, 130, 140, 255),
+}
+"""RGBA from 0 to 255."""
 _LARGEST = 200_000_000
-"""Bytes of all mesh files of a robot together, unpacked; readers take several times as much memory."""
-_PACKED = (".gz", ".bz2")
-"""Suffixes of packed files, whose size nobody knows before they are unpacked."""
-_LONGEST = 500
-"""Letters of a reason."""
+"""Size of all mesh files of a robot together, unpacked, bytes; readers take several times as much memory."""
 
 
 def link_shapes(
@@ -59,80 +58,71 @@ def link_shapes(
         Of the shapes that cannot be shown, the link and the reason; of missing files one line.
     """
     tree = read_tree(urdf, "URDF")
-    shapes = {}
+    shapes: dict[str, list[trimesh.Trimesh]] = {}
     unread = []
     absent: list[str] = []
     room = _LARGEST
     materials = [each for each in tree.robot if each.tag == "material"]
-    for name, link in tree.links.items():
-        found: list[trimesh.Trimesh] = []
-        for visual in link.findall("visual"):
-            missing = _find_meshes(visual, folder)
-            absent += missing
-            if missing:
-                continue
-            try:
-                room -= _check_size(visual, room)
-                found += _meshes(name, visual, materials)
-            except InputError as error:
-                unread.append(f"{name}: {error}"[:_LONGEST])
-            except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
-                unread.append(f"{name}: {type(error).__name__}: {error}"[:_LONGEST])
-        if found:
-            shapes[name] = found
+    visuals = [
+        (name, visual)
+        for name, link in tree.links.items()
+        for visual in link.findall("visual")
+    ]
+    for name, visual in visuals:
+        files = _find_meshes(visual, folder)
+        missing = [file for file, path in files.items() if path is None]
+        absent += missing
+        if missing:
+            continue
+        try:
+            for path in files.values():
+                room -= _check_size(Path(str(path)), room)
+            shapes.setdefault(name, []).extend(_meshes(name, visual, materials))
+        except InputError as error:
+            unread.append(f"{name}: {error}")
+        except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
+            unread.append(f"{name}: {type(error).__name__}: {error}")
     if absent:
         count = f"{len(absent)} mesh files are" if len(absent) > 1 else "a mesh file is"
-        where = (
-            "; ROS_PACKAGE_PATH may name the folder of its package"
-            if absent[0].startswith("package://")
-            else ""
-        )
-        unread.insert(
-            0,
-            f"{count} missing: {absent[0]}{', ...' if len(absent) > 1 else ''}{where}"[
-                :_LONGEST
-            ],
-        )
-    return shapes, unread
+        more = ", ..." if len(absent) > 1 else ""
+        where = ""
+        if absent[0].startswith("package://"):
+            where = "; ROS_PACKAGE_PATH may name the folder of its package"
+        unread.insert(0, f"{count} missing: {absent[0]}{more}{where}")
+    shown = {name: meshes for name, meshes in shapes.items() if meshes}
+    return shown, [reason[:500] for reason in unread]
 
 
-def _find_meshes(visual: Element, folder: Path) -> list[str]:
-    """Put the paths of a visual's mesh files in the place of their names; return those that are missing."""
-    missing = []
+def _find_meshes(visual: Element, folder: Path) -> dict[str, Path | None]:
+    """Put the paths of a visual's mesh files in the place of their names; return them by name, None if missing."""
+    found = {}
     for mesh in visual.iter("mesh"):
         name = str(mesh.get("filename"))
-        path = mesh_file(name, folder)
-        if path is None:
-            missing.append(name)
-        mesh.set("filename", str(path))
-    return missing
+        found[name] = mesh_file(name, folder)
+        mesh.set("filename", str(found[name]))
+    return found
 
 
-def _check_size(visual: Element, room: int) -> int:
-    """Return the size of a visual's mesh files, bytes.
+def _check_size(path: Path, room: int) -> int:
+    """Return the size of a mesh file, bytes.
 
     Raises
     ------
     InputError
-        They are packed, or larger than `room`, bytes.
+        It is packed, so that nobody knows its size, or larger than `room`, bytes.
     """
-    size = 0
-    for mesh in visual.iter("mesh"):
-        path = Path(str(mesh.get("filename")))
-        if path.suffix in _PACKED:
-            raise InputError(
-                "packed meshes are not read", where=path.name, hint="Unpack it"
-            )
-        size += _size(path)
-        if size > room:
-            found = f"{size / 1e6:.0f} MB"
-            allowed = f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
-            raise InputError(
-                "the mesh is too large to be shown",
-                where=path.name,
-                found=found,
-                allowed=allowed,
-            )
+    if path.suffix in {".gz", ".bz2"}:
+        raise InputError(
+            "packed meshes are not read", where=path.name, hint="Unpack it"
+        )
+    size = _size(path)
+    if size > room:
+        raise InputError(
+            "the mesh is too large to be shown",
+            where=path.name,
+            found=f"{size / 1e6:.0f} MB",
+            allowed=f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot",
+        )
     return size
 
 
@@ -158,8 +148,8 @@ def _meshes(
     import yourdfpy
 
     robot = etree.Element("robot", name="robot")
-    robot.extend([_copy(each) for each in materials])
-    etree.SubElement(robot, "link", name=name).append(_copy(visual))
+    robot.extend(deepcopy(materials))
+    etree.SubElement(robot, "link", name=name).append(deepcopy(visual))
     read = yourdfpy.URDF.load(
         io.BytesIO(etree.tostring(robot)),
         load_meshes=True,
@@ -171,12 +161,8 @@ def _meshes(
         placement, geometry = read.scene.graph.get(node)
         mesh = read.scene.geometry[geometry]
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-            found.append(
-                _place(
-                    trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual),
-                    placement,
-                )
-            )
+            bare = trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual)
+            found.append(_place(bare, placement))
     if not found or not all(np.isfinite(mesh.vertices).all() for mesh in found):
         file = next((mesh.get("filename") for mesh in visual.iter("mesh")), None)
         raise InputError(
@@ -185,22 +171,14 @@ def _meshes(
     return found
 
 
-def _copy(element: Element) -> Element:
-    return etree.fromstring(etree.tostring(element))
-
-
 def _place(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
     """Place a mesh, and see to its colour where it has no picture on it."""
-    look = getattr(
-        mesh.visual, "material", mesh.visual
-    )  # a material, or colours of the faces
-    if (
-        getattr(look, "baseColorTexture", None) is None
-        and getattr(look, "image", None) is None
-    ):
-        mesh = with_colour(
-            mesh, tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL
-        )
+    # A material, or colours of the faces.
+    look = getattr(mesh.visual, "material", mesh.visual)
+    pictures = [getattr(look, name, None) for name in ("baseColorTexture", "image")]
+    if pictures == [None, None]:
+        own = tuple(map(int, look.main_color)) if mesh.visual.defined else None
+        mesh = with_colour(mesh, own or _COLOURS["shape"])
     mesh.apply_transform(placement)
     return mesh
 
@@ -209,8 +187,8 @@ def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trime
     """Give a mesh a matt material, RGBA from 0 to 255, and sharp edges if it has few faces."""
     import trimesh
 
-    if len(mesh.faces) <= _PRIMITIVE:
-        mesh = trimesh.graph.smooth_shade(mesh, angle=_SHARP)
+    if len(mesh.faces) <= 2000:
+        mesh = trimesh.graph.smooth_shade(mesh, angle=0.6)  # rad
     material = trimesh.visual.material.PBRMaterial(
         baseColorFactor=colour, metallicFactor=0.1, roughnessFactor=0.65
     )
@@ -242,25 +220,13 @@ class Placements:
 def placements(robot: Robot, q: np.ndarray) -> Placements:
     """Forward kinematics of postures `q`, (K, n)."""
     model = robot.model
-    data = robot.model.createData()
-    frame = robot.frame_id
-    found = Placements(
-        np.empty((len(q), robot.n + 2, 3)), np.empty((len(q), robot.n + 2, 4))
-    )
-    for k, posture in enumerate(q):
+    data = model.createData()
+    frames = np.empty((len(q), robot.n + 2, 7))
+    for rows, posture in zip(frames, q, strict=True):
         pin.forwardKinematics(model, data, posture)
-        tool = pin.updateFramePlacement(model, data, frame)
-        for row, placement in enumerate((*data.oMi, tool)):
-            found.positions[k, row] = placement.translation
-            found.quaternions[k, row] = np.roll(
-                pin.Quaternion(placement.rotation).coeffs(), 1
-            )
-    return found
-
-
-_BONE = (72, 101, 129, 255)
-_JOINT = (230, 159, 0, 255)
-_AXIS = (120, 130, 140, 255)
+        tool = pin.updateFramePlacement(model, data, robot.frame_id)
+        rows[:] = [pin.SE3ToXYZQUAT(placement) for placement in (*data.oMi, tool)]
+    return Placements(frames[..., :3], frames[..., [6, 3, 4, 5]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,19 +241,17 @@ class Bodies:
         Joints and the straight lines between them.
     unread : tuple of str
         Shapes of the URDF that cannot be shown, and why.
-    lower, upper : (3,) ndarray
-        Corners of the box that the whole robot keeps within, m.
-    moving_lower, moving_upper : (3,) ndarray
+    box : (2, 3) ndarray
+        Lower and upper corner of the box that the whole robot keeps within, m.
+    moving_box : (2, 3) ndarray
         Of the box that its joints, what they move, and the tool keep within, m.
     """
 
     links: Mapping[int, Sequence[trimesh.Trimesh]]
     skeleton: Mapping[int, Sequence[trimesh.Trimesh]]
     unread: tuple[str, ...]
-    lower: np.ndarray
-    upper: np.ndarray
-    moving_lower: np.ndarray
-    moving_upper: np.ndarray
+    box: np.ndarray
+    moving_box: np.ndarray
 
     @property
     def shows_links(self) -> bool:
@@ -312,69 +276,69 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
     drawn = links or skeleton
     moving = {joint: meshes for joint, meshes in drawn.items() if joint}
     return Bodies(
-        links, skeleton, tuple(unread), *_box(drawn, found), *_box(moving, found)
+        links, skeleton, tuple(unread), _box(drawn, found), _box(moving, found)
     )
 
 
 def _box(
     bodies: Mapping[int, Sequence[trimesh.Trimesh]], found: Placements
-) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a box around joints, tool and bodies in all postures."""
+) -> np.ndarray:
+    """Corners, (2, 3), of a box around joints, tool and bodies in all postures."""
+    import trimesh
     from scipy.spatial.transform import Rotation
 
     points = [found.positions[:, 1:].reshape(-1, 3)]
     for joint, meshes in bodies.items():
-        corners = np.concatenate([_corners(mesh.bounds) for mesh in meshes])
-        turned = (
-            Rotation.from_quat(
-                found.quaternions[:, joint], scalar_first=True
-            ).as_matrix()
-            @ corners.T
+        corners = np.concatenate(
+            [trimesh.bounds.corners(each.bounds) for each in meshes]
         )
-        points.append(
-            (found.positions[:, joint, :, None] + turned)
-            .transpose(0, 2, 1)
-            .reshape(-1, 3)
-        )
+        turns = Rotation.from_quat(found.quaternions[:, joint], scalar_first=True)
+        for turn, position in zip(turns, found.positions[:, joint], strict=True):
+            points.append(position + turn.apply(corners))
     every = np.concatenate(points)
-    return every.min(axis=0), every.max(axis=0)
-
-
-def _corners(bounds: np.ndarray) -> np.ndarray:
-    return np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
+    return np.array([every.min(axis=0), every.max(axis=0)])
 
 
 def _skeleton(
     trajectory: Trajectory, radius: float
 ) -> dict[int, list[trimesh.Trimesh]]:
     """Draw every joint, and the link from it to the next one; along the axis of a prismatic joint where it slides."""
+    import trimesh
+
     robot = trajectory.robot
     model = robot.model
-    tool = robot.model.frames[robot.frame_id]
-    base = model.frames[
-        model.getFrameId(robot.base_frame, pin.FrameType.BODY)
-    ].placement.translation
-    begins = [base, *np.zeros((robot.n, 3))]
-    drawn: dict[int, list[trimesh.Trimesh]] = {
-        joint: [] for joint in range(robot.n + 1)
-    }
+    base = model.getFrameId(robot.base_frame, pin.FrameType.BODY)
+    begin = model.frames[base].placement.translation
+    drawn: dict[int, list[trimesh.Trimesh]] = {}
+
+    def draw(joint: int, mesh: trimesh.Trimesh, kind: str) -> None:
+        drawn.setdefault(joint, []).append(with_colour(mesh, _COLOURS[kind]))
+
+    def draw_rod(
+        joint: int, first: np.ndarray, last: np.ndarray, thick: float, kind: str
+    ) -> None:
+        """Draw a cylinder between two points if they are apart; `thick` as a multiple of the radius."""
+        if np.linalg.norm(last - first) >= 1e-9:
+            ends = [first, last]
+            rod = trimesh.creation.cylinder(thick * radius, segment=ends, sections=24)
+            draw(joint, rod, kind)
+
     for joint in range(robot.n):
         placement = model.jointPlacements[joint + 1]
         axis = _axis(model.joints[joint + 1])
-        drawn[joint] += _rod(begins[joint], placement.translation, radius, _BONE)
-        if robot.position_units[joint] == "m":
-            low, high = (
-                placement.act(axis * reach) for reach in _range(trajectory, joint)
-            )
-            drawn[joint] += _rod(low, high, 0.5 * radius, _AXIS)
-            drawn[joint + 1] += _block(3.0 * radius, _JOINT)
-        else:
+        draw_rod(joint, begin, placement.translation, 1.0, "bone")
+        if robot.revolute[joint]:
             half = 2.0 * radius * axis
-            drawn[joint + 1] += _rod(-half, half, 1.7 * radius, _JOINT)
-    drawn[tool.parentJoint] += _rod(
-        begins[-1], tool.placement.translation, radius, _BONE
-    )
-    return {joint: meshes for joint, meshes in drawn.items() if meshes}
+            draw_rod(joint + 1, -half, half, 1.7, "joint")
+        else:
+            low, high = _range(trajectory, joint)
+            rail = (placement.act(axis * low), placement.act(axis * high))
+            draw_rod(joint, *rail, 0.5, "axis")
+            draw(joint + 1, trimesh.creation.box((3.0 * radius,) * 3), "joint")
+        begin = np.zeros(3)
+    tool = model.frames[robot.frame_id]
+    draw_rod(tool.parentJoint, begin, tool.placement.translation, 1.0, "bone")
+    return drawn
 
 
 def _axis(joint: Any) -> np.ndarray:
@@ -383,34 +347,49 @@ def _axis(joint: Any) -> np.ndarray:
     return subspace[:3] if np.any(subspace[:3]) else subspace[3:]
 
 
-def _range(trajectory: Trajectory, joint: int) -> tuple[float, float]:
-    """Positions between which a prismatic joint can move, m; where it has no ends, those of the motion."""
+def _range(trajectory: Trajectory, joint: int) -> np.ndarray:
+    """Positions between which a prismatic joint can move, (2,), m; ends that it does not have are the motion's."""
     limits = trajectory.robot.limits
     q = trajectory.q[:, joint]
-    low = float(limits.position_lower[joint])
-    high = float(limits.position_upper[joint])
-    return (
-        low if np.isfinite(low) else float(q.min()),
-        high if np.isfinite(high) else float(q.max()),
-    )
+    ends = np.array([limits.position_lower[joint], limits.position_upper[joint]])
+    return np.where(np.isfinite(ends), ends, [q.min(), q.max()])
 
 
-def _rod(
-    begin: np.ndarray, end: np.ndarray, radius: float, colour: tuple[int, ...]
-) -> list[trimesh.Trimesh]:
-    """Cylinder between two points; nothing where they are one."""
-    import trimesh
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A trajectory at even times.
 
-    if np.linalg.norm(end - begin) < 1e-9:
-        return []
-    return [
-        with_colour(
-            trimesh.creation.cylinder(radius, segment=[begin, end], sections=24), colour
-        )
-    ]
+    Attributes
+    ----------
+    trajectory : Trajectory
+    samples : Samples
+        At K times from start to end.
+    frames : Placements
+        At the same times.
+    path : (K, 3) ndarray
+        The prescribed path at the motion's own s, m; what it does not prescribe is the tool's.
+    ghosts : Placements
+        At a few even times from start to end.
+    """
 
+    trajectory: Trajectory
+    samples: Samples
+    frames: Placements
+    path: np.ndarray
+    ghosts: Placements
 
-def _block(size: float, colour: tuple[int, ...]) -> list[trimesh.Trimesh]:
-    import trimesh
-
-    return [with_colour(trimesh.creation.box((size, size, size)), colour)]
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> Motion:
+        """Evaluate a trajectory."""
+        samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
+        frames = placements(trajectory.robot, samples.q)
+        times = np.linspace(0.0, trajectory.t_end, 6)
+        ghosts = placements(trajectory.robot, trajectory.position(times))
+        path = frames.tool.copy()
+        task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
+        axes = list(task_map.axes)
+        if axes:
+            prescribed = path_of(task_map, trajectory.task)
+            target = prescribed.sample(np.clip(samples.s, 0.0, 1.0)).target
+            path[:, axes] = target[:, : len(axes)]
+        return cls(trajectory, samples, frames, path, ghosts)

@@ -4,36 +4,63 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.plots.style import COLOURS, LINE_STYLES
+from brachis.apps.bottleneck.saturation import limit_ratios
+from brachis.apps.plots import style
+from brachis.apps.plots.panels import Panel, panels_of, ratio_panel, titles_of
 from brachis.apps.view import tables
-from brachis.apps.view.curves import Curves, Motion, all_curves
+from brachis.apps.view.bodies import Motion
 from brachis.apps.view.scene import Scene, speed_colours
 from brachis.errors import BrachisError
+from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
     import viser
     from viser import uplot
 
-_HEIGHT = 165
-_LEFT = 40
-_RIGHT = 12
-_ABOVE = 6
-_BELOW = 44
-"""Of a plot, and what is around its curves; pixels."""
-_LABEL = 16
-"""Of the height below, for the label."""
-_EDGE = 9.5
-_EDGES = 18.5
-_GAP = 12
-"""What viser leaves to the left of a plot (less half the line), on both sides and below, pixels; a test measures it."""
+_PIXELS = {
+    "height": 165,  # of a plot
+    "left": 40,  # of the curves in it, and so on
+    "right": 12,
+    "above": 6,
+    "below": 44,
+    "label": 16,  # of the part below
+    "outside left": 9.5,  # what viser leaves free around a plot; a test measures it
+    "outside": 18.5,  # on both sides together
+    "outside below": 12,
+}
 _FONT = "11px sans-serif"
-_NOW = "#D00000"
-_LIMIT = "#666666"
+
+
+def shown_panels(
+    trajectory: Trajectory, samples: Samples, *, degrees: bool = False
+) -> list[Panel]:
+    """Make the panels of the viewer: ratios to all limits, joints without a limit, and the tool's speed.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    samples : Samples
+    degrees : bool, optional
+        Whether angles of joints without limits are in degrees.
+    """
+    ratios = limit_ratios(trajectory)
+    found = []
+    for title in titles_of(ratios):
+        panel = ratio_panel(trajectory, ratios, title)
+        is_last = np.append(np.diff(panel.t) > 0.0, True)  # times of jumps occur twice
+        found.append(replace(panel, t=panel.t[is_last], values=panel.values[is_last]))
+    rows = ("torque", "velocity", "position")
+    for panel in panels_of(trajectory, samples, *rows, degrees=degrees):
+        if not panel.is_limited.all():
+            free = panel.select(~panel.is_limited)
+            found.append(replace(free, unit=f"{free.unit}, no limit"))
+    return [*found, *panels_of(trajectory, samples, "tool speed")]
 
 
 class Chart:
@@ -43,124 +70,111 @@ class Chart:
     ----------
     gui : viser.GuiApi
         Where it is added.
-    curves : Curves
+    panel : Panel
     """
 
-    def __init__(self, gui: viser.GuiApi, curves: Curves) -> None:
-        self._curves = curves
-        gui.add_html(_heading(curves))
+    def __init__(self, gui: viser.GuiApi, panel: Panel) -> None:
+        self._t_end = float(panel.t[-1])
+        data = [panel.t]
+        series: list[uplot.Series] = [{"label": "time (s)"}]
+        for limit, _ in panel.near_limits():
+            data.append(np.broadcast_to(limit, panel.t.shape))
+            series.append(_series("limit", style.GREY, 1.0, (5.0, 4.0)))
+        for name, number, values in zip(
+            panel.names, panel.styles.tolist(), panel.values.T, strict=True
+        ):
+            colour, dash = look(number)
+            data.append(values)
+            series.append(_series(name, colour, 1.6, dash))
+        gui.add_html(_heading(panel))
         gui.add_uplot(
-            self._data(),
-            self._series(),
-            scales={"x": {"time": False}, "y": {"range": (curves.low, curves.high)}},
+            tuple(data),
+            tuple(series),
+            scales={"x": {"time": False}, "y": {"range": panel.view()}},
             axes=(
                 {
                     "font": _FONT,
-                    "size": _BELOW - _LABEL,
+                    "size": _PIXELS["below"] - _PIXELS["label"],
                     "label": "time (s)",
-                    "labelSize": _LABEL,
+                    "labelSize": _PIXELS["label"],
                     "labelFont": _FONT,
                 },
-                {"font": _FONT, "size": _LEFT},
+                {"font": _FONT, "size": _PIXELS["left"]},
             ),
             legend={"show": False},
             cursor={"drag": {"x": False, "y": False, "setScale": False}},
-            height=_HEIGHT,
-            padding=(_ABOVE, _RIGHT, 0, 0),
+            height=_PIXELS["height"],
+            padding=(_PIXELS["above"], _PIXELS["right"], 0, 0),
         )
         self._line = gui.add_html(_line(0.0))
 
     def mark(self, t: float) -> None:
         """Draw the line at time `t`, s."""
-        self._line.content = _line(t / float(self._curves.t[-1]))
+        self._line.content = _line(t / self._t_end)
 
-    def _series(self) -> tuple[uplot.Series, ...]:
-        """Time, limits and curves."""
-        lines: list[uplot.Series] = [{"label": "time (s)"}]
-        hidden: uplot.Series_Points = {"show": False}
-        lines += [
-            {
-                "label": "limit",
-                "stroke": _LIMIT,
-                "width": 1.0,
-                "dash": (5.0, 4.0),
-                "points": hidden,
-            }
-            for _ in self._curves.bounds
-        ]
-        for name, style in zip(self._curves.names, self._curves.styles, strict=True):
-            colour, dash = look(style)
-            lines.append(
-                {
-                    "label": name,
-                    "stroke": colour,
-                    "width": 1.6,
-                    "dash": dash,
-                    "points": hidden,
-                }
-            )
-        return tuple(lines)
 
-    def _data(self) -> tuple[np.ndarray, ...]:
-        """Columns of the plot."""
-        t = self._curves.t
-        values = self._curves.values
-        return (
-            t,
-            *(np.full_like(t, bound) for bound in self._curves.bounds),
-            *values.T,
-        )
+def _series(
+    label: str, colour: str, width: float, dash: tuple[float, ...]
+) -> uplot.Series:
+    """Describe a line without points."""
+    return {
+        "label": label,
+        "stroke": colour,
+        "width": width,
+        "dash": dash,
+        "points": {"show": False},
+    }
 
 
 def _line(part: float) -> str:
-    """Line over the plot above it, at a part of its width; a plot that is given new data ever so often would blink."""
-    left = (
-        f"calc({_EDGE + _LEFT}px + {part:.5f} * (100% - {_EDGES + _LEFT + _RIGHT}px))"
-    )
-    style = f"position:absolute;z-index:5;width:1.5px;background:{_NOW};left:{left};bottom:{_BELOW + _GAP}px"
+    """Line over the plot above it, at a part of its width; a plot whose data are replaced so often would blink."""
+    before = _PIXELS["outside left"] + _PIXELS["left"]
+    around = _PIXELS["outside"] + _PIXELS["left"] + _PIXELS["right"]
+    left = f"calc({before}px + {part:.5f} * (100% - {around}px))"
+    bottom = _PIXELS["below"] + _PIXELS["outside below"]
+    height = _PIXELS["height"] - _PIXELS["above"] - _PIXELS["below"]
+    place = f"left:{left};bottom:{bottom}px;height:{height}px"
+    style_now = f"position:absolute;z-index:5;width:1.5px;background:#D00000;{place}"
     return (
         '<div style="position:relative;height:0;pointer-events:none">'
-        f'<div data-part="{part:.5f}" style="{style};height:{_HEIGHT - _ABOVE - _BELOW}px"></div></div>'
+        f'<div data-part="{part:.5f}" style="{style_now}"></div></div>'
     )
 
 
-def look(style: int) -> tuple[str, tuple[float, ...]]:
-    """Colour and dashes of the curve with this number, as in the figures."""
-    turn, colour = divmod(style, len(COLOURS))
-    dashes = LINE_STYLES[turn % len(LINE_STYLES)]
-    return COLOURS[colour], () if isinstance(dashes, str) else tuple(
-        2.0 * length for length in dashes[1]
+def look(number: int) -> tuple[str, tuple[float, ...]]:
+    """Colour and dashes of the curve with this number: solid until all colours are used."""
+    turn, colour = divmod(number, len(style.COLOURS))
+    dashes = style.LINE_STYLES[turn % len(style.LINE_STYLES)]
+    solid = isinstance(dashes, str)
+    lengths = () if solid else tuple(2.0 * length for length in dashes[1])
+    return style.COLOURS[colour], lengths
+
+
+def _heading(panel: Panel) -> str:
+    """Title of a plot, and the names in the colours of their curves, as HTML."""
+    entries = []
+    for name, number in zip(panel.names, panel.styles.tolist(), strict=True):
+        colour, dashes = look(number)
+        border = f"2.5px {'dashed' if dashes else 'solid'} {colour}"
+        line = f"display:inline-block;width:1.2em;border-top:{border};vertical-align:middle;margin-right:0.3em"
+        entries.append(
+            f'<span style="white-space:nowrap;margin-right:0.8em"><span style="{line}"></span>'
+            f"{html.escape(name)}</span>"
+        )
+    return (
+        '<div style="margin:0.3em 0.8em 0 0.8em">'
+        f'<div style="font-size:0.85em;font-weight:600">{html.escape(panel.heading)}</div>'
+        f'<div style="font-size:0.8em;line-height:1.5">{"".join(entries)}</div></div>'
     )
-
-
-def legend(names: Sequence[str], styles: Sequence[int]) -> str:
-    """Names in the colours of their curves, as HTML."""
-    entries = (
-        f'<span style="white-space:nowrap;margin-right:0.8em"><span style="display:inline-block;width:1.2em;'
-        f"border-top:2.5px {'dashed' if look(style)[1] else 'solid'} {look(style)[0]};vertical-align:middle;"
-        f'margin-right:0.3em"></span>{html.escape(name)}</span>'
-        for name, style in zip(names, styles, strict=True)
-    )
-    return f'<div style="font-size:0.8em;line-height:1.5">{"".join(entries)}</div>'
-
-
-def _heading(curves: Curves) -> str:
-    """Title and legend of a plot."""
-    title = f'<div style="font-size:0.85em;font-weight:600">{html.escape(curves.title)}</div>'
-    return f'<div style="margin:0.3em 0.8em 0 0.8em">{title}{legend(curves.names, curves.styles)}</div>'
 
 
 RATES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 """Speeds at which a motion can be played, as parts of the real one."""
-_WATCHED = 3.0
-"""Least time that a motion is played in at first, s."""
-_PAUSE = 0.7
-"""How long the end is shown before a motion begins again, s."""
 
 
 def first_rate(t_end: float) -> float:
-    """Return the largest of `RATES`, at most the real one, at which a motion of `t_end` s can be watched."""
-    slow = [rate for rate in RATES if rate <= 1.0 and t_end / rate >= _WATCHED]
+    """Return the largest of `RATES`, no more than the real one, at which a motion of `t_end` s takes 3 s or more."""
+    slow = [rate for rate in RATES if rate <= 1.0 and t_end / rate >= 3.0]
     return max(slow, default=RATES[0])
 
 
@@ -203,7 +217,7 @@ class Playback:
             self.playing = False
             return self.time
         self._waited += elapsed
-        if self.loops or self._waited >= _PAUSE:
+        if self.loops or self._waited >= 0.7:  # s
             self.time = 0.0
         return self.time
 
@@ -219,7 +233,7 @@ class Playback:
             self.time = 0.0
 
 
-class Panel:
+class Controls:
     """What is beside the scene.
 
     Parameters
@@ -232,7 +246,7 @@ class Panel:
     show : callable
         Called when the user has chosen another instant.
     candidates : sequence of mapping
-        What the search looked at, as `Attempt.to_dict` gives it.
+        What the search looked at, as `Candidate.to_dict` gives it.
     notes : sequence of str
         What else the user should know.
     verified : bool or None
@@ -303,18 +317,14 @@ class Panel:
         self._button = self._gui.add_button("Pause")
         self._button.on_click(self._toggle)
         self._rates = {f"{rate:g} x real time": rate for rate in RATES}
-        current = next(
-            name for name, rate in self._rates.items() if rate == self._playback.rate
-        )
-        self._gui.add_dropdown(
-            "speed", tuple(self._rates), initial_value=current
-        ).on_update(self._set_rate)
-        self._gui.add_checkbox("again and again", self._playback.repeats).on_update(
-            self._set_repeats
-        )
-        self._gui.add_button(
-            "Download the report", hint="The motion as one HTML page"
-        ).on_click(self._send_report)
+        rate = f"{self._playback.rate:g} x real time"
+        rates = self._gui.add_dropdown("speed", tuple(self._rates), initial_value=rate)
+        rates.on_update(self._set_rate)
+        repeats = self._gui.add_checkbox("again and again", self._playback.repeats)
+        repeats.on_update(self._set_repeats)
+        hint = "The motion as one HTML page"
+        download = self._gui.add_button("Download the report", hint=hint)
+        download.on_click(self._send_report)
 
     def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         """Show what the user chose with the slider, and stay there."""
@@ -341,7 +351,7 @@ class Panel:
         try:
             page = make_report(self._motion.trajectory, degrees=self._degrees)
         except BrachisError as error:
-            event.client.add_notification("There is no report", str(error))
+            event.client.add_notification("The report cannot be made", str(error))
             return
         event.client.send_file_download(
             "report.html", page.content, save_immediately=True
@@ -355,7 +365,7 @@ class Panel:
             for name, handles in scene.layers.items():
                 if handles:
                     box = self._gui.add_checkbox(name, handles[0].visible)
-                    box.on_update(_switch(scene, name))
+                    box.on_update(partial(_switch, scene, name))
 
     def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> list[Chart]:
         """Add a panel with the plots and the list of candidates."""
@@ -363,8 +373,8 @@ class Panel:
         panel = self._gui.add_panel()
         with panel.add_tab("limits"):
             charts = [
-                Chart(self._gui, curves)
-                for curves in all_curves(
+                Chart(self._gui, each)
+                for each in shown_panels(
                     motion.trajectory, motion.samples, degrees=self._degrees
                 )
             ]
@@ -380,11 +390,7 @@ class Panel:
 
 
 def _switch(
-    scene: Scene, name: str
-) -> Callable[[viser.GuiEvent[viser.GuiCheckboxHandle]], None]:
-    """Return what shows or hides a layer."""
-
-    def switch(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
-        scene.set_visible(name, visible=event.target.value)
-
-    return switch
+    scene: Scene, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]
+) -> None:
+    """Show or hide a layer of the scene."""
+    scene.set_visible(name, visible=event.target.value)

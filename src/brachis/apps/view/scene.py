@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.plots.postures import drawing_plane
-from brachis.apps.view.bodies import Bodies, Placements, placements
-from brachis.apps.view.curves import Motion
-from brachis.robot import task_map_of
+from brachis.apps.plots.postures import plane_of
+from brachis.apps.view.bodies import Bodies, Motion, placements
 
 if TYPE_CHECKING:
     import viser
@@ -27,21 +25,6 @@ LAYERS = (
     "ground",
 )
 """What can be shown and hidden."""
-_GHOST_FIRST = np.array([190.0, 214.0, 235.0])
-_GHOST_LAST = np.array([25.0, 75.0, 125.0])
-_SHADES = 32
-"""Colours of the trace."""
-_FINE = 2000
-"""Faces of a mesh that is drawn as its convex hull where it is a ghost."""
-_PATH = (30, 30, 30)
-_START = (0, 158, 115)
-_END = (213, 94, 0)
-_FIELD_OF_VIEW = 0.75
-"""rad."""
-_ROOM = 1.35
-"""Distance of the camera, as a multiple of the one from which the motion fills the height of the picture."""
-_SIDE = np.radians(50.0)
-"""From the direction in which the arm reaches to where it is looked at from, in the ground plane."""
 
 
 class Scene:
@@ -60,9 +43,8 @@ class Scene:
         self._api = server.scene
         self._motion = motion
         self._bodies = bodies
-        self._api.configure_environment_map(
-            None
-        )  # a plain light shows pale robots on the white page better
+        # A plain light shows pale robots on the white page better.
+        self._api.configure_environment_map(None)
         self._api.add_light_hemisphere(
             "/light",
             sky_color=(255, 255, 255),
@@ -70,7 +52,7 @@ class Scene:
             intensity=2.0,
         )
         self._robot = motion.trajectory.robot
-        self._size = float(np.linalg.norm(bodies.moving_upper - bodies.moving_lower))
+        self._size = float(np.linalg.norm(np.ptp(bodies.moving_box, axis=0)))
         self.layers: dict[str, Layer] = {name: [] for name in LAYERS}
         self._frames = [
             self._api.add_frame(f"/joint {k}", show_axes=False)
@@ -119,32 +101,29 @@ class Scene:
         """Hang links and skeleton on the joints' frames, one asset for each."""
         import trimesh
 
-        for layer, bodies in (
-            ("robot", self._bodies.links),
-            ("skeleton", self._bodies.skeleton),
-        ):
+        layers = {"robot": self._bodies.links, "skeleton": self._bodies.skeleton}
+        for layer, bodies in layers.items():
             for joint, meshes in bodies.items():
                 asset = trimesh.Scene(list(meshes)).export(file_type="glb")
-                self.layers[layer].append(
-                    self._api.add_glb(f"/joint {joint}/{layer}", asset)
-                )
+                handle = self._api.add_glb(f"/joint {joint}/{layer}", asset)
+                self.layers[layer].append(handle)
 
     def _draw_ghosts(self) -> None:
-        """Draw what moves a few times, fainter, the later the darker."""
+        """Draw what moves a few times, fainter, the later the darker; meshes of many faces as their convex hulls."""
         import trimesh
 
-        bodies = (
-            self._bodies.links if self._bodies.shows_links else self._bodies.skeleton
-        )
+        links = self._bodies.links
+        bodies = links if self._bodies.shows_links else self._bodies.skeleton
         ghosts = self._motion.ghosts
-        shades = np.linspace(_GHOST_FIRST, _GHOST_LAST, len(ghosts.positions)).astype(
-            np.uint8
-        )
+        first = (190.0, 214.0, 235.0)
+        last = (25.0, 75.0, 125.0)
+        shades = np.linspace(first, last, len(ghosts.positions)).astype(np.uint8)
         for joint, meshes in bodies.items():
-            if _still(ghosts, joint):
+            frames = (ghosts.positions[:, joint], ghosts.quaternions[:, joint])
+            if np.ptp(np.hstack(frames), axis=0).max() < 1e-9:  # it stands still
                 continue
             coarse = [
-                mesh.convex_hull if len(mesh.faces) > _FINE else mesh for mesh in meshes
+                mesh.convex_hull if len(mesh.faces) > 2000 else mesh for mesh in meshes
             ]
             whole = trimesh.util.concatenate(
                 [trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse]
@@ -153,8 +132,8 @@ class Scene:
                 f"/ghosts/{joint}",
                 whole.vertices,
                 whole.faces,
-                batched_wxyzs=ghosts.quaternions[:, joint],
-                batched_positions=ghosts.positions[:, joint],
+                batched_positions=frames[0],
+                batched_wxyzs=frames[1],
                 batched_colors=shades,
                 opacity=0.13,
                 cast_shadow=False,
@@ -165,57 +144,47 @@ class Scene:
     def _draw_path(self) -> None:
         """Draw the prescribed path with its ends."""
         points = self._motion.path
-        layer = self.layers["path"]
-        layer.append(
-            self._api.add_line_segments(
-                "/path",
-                _segments(points),
-                _PATH,
-                thickness=2.5,
-                thickness_units="screen",
-            )
-        )
-        for name, point, colour in (
-            ("end", points[-1], _END),
-            ("start", points[0], _START),
-        ):
+        self._draw_line("path", "/path", _segments(points), (30, 30, 30), 2.5)
+        ends = {"start": (points[0], (0, 158, 115)), "end": (points[-1], (213, 94, 0))}
+        for name, (point, colour) in ends.items():
             ball = self._api.add_icosphere(
                 f"/path/{name}", 0.009 * self._size, color=colour, position=point
             )
-            layer.append(ball)
+            self.layers["path"].append(ball)
 
     def _draw_trace(self) -> None:
-        """Draw the way of the tool, coloured by its speed."""
+        """Draw the way of the tool in 32 colours of its speed; viser shows colours of single points too light."""
         speed = self._motion.samples.tool_speed
         segments = _segments(self._motion.frames.tool)
         parts = 0.5 * (speed[:-1] + speed[1:]) / max(float(speed.max()), 1e-9)
-        shades = np.round(parts * (_SHADES - 1)).astype(int)
-        colours = speed_colours(np.linspace(0.0, 1.0, _SHADES))
-        for shade in np.unique(
-            shades
-        ).tolist():  # viser shows colours of single points lighter than they are
-            lines = self._api.add_line_segments(
-                f"/trace/{shade}",
-                segments[shades == shade],
-                colours[shade],
-                thickness=7.0,
-                thickness_units="screen",
-            )
-            self.layers["tool trace"].append(lines)
+        shades = np.round(31.0 * parts).astype(int)
+        colours = speed_colours(np.linspace(0.0, 1.0, 32))
+        for shade in np.unique(shades).tolist():
+            pieces = segments[shades == shade]
+            self._draw_line("tool trace", f"/trace/{shade}", pieces, colours[shade], 7)
+
+    def _draw_line(
+        self, layer: str, name: str, segments: np.ndarray, colour: Any, thickness: float
+    ) -> None:
+        """Draw straight pieces (K, 2, 3), so many pixels thick."""
+        line = self._api.add_line_segments(
+            name, segments, colour, thickness=thickness, thickness_units="screen"
+        )
+        self.layers[layer].append(line)
 
     def _draw_ground(self) -> float:
         """Draw a grid below everything; returns the size of its cells, m."""
-        low = self._bodies.lower
-        high = self._bodies.upper
+        low, high = self._bodies.box
         cell = float(10.0 ** np.round(np.log10(0.06 * self._size)))
-        width, height = 10.0 * cell * np.ceil((high - low)[:2] / (10.0 * cell) + 1.0)
-        centre = 10.0 * cell * np.round(0.5 * (low + high)[:2] / (10.0 * cell))
+        section = 10.0 * cell
+        width, height = section * np.ceil((high - low)[:2] / section + 1.0)
+        centre = section * np.round(0.5 * (low + high)[:2] / section)
         grid = self._api.add_grid(
             "/ground",
             width=float(width),
             height=float(height),
             cell_size=cell,
-            section_size=10.0 * cell,
+            section_size=section,
             cell_color=(225, 225, 225),
             section_color=(170, 170, 170),
             shadow_opacity=0.2,
@@ -226,33 +195,27 @@ class Scene:
 
     def _aim(self, server: viser.ViserServer) -> None:
         """Look at the whole motion: a planar one at its plane, any other from the side to which the arm reaches."""
-        centre = 0.5 * (self._bodies.moving_lower + self._bodies.moving_upper)
-        distance = _ROOM * 0.5 * self._size / np.sin(0.5 * _FIELD_OF_VIEW)
         camera = server.initial_camera
-        camera.fov = _FIELD_OF_VIEW
+        camera.fov = 0.75  # rad
+        # 1.35 times the distance from which the motion fills the height of the picture.
+        distance = 1.35 * 0.5 * self._size / np.sin(0.5 * camera.fov)
         camera.near = 0.005 * distance
         camera.far = 100.0 * distance
-        camera.look_at = centre
-        camera.position = centre + distance * self._direction()
+        camera.look_at = self._bodies.moving_box.mean(axis=0)
+        camera.position = camera.look_at + distance * self._direction()
 
     def _direction(self) -> np.ndarray:
         """Return the unit vector from the scene to the camera, (3,)."""
-        trajectory = self._motion.trajectory
-        axes = task_map_of(self._robot, trajectory.task.task_space).axes
-        plane = drawing_plane(self._robot, trajectory.q[0], axes)
-        if plane is None:
-            base = self._motion.frames.positions[:, 1].mean(axis=0)
-            tool = self._motion.frames.tool.mean(axis=0)
-            azimuth = np.arctan2(*(tool - base)[1::-1]) - _SIDE
-            direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.55])
-        else:
-            direction = np.array(
-                {
-                    (0, 1): (0.0, -0.45, 1.0),
-                    (0, 2): (0.0, -1.0, 0.3),
-                    (1, 2): (1.0, 0.0, 0.3),
-                }[plane]
-            )
+        frames = self._motion.frames
+        reach = frames.tool.mean(axis=0) - frames.positions[:, 1].mean(axis=0)
+        azimuth = np.arctan2(reach[1], reach[0]) - np.radians(50.0)
+        directions = {
+            None: (np.cos(azimuth), np.sin(azimuth), 0.55),
+            (0, 1): (0.0, -0.45, 1.0),
+            (0, 2): (0.0, -1.0, 0.3),
+            (1, 2): (1.0, 0.0, 0.3),
+        }
+        direction = np.array(directions[plane_of(self._motion.trajectory)])
         return np.asarray(direction / np.linalg.norm(direction))
 
 
@@ -266,9 +229,3 @@ def speed_colours(parts: np.ndarray) -> np.ndarray:
     from matplotlib import colormaps
 
     return np.asarray(colormaps["plasma"](0.88 * parts, bytes=True)[:, :3])
-
-
-def _still(found: Placements, joint: int) -> bool:
-    """Whether what this joint moves stays where it is in all postures."""
-    frames: Any = np.hstack([found.positions[:, joint], found.quaternions[:, joint]])
-    return bool(np.ptp(frames, axis=0).max() < 1e-9)

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 8080
-"""The port that is tried first where none is asked for."""
-_TRIED = 100
-_HIGHEST = 65535
+"""The port that is tried first if none is asked for."""
 
 
 def start_server(host: str, port: int | None) -> viser.ViserServer:
@@ -54,14 +52,14 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
             with _quiet():
                 super().stop()
 
-    chosen = _free_port(host) if port is None else port
-    _check(host, chosen)
+    _check(host, port or 0)
     logging.getLogger("websockets.server").addFilter(_is_of_a_page)
+    first = FIRST_PORT if port is None else port  # viser takes the next free one
     with _quiet():
-        server = Server(host=host, port=chosen, label="brachis", verbose=False)
-    if chosen not in (0, server.get_port()):  # somebody took it in between
+        server = Server(host=host, port=first, label="brachis", verbose=False)
+    if port and port != server.get_port():  # somebody took it in between
         server.stop()
-        raise _in_use(host, chosen)
+        raise _in_use(host, port)
     return server
 
 
@@ -77,7 +75,7 @@ def require_viser() -> None:
 
 
 def is_local(host: str) -> bool:
-    """Whether an address that was listened on is reached from this machine alone."""
+    """Tell whether an address that was listened on is reached from this machine alone."""
     addresses = {
         str(found[4][0])
         for found in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
@@ -97,27 +95,8 @@ def _is_of_a_page(record: logging.LogRecord) -> bool:
     return record.exc_info is None or not isinstance(record.exc_info[1], InvalidMessage)
 
 
-def _free_port(host: str) -> int:
-    """Return the first free port from `FIRST_PORT` on."""
-    for port in range(FIRST_PORT, FIRST_PORT + _TRIED):
-        try:
-            _check(host, port)
-        except _InUseError:
-            continue
-        return port
-    raise InputError(
-        "no port is free",
-        where="--port",
-        found=f"all from {FIRST_PORT} to {FIRST_PORT + _TRIED - 1} are in use",
-    )
-
-
-class _InUseError(InputError):
-    """Somebody listens there already."""
-
-
-def _in_use(host: str, port: int) -> _InUseError:
-    return _InUseError(
+def _in_use(host: str, port: int) -> InputError:
+    return InputError(
         "the port is in use",
         where="--port",
         found=f"{port} on {host}",
@@ -128,19 +107,13 @@ def _in_use(host: str, port: int) -> _InUseError:
 
 def _check(host: str, port: int) -> None:
     """Refuse an address that cannot be listened on."""
-    if not 0 <= port <= _HIGHEST:
+    if not 0 <= port <= 65535:
         raise InputError(
-            "is no port", where="--port", found=port, allowed=f"0 to {_HIGHEST}"
+            "the port does not exist", where="--port", found=port, allowed="0 to 65535"
         )
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM
-        )[0]
-        with socket.socket(family, kind, protocol) as trial:
-            trial.setsockopt(
-                socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
-            )  # as the server does: none waits for old ones
-            trial.bind(address)
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        socket.create_server(found[4], family=found[0]).close()
     except (OSError, UnicodeError) as error:
         if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
             raise _in_use(host, port) from error

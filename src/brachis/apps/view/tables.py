@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from brachis.apps.plots.quantities import joint_quantities
+from brachis.apps.plots.panels import panels_of, select_joint
 from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import Samples, Trajectory
 
@@ -34,25 +34,20 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
         f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
         f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
     )
-    rows = [
-        [
-            name,
-            *(
-                f"{_write_number(part.values[0, 0], digits)} {part.unit}"
-                for part, digits in zip(parts, _STATE.values(), strict=True)
-            ),
+    panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
+    rows = []
+    for name in trajectory.joint_names:
+        parts = zip(select_joint(panels, name), _STATE.values(), strict=True)
+        cells = [
+            f"{_write_number(part.values[0, 0], digits)} {part.unit}"
+            for part, digits in parts
         ]
-        for name, parts in zip(
-            trajectory.joint_names,
-            joint_quantities(trajectory, now, *_STATE, degrees=degrees),
-            strict=True,
-        )
-    ]
+        rows.append([name, *cells])
     return head + _table(("joint", "position", "velocity", "torque, force"), rows)
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
-    """List what the search looked at, as `Attempt.to_dict` gives it, the fastest verified one first.
+    """List what the search looked at, as `Candidate.to_dict` gives it, the fastest verified one first.
 
     The same motion is listed once.
     """

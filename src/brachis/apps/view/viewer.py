@@ -8,21 +8,14 @@ import sys
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from types import TracebackType
 from typing import Any, Self
 
-from brachis.apps.view.bodies import bodies_of
-from brachis.apps.view.curves import Motion
-from brachis.apps.view.panel import Panel, Playback, first_rate
+from brachis.apps.view.bodies import Motion, bodies_of
+from brachis.apps.view.panel import Controls, Playback, first_rate
 from brachis.apps.view.scene import Scene
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
 from brachis.common import interrupts
 from brachis.trajectory import Trajectory, motion_of
-
-_FRAME = 1.0 / 30.0
-"""Period of the robot's pictures, s."""
-_EVERY = 3
-"""Pictures of the robot for each of the plots and the table."""
 
 
 class Viewer:
@@ -32,7 +25,7 @@ class Viewer:
     ----------
     trajectory : Trajectory
     candidates : sequence of mapping, optional
-        What the search looked at, as `Attempt.to_dict` gives it.
+        What the search looked at, as `Candidate.to_dict` gives it.
     verified : bool, optional
         Whether the motion passed the verification, where that is known.
     degrees : bool, optional
@@ -69,15 +62,35 @@ class Viewer:
         host: str = LOOPBACK,
         port: int | None = None,
     ) -> None:
+        self.playback = Playback(
+            trajectory.t_end,
+            first_rate(trajectory.t_end),
+            loops=trajectory.task.boundary.periodic,
+        )
+        self._trajectory = trajectory
+        self._lock = threading.RLock()
+        motion = Motion.of(trajectory)
+        bodies = bodies_of(trajectory)
         self._server = start_server(host, port)
         try:
-            self._fill(trajectory, candidates, verified=verified, degrees=degrees)
+            self._scene = Scene(self._server, motion, bodies)
+            self._panel = Controls(
+                self._server,
+                motion,
+                self._scene,
+                self.playback,
+                self.show,
+                candidates,
+                [f"not shown: {reason}" for reason in bodies.unread],
+                verified=verified,
+                degrees=degrees,
+            )
+            self.show()
         except BaseException:
             self._server.stop()
             raise
-        shown = {"0.0.0.0": LOOPBACK, "::": "[::1]"}.get(  # noqa: S104
-            host, f"[{host}]" if ":" in host else host
-        )
+        name = f"[{host}]" if ":" in host else host
+        shown = {"0.0.0.0": LOOPBACK, "[::]": "[::1]"}.get(name, name)  # noqa: S104
         self.local = is_local(host)
         self.url = f"http://{shown}:{self._server.get_port()}"
         self._stopped = threading.Event()
@@ -85,37 +98,6 @@ class Viewer:
             target=self._run, name="brachis viewer", daemon=True
         )
         self._thread.start()
-
-    def _fill(
-        self,
-        trajectory: Trajectory,
-        candidates: Sequence[Mapping[str, Any]],
-        *,
-        verified: bool | None,
-        degrees: bool,
-    ) -> None:
-        motion = Motion.of(trajectory)
-        bodies = bodies_of(trajectory)
-        boundary = trajectory.task.boundary
-        self.playback = Playback(
-            trajectory.t_end, first_rate(trajectory.t_end), loops=boundary.periodic
-        )
-        self._trajectory = trajectory
-        self._lock = threading.RLock()
-        self._scene = Scene(self._server, motion, bodies)
-        notes = [f"not shown: {reason}" for reason in bodies.unread]
-        self._panel = Panel(
-            self._server,
-            motion,
-            self._scene,
-            self.playback,
-            self.show,
-            candidates,
-            notes,
-            verified=verified,
-            degrees=degrees,
-        )
-        self.show()
 
     def show(self) -> None:
         """Show the instant of the playback."""
@@ -140,12 +122,7 @@ class Viewer:
         """Return the viewer, which is stopped at the end of the block."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stop."""
         self.stop()
 
@@ -159,21 +136,20 @@ class Viewer:
         return f'<iframe src="{url}" width="100%" height="640" style="border:0"></iframe><a href="{url}">{url}</a>'
 
     def _run(self) -> None:
-        """Play the motion as long as somebody looks."""
+        """Play the motion as long as somebody looks: 30 pictures/s of the robot, 10 of the plots and the table."""
         before = time.monotonic()
         picture = 0
-        while not self._stopped.wait(_FRAME):
+        while not self._stopped.wait(1.0 / 30.0):
             now = time.monotonic()
             elapsed = now - before
             before = now
             if not self.playback.playing or not self._server.get_clients():
                 continue
             with self._lock, self._server.atomic():
-                self._scene.show(
-                    self._trajectory.position(self.playback.advance(elapsed))
-                )
+                t = self.playback.advance(elapsed)
+                self._scene.show(self._trajectory.position(t))
                 picture += 1
-                if picture % _EVERY == 0:
+                if picture % 3 == 0:
                     self._panel.update()
                 else:
                     self._panel.follow()

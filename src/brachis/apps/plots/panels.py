@@ -1,0 +1,382 @@
+"""The panels that plots, report and viewer draw of a motion: what each shows over time, in which unit, with its limits.
+
+A new panel is one row of `PANELS`, and a function if its values are not among the samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brachis.apps.bottleneck.saturation import LimitRatios
+from brachis.limits.tool import build_tool_speed
+from brachis.robot.joints import UNITS, shown_unit
+from brachis.robot.limits import Limits
+from brachis.trajectory import Samples, Trajectory
+
+BLACK = 48
+"""Style of curves of the whole arm: a number that gives a solid black line in all figures."""
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Curves over one time axis, with their limits.
+
+    Attributes
+    ----------
+    title : str
+        In words: ``position``, ``torque``, ``torque / limit``, ...
+    symbol : str
+        The title in Matplotlib's mathematics.
+    unit : str
+        Of the values; empty if they are dimensionless.
+    t : (K,) ndarray
+        s.
+    names : tuple of str
+        Of the c curves: joints in chain order, ``tool``, ...
+    styles : (c,) int ndarray
+        Numbers of the curves' colours and dashes: the index of the joint, or `BLACK`.
+    values : (K, c) ndarray
+    lower, upper : (1, c) or (K, c) ndarray
+        Limits; infinite if a curve has none.
+    centre : (c,) ndarray
+        Values that use nothing of the limits: zero, or the middle of a range of positions.
+    ratio_title : str
+        Title of the values over their limits.
+    is_ratio : bool
+        Whether the values are over their limits already.
+    ends : (float or None, float or None)
+        Ends of the axis; None if they follow from the values.
+    """
+
+    title: str
+    symbol: str
+    unit: str
+    t: np.ndarray
+    names: tuple[str, ...]
+    styles: np.ndarray
+    values: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    centre: np.ndarray
+    ratio_title: str = ""
+    is_ratio: bool = False
+    ends: tuple[float | None, float | None] = (None, None)
+
+    @property
+    def heading(self) -> str:
+        """Title with the unit."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+    @property
+    def label(self) -> str:
+        """Symbol with the unit."""
+        return f"{self.symbol} ({self.unit})" if self.unit else self.symbol
+
+    @property
+    def is_limited(self) -> np.ndarray:
+        """Whether curves have limits in both directions at all times, (c,)."""
+        return (np.isfinite(self.lower) & np.isfinite(self.upper)).all(axis=0)
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """Values over the limits of their directions, both from the centre, (K, c); NaN without a limit."""
+        away = self.values - self.centre
+        room = np.where(away > 0.0, self.upper - self.centre, self.centre - self.lower)
+        return np.where(self.is_limited, away / room, np.nan)
+
+    def select(self, kept: np.ndarray) -> Panel:
+        """Return the panel with some of its curves, (c,) bool."""
+        names = zip(self.names, kept, strict=True)
+        return replace(
+            self,
+            names=tuple(name for name, is_kept in names if is_kept),
+            styles=self.styles[kept],
+            values=self.values[:, kept],
+            lower=self.lower[:, kept],
+            upper=self.upper[:, kept],
+            centre=self.centre[kept],
+        )
+
+    def near_limits(self) -> list[tuple[np.ndarray, list[int]]]:
+        """List the limits that are drawn: all of ratios, others if the motion comes within 30 % of its own range.
+
+        Returns
+        -------
+        list of ((1,) or (K,) ndarray, list of int)
+            The limit over time, NaN where it is far away, and the curves that share it.
+        """
+        reach = 0.3 * max(float(np.ptp(self.values)), 1e-9)
+        lowest = self.values.min(axis=0) - reach
+        highest = self.values.max(axis=0) + reach
+        found: dict[bytes, tuple[np.ndarray, list[int]]] = {}
+        for limit in (self.lower, self.upper):
+            is_near = (limit >= lowest) & (limit <= highest)
+            is_drawn = np.isfinite(limit) if self.is_ratio else is_near
+            for curve, line in enumerate(np.where(is_drawn, limit, np.nan).T):
+                if np.isfinite(line).any():
+                    found.setdefault(line.tobytes(), (line, []))[1].append(curve)
+        return list(found.values())
+
+    def view(self) -> tuple[float, float]:
+        """Return the ends of the axis: `ends`, or those of the values and of the limits near them."""
+        limits = [line for line, _ in self.near_limits()]
+        shown = np.concatenate([self.values.ravel(), *limits])
+        low = float(np.nanmin(shown))
+        high = float(np.nanmax(shown))
+        margin = 0.05 * (high - low) if high - low > 1e-9 else 1.0
+        first, last = self.ends
+        return (
+            low - margin if first is None else first,
+            high + margin if last is None else last,
+        )
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the table of panels.
+
+    Attributes
+    ----------
+    values : callable
+        Of trajectory and samples: (K, n) for the joints, or (K, 1).
+    symbol : str
+        In Matplotlib's mathematics.
+    prismatic : tuple of str
+        Title and symbol for prismatic joints if they differ.
+    ratio_title : str
+        Title of the values over their limits if it is not ``... / limit``.
+    ranges : callable or None
+        Of the robot's limits: lower and upper ends of ranges, (2, n), whose middle uses nothing of them.
+    only_if_limited : bool
+        Whether the row is of interest only if the robot limits it.
+    unit : str or None
+        Unit of the values; None for joints, which have their own.
+    largest : callable or None
+        Of trajectory and samples: the largest values that the task allows, (K, 1).
+    ends : (float or None, float or None)
+        See `Panel`.
+    """
+
+    values: Callable[[Trajectory, Samples], np.ndarray]
+    symbol: str
+    prismatic: tuple[str, str] | None = None
+    ratio_title: str = ""
+    ranges: Callable[[Limits], np.ndarray] | None = None
+    only_if_limited: bool = False
+    unit: str | None = None
+    largest: Callable[[Trajectory, Samples], np.ndarray] | None = None
+    ends: tuple[float | None, float | None] = (None, None)
+
+
+def _allowed_tool_speed(trajectory: Trajectory, samples: Samples) -> np.ndarray:
+    """Return the largest speed of the tool that the task allows, (K, 1), m/s; infinite without a limit."""
+    limit = build_tool_speed(trajectory.robot, trajectory.task)
+    if limit is None:
+        return np.array([[np.inf]])
+    return limit.largest_at(samples.s)[0].min(axis=1, keepdims=True)
+
+
+PANELS = {
+    "position": Row(
+        lambda _, samples: samples.q,
+        "$q$",
+        ratio_title="position in its range",
+        ranges=lambda limits: np.array([limits.position_lower, limits.position_upper]),
+    ),
+    "velocity": Row(lambda _, samples: samples.qdot, r"$\dot{q}$"),
+    "acceleration": Row(lambda _, samples: samples.qddot, r"$\ddot{q}$"),
+    "jerk": Row(
+        lambda trajectory, samples: trajectory.jerk(samples.t),
+        r"$\dddot{q}$",
+        only_if_limited=True,
+    ),
+    "torque": Row(
+        lambda _, samples: samples.tau, r"$\tau$", prismatic=("force", "$F$")
+    ),
+    "path coordinate": Row(
+        lambda _, samples: samples.s[:, None], "$s$", unit="", ends=(-0.04, 1.04)
+    ),
+    "tool speed": Row(
+        lambda _, samples: samples.tool_speed[:, None],
+        "tool speed",
+        unit="m/s",
+        largest=_allowed_tool_speed,
+        ends=(0.0, None),
+    ),
+}
+"""All panels by their titles. Rows without a unit are of joints; their keys are the names of the robot's limits."""
+
+
+def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
+    """Return the rows of joints that are of interest for a motion."""
+    return tuple(
+        name
+        for name, row in PANELS.items()
+        if row.unit is None
+        and (
+            not row.only_if_limited
+            or np.isfinite(_limits_of(trajectory.robot.limits, name)).any()
+        )
+    )
+
+
+def panels_of(
+    trajectory: Trajectory, samples: Samples, *names: str, degrees: bool = False
+) -> list[Panel]:
+    """Make panels; joints in rad and joints in m have panels of their own.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    samples : Samples
+        Of the trajectory.
+    *names : str
+        Some of `PANELS`.
+    degrees : bool, optional
+        Whether angles are in degrees.
+
+    Returns
+    -------
+    list of Panel
+        One or two of each row, revolute joints first.
+    """
+    found = []
+    for name in names:
+        row = PANELS[name]
+        if row.unit is None:
+            found += _joint_panels(trajectory, samples, name, degrees=degrees)
+            continue
+        values = row.values(trajectory, samples)
+        largest = row.largest(trajectory, samples) if row.largest else None
+        panel = Panel(
+            title=name,
+            symbol=row.symbol,
+            unit=row.unit,
+            t=samples.t,
+            names=("tool",),
+            styles=np.array([BLACK]),
+            values=values,
+            lower=np.array([[-np.inf]]),
+            upper=np.array([[np.inf]]) if largest is None else largest,
+            centre=np.zeros(1),
+            ends=row.ends,
+        )
+        found.append(panel)
+    return found
+
+
+def _joint_panels(
+    trajectory: Trajectory, samples: Samples, name: str, *, degrees: bool
+) -> list[Panel]:
+    """Make the panels of a row of joints, one for each unit."""
+    row = PANELS[name]
+    robot = trajectory.robot
+    lower, upper = _limits_of(robot.limits, name)
+    middle = np.zeros(robot.n)
+    if row.ranges:
+        is_range = np.isfinite(lower) & np.isfinite(upper)
+        middle[is_range] = 0.5 * lower[is_range] + 0.5 * upper[is_range]
+    values = row.values(trajectory, samples)
+    found = []
+    for base, is_shown in (("rad", robot.revolute), ("m", ~robot.revolute)):
+        if not is_shown.any():
+            continue
+        joints = np.flatnonzero(is_shown)
+        title, symbol = name, row.symbol
+        if base == "m" and row.prismatic:
+            title, symbol = row.prismatic
+        unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
+        panel = Panel(
+            title=title,
+            symbol=symbol,
+            unit=unit.replace("^2", "²").replace("^3", "³"),
+            t=samples.t,
+            names=tuple(trajectory.joint_names[joint] for joint in joints),
+            styles=joints,
+            values=factor * values[:, joints],
+            lower=factor * lower[None, joints],
+            upper=factor * upper[None, joints],
+            centre=factor * middle[joints],
+            ratio_title=row.ratio_title or f"{title} / limit",
+        )
+        found.append(panel)
+    return found
+
+
+def _limits_of(limits: Limits, name: str) -> np.ndarray:
+    """Lower and upper limits of a row of joints, (2, n)."""
+    ranges = PANELS[name].ranges
+    return ranges(limits) if ranges else limits.both_ways(name)
+
+
+def select_joint(parts: Sequence[Panel], name: str) -> list[Panel]:
+    """Return the panels that show a joint, each with this joint alone."""
+    return [
+        part.select(np.array(part.names) == name)
+        for part in parts
+        if name in part.names
+    ]
+
+
+def ratio_panel(
+    trajectory: Trajectory, ratios: LimitRatios, *titles: str, symbol: str = ""
+) -> Panel:
+    """Make a panel of the ratios to some kinds of limits; a subject has the same style in all such panels.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    ratios : LimitRatios
+    *titles : str
+        Of the labels' axes: which kinds.
+    symbol : str, optional
+        Title in Matplotlib's mathematics if it is not in words.
+    """
+    subjects = [label.subject for label in ratios.labels]
+    order = list(dict.fromkeys((*trajectory.joint_names, *subjects)))
+    columns = [k for k, label in enumerate(ratios.labels) if label.axis in titles]
+    columns.sort(key=lambda column: order.index(subjects[column]))
+    names = tuple(subjects[column] for column in columns)
+    values = ratios.values[:, columns]
+    title = ", ".join(titles)
+    is_signed = bool(values.min() < 0.0)
+    top = 1.15 * max(1.0, float(np.abs(values).max()))
+    ones = np.ones((1, len(names)))
+    return Panel(
+        title=title,
+        symbol=symbol or title,
+        unit="",
+        t=ratios.t,
+        names=names,
+        styles=np.array([order.index(name) for name in names]),
+        values=values,
+        lower=-ones if is_signed else -np.inf * ones,
+        upper=ones,
+        centre=np.zeros(len(names)),
+        ratio_title=title,
+        is_ratio=True,
+        ends=(-top if is_signed else -0.05 * top, top),
+    )
+
+
+def torque_panels(
+    trajectory: Trajectory, samples: Samples, ratios: LimitRatios
+) -> list[Panel]:
+    """Show torques and forces over their limits in one panel; by units in one or two if no joint has a limit."""
+    parts = panels_of(trajectory, samples, "torque")
+    titles = titles_of(ratios)
+    limited = [part for part in parts if part.ratio_title in titles]
+    if not limited:
+        return parts
+    symbols = [part.symbol.strip("$") for part in limited]
+    symbol = ", ".join(rf"${each} / {each}_\mathrm{{max}}$" for each in symbols)
+    shown = [part.ratio_title for part in limited]
+    return [ratio_panel(trajectory, ratios, *shown, symbol=symbol)]
+
+
+def titles_of(ratios: LimitRatios) -> list[str]:
+    """List the titles of the kinds of limits."""
+    return list(dict.fromkeys(label.axis for label in ratios.labels))
