@@ -73,7 +73,7 @@ def main() -> None:
         result = plan(robot, task)
         coarse = min(
             report.objective
-            for report in result.attempt.reports
+            for report in result.candidate.reports
             if report.status.usable
         )
         times = restarts(Problem.of(robot, load_task(task)), count)

@@ -130,7 +130,7 @@ def plan(
         `Robot` and the task's ``robot`` part contradict each other (`TaskError`); the start posture looks like
         degrees, or with ``strict=True`` another figure is implausible (`PlausibilityError`).
     PlanningError
-        No attempt gave a motion within the limits.
+        No candidate gave a motion within the limits.
 
     Warns
     -----
@@ -271,7 +271,7 @@ def _plan(
         trajectory=best.trajectory if least is None else least.trajectory,
         verification=best.verification if least is None else least.verification,
         family=best.start.family,
-        attempt=best.without_programs(),
+        candidate=best.without_programs(),
         least_motion=least,
         timing={
             "load": loaded - began,

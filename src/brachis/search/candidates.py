@@ -41,13 +41,13 @@ def solve_candidate(
 
     Parameters
     ----------
-    start : Start
+    start : InitialGuess
     deadline : Deadline
     listener : callable
 
     Returns
     -------
-    Attempt
+    Candidate
     """
     problem = start.problem
     target = program_of(problem, start.joint_map, initial_knots(start))
@@ -86,23 +86,23 @@ def solve_candidate(
 
 
 def finish_candidate(
-    attempt: Candidate, deadline: Deadline, listener: Listener
+    candidate: Candidate, deadline: Deadline, listener: Listener
 ) -> Candidate:
     """Adapt the mesh, refine and verify; only verify where the time is up.
 
     Parameters
     ----------
-    attempt : Attempt
+    candidate : Candidate
         A usable one.
     deadline : Deadline
     listener : callable
 
     Returns
     -------
-    Attempt
+    Candidate
     """
-    start = attempt.start
-    program = attempt.program
+    start = candidate.start
+    program = candidate.program
     assert start is not None and program is not None
     task = start.problem.task
     settings = task.refinement
@@ -111,10 +111,10 @@ def finish_candidate(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
     session = _session(start, soon, listener)
-    reports = attempt.reports
-    target = attempt.target
+    reports = candidate.reports
+    target = candidate.target
     if (
-        attempt.keeps_knots
+        candidate.keeps_knots
         and start.in_chart
         and not start.timed
         and not deadline.passed
@@ -123,11 +123,11 @@ def finish_candidate(
         reports = (*reports[:-1], *further)
         target = program
     adapted = adapt_mesh(program, reports, session, task.spline, options, target=target)
-    attempt = dataclasses.replace(attempt, not_completed=adapted.not_completed)
+    candidate = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     options = dataclasses.replace(options, deadline=deadline)
     session = dataclasses.replace(session, deadline=deadline)
     return refine_and_verify(
-        attempt, adapted.program, adapted.reports, session, options
+        candidate, adapted.program, adapted.reports, session, options
     )
 
 

@@ -59,7 +59,7 @@ def chart_starts(
 
     Returns
     -------
-    list of Start or DeadEnd
+    list of InitialGuess or DeadEnd
         Those with the least estimated times first; empty where the time was up.
     """
     for finer in (1, _FINER):

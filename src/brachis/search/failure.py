@@ -270,14 +270,14 @@ def refuse_what_is_out_of_reach(
     candidates: Sequence[Candidate],
     deadline: Deadline,
 ) -> None:
-    """Raise the reason where the path is out of reach, so that further attempts would be in vain.
+    """Raise the reason where the path is out of reach, so that further candidates would be in vain.
 
     Where no lattice has a joint path, any part of it counts; where no lattice was looked at, a good part.
 
     Parameters
     ----------
     decompositions : sequence of Decomposition
-    candidates : sequence of Attempt
+    candidates : sequence of Candidate
         So far.
     deadline : Deadline
         Nothing is refused for a reason that is not found by then.
@@ -318,7 +318,7 @@ def no_motion(
     ----------
     problem : Problem
     decompositions : sequence of Decomposition
-    candidates : sequence of Attempt
+    candidates : sequence of Candidate
     dead_ends : mapping of str to DeadEnd
         Where the lattices end, by the names of the redundant joints.
     deadline : Deadline

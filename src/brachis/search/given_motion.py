@@ -47,7 +47,7 @@ def given_start(
 
     Returns
     -------
-    Start or str
+    InitialGuess or str
         Why there is none, in plain words.
     """
     robot = problem.robot

@@ -50,7 +50,7 @@ def explain_holding(
 
     Parameters
     ----------
-    starts : sequence of Start
+    starts : sequence of InitialGuess
     everywhere : bool, optional
         Whether each posture has to exceed the limit by itself, not their mean alone.
     """

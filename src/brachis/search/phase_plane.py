@@ -318,7 +318,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     Parameters
     ----------
     program : Program
-    start : Start
+    start : InitialGuess
 
     Returns
     -------

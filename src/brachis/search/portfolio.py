@@ -1,7 +1,7 @@
 """The search: starts from lattices, solved coarsely, ranked, the best finished.
 
 1. Lattices give starts (see `schedule`); they are solved at the first collocation points.
-2. Attempts that agree are merged. In the order of their end times the others are refined and verified, as long as they
+2. Candidates that agree are merged. In the order of their end times the others are refined and verified, as long as they
    may beat the best verified one: refinement adds rows, so that over the same knots and in the same coordinates the
    coarse end time of an optimum bounds its refined one from below. In charts, where the coordinates may still be
    changed, coarse end times are compared with each other.
@@ -36,9 +36,9 @@ _LEAST_SHARE = 2.0
 _LARGEST_SHARE = 0.15
 """Part of the time limit that the solve from one start may take at most."""
 _GRACE = 1.0
-"""Seconds to finish the best attempt where the time is up and nothing is verified."""
+"""Seconds to finish the best candidate where the time is up and nothing is verified."""
 _LAST_CHANCES = 3
-"""Attempts of which one becomes the unverified motion where none could be finished."""
+"""Candidates of which one becomes the unverified motion where none could be finished."""
 
 
 def find_fastest(
@@ -58,13 +58,13 @@ def find_fastest(
     deadline : Deadline
         When to return the best motion so far; one that is not verified where none is.
     listener : callable
-    first : Start, optional
+    first : InitialGuess, optional
         Tried alone; nothing else is where it leads to a verified motion.
 
     Returns
     -------
     Record
-        With a best attempt: the fastest verified one, or the one nearest to the limits.
+        With a best candidate: the fastest verified one, or the one nearest to the limits.
 
     Raises
     ------
@@ -97,7 +97,11 @@ def find_fastest(
     if record.too_fast is not None:
         raise record.too_fast.error
     heavy = explain_holding(
-        [attempt.start for attempt in record.attempts if attempt.start is not None]
+        [
+            candidate.start
+            for candidate in record.candidates
+            if candidate.start is not None
+        ]
     )
     if heavy is not None:
         raise heavy
@@ -105,7 +109,7 @@ def find_fastest(
         record.interrupted = True
         raise out_of_time(problem.task, record.not_completed())
     raise no_motion(
-        problem, decompositions, record.attempts, record.dead_ends, deadline
+        problem, decompositions, record.candidates, record.dead_ends, deadline
     )
 
 
@@ -181,7 +185,7 @@ class _Search:
                 break
             if batch.fallback and not refused:
                 refuse_what_is_out_of_reach(
-                    self._decompositions, self.record.attempts, self._deadline
+                    self._decompositions, self.record.candidates, self._deadline
                 )
                 self._refuse_what_is_too_fast()
                 refused = True
@@ -194,7 +198,7 @@ class _Search:
         limit = self._deadline.part(_COARSE_SHARE).within(_LEAST_SHARE)
         record = self.record
         record.too_fast = out_of_reach(
-            record.attempts,
+            record.candidates,
             lambda start: candidates.solve_candidate(start, limit, self._listener),
         )
         if record.too_fast is not None and unlikely(record.too_fast):
@@ -217,13 +221,13 @@ class _Search:
             max(_LEAST_SHARE, share),
         )
         with closing(each(*work, jobs=self._jobs, listener=self._listener)) as outcomes:
-            for attempt in outcomes:
-                record.add(attempt)
+            for candidate in outcomes:
+                record.add(candidate)
         # In the last resort a motion that could not be verified gets another chance, with another solver.
         return record.ranked(record.solved[known:], again=batch.fallback)
 
     def _finish(self, ranked: Sequence[Numbered], most: int) -> None:
-        """Refine and verify attempts in the order of their end times while they may be the fastest."""
+        """Refine and verify candidates in the order of their end times while they may be the fastest."""
         jobs = self._jobs
         left = most
         for first in range(0, len(ranked), jobs):
@@ -232,21 +236,21 @@ class _Search:
                 return
             work = (
                 candidates.finish_candidate,
-                [attempt for _, attempt in batch],
+                [candidate for _, candidate in batch],
                 self._latest,
             )
             with closing(each(*work, jobs=jobs, listener=self._listener)) as outcomes:
-                for place, attempt in enumerate(outcomes):
+                for place, candidate in enumerate(outcomes):
                     if place and not self._goes_on(ranked[first + place :], left):
                         return
                     left -= 1
-                    self.record.finish(batch[place][0], attempt)
+                    self.record.finish(batch[place][0], candidate)
                     self._listener(
-                        f"{attempt.solver}: t_E = {attempt.t_end:.4f} s, {attempt.status}"
+                        f"{candidate.solver}: t_E = {candidate.t_end:.4f} s, {candidate.status}"
                     )
 
     def _goes_on(self, ranked: Sequence[Numbered], left: int) -> bool:
-        """Tell whether the first one of the attempts that are left is worth finishing."""
+        """Tell whether the first one of the candidates that are left is worth finishing."""
         if not self.record.may_win(ranked[0][1]) or (self.record.content and left <= 0):
             self.record.drop(ranked)
             return False
@@ -256,15 +260,15 @@ class _Search:
         return True
 
     def take_what_there_is(self) -> None:
-        """Verify the best attempts as they are until one gives a motion, where none is known."""
+        """Verify the best candidates as they are until one gives a motion, where none is known."""
         over = Deadline(0.0)
-        for number, attempt in sorted(
+        for number, candidate in sorted(
             self.record.solved, key=lambda item: round_end_time(item[1].coarse)
         )[:_LAST_CHANCES]:
             if self.record.best is not None:
                 return
             self.record.finish(
-                number, candidates.finish_candidate(attempt, over, lambda _text: None)
+                number, candidates.finish_candidate(candidate, over, lambda _text: None)
             )
 
 

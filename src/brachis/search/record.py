@@ -1,4 +1,4 @@
-"""What the search has seen so far: attempts, the best motion, and what is left to do.
+"""What the search has seen so far: candidates, the best motion, and what is left to do.
 
 What the search looked at, as a table.
 """
@@ -20,20 +20,20 @@ from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.too_fast import TooFast
 
 NOT_TRIED = "not tried: the time was up"
-"""Status of an attempt for which there was no time."""
+"""Status of a candidate for which there was no time."""
 SAME_MOTION = "same motion as another"
-"""Status of an attempt that agrees with one that ranks before it."""
+"""Status of a candidate that agrees with one that ranks before it."""
 _WORTH_IT = 2e-4
-"""An attempt is finished if it may be faster than the best one by more than this fraction."""
+"""A candidate is finished if it may be faster than the best one by more than this fraction."""
 _SAME_TIME = 1e-4
 _SAME_TIME_IN_CHARTS = 3e-3
 """Splines of different measures of self-motion come to end times that differ by so much for the same motion."""
 _SAME_MOTION = 0.1  # rad or m
 _GAIN_SLACK = 0.005
-"""Better knots shorten a motion when it is finished; an attempt may gain this part more by them than any one so far."""
+"""Better knots shorten a motion when it is finished; a candidate may gain this part more by them than any one so far."""
 
 Numbered = tuple[int, Candidate]
-"""Index among the attempts, and the attempt as it was when it was solved."""
+"""Index among the candidates, and the candidate as it was when it was solved."""
 
 
 class Record:
@@ -47,7 +47,7 @@ class Record:
 
     def __init__(self, *, refined: bool) -> None:
         self._refined = refined
-        self.attempts: list[Candidate] = []
+        self.candidates: list[Candidate] = []
         self.dead_ends: dict[str, DeadEnd] = {}
         self.best: Candidate | None = None
         self.interrupted = False
@@ -64,13 +64,13 @@ class Record:
         """Whether a verified motion is known; without refinement any motion will do."""
         return self.best is not None and self._merit(self.best)[0] == -np.inf
 
-    def _merit(self, attempt: Candidate) -> tuple[float, float]:
-        """By what finished attempts are compared: violation of a limit, -inf where it will do, and end time, s."""
-        assert attempt.verification is not None
-        will_do = attempt.verified or not self._refined
+    def _merit(self, candidate: Candidate) -> tuple[float, float]:
+        """By what finished candidates are compared: violation of a limit, -inf where it will do, and end time, s."""
+        assert candidate.verification is not None
+        will_do = candidate.verified or not self._refined
         return (
-            -np.inf if will_do else attempt.verification.worst_ratio - 1.0
-        ), attempt.t_end
+            -np.inf if will_do else candidate.verification.worst_ratio - 1.0
+        ), candidate.t_end
 
     def report_dead_end(
         self, decomposition: Decomposition | None, dead_end: DeadEnd | None
@@ -83,72 +83,78 @@ class Record:
             return
         self.dead_ends[name] = dead_end
         names = () if decomposition is None else decomposition.match.redundant_joints
-        self.attempts.append(Candidate(names, "", "lattice", "", np.inf, str(dead_end)))
+        self.candidates.append(
+            Candidate(names, "", "lattice", "", np.inf, str(dead_end))
+        )
 
     def begin(self, starts: int) -> None:
         """Put down that so many starts are about to be solved."""
         self._unsolved += starts
 
-    def add(self, attempt: Candidate) -> None:
-        """Put a solved attempt down."""
-        if attempt.status == NOT_TRIED:
+    def add(self, candidate: Candidate) -> None:
+        """Put a solved candidate down."""
+        if candidate.status == NOT_TRIED:
             self.interrupted = True
         else:
             self._unsolved -= 1
-        if attempt.usable:
-            self.solved.append((len(self.attempts), attempt))
-        self.attempts.append(attempt)
+        if candidate.usable:
+            self.solved.append((len(self.candidates), candidate))
+        self.candidates.append(candidate)
 
     def ranked(self, solved: Sequence[Numbered], *, again: bool) -> list[Numbered]:
-        """Order attempts by their end times, without those that are a motion known before; `again` lets these in."""
+        """Order candidates by their end times, without those that are a motion known before; `again` lets these in."""
         known = [] if again else self._known
         self._waiting = []
-        for number, attempt in sorted(
+        for number, candidate in sorted(
             solved, key=lambda item: (round_end_time(item[1].coarse), item[0])
         ):
-            if any(_agree(attempt, other) for other in known):
-                self.attempts[number] = dataclasses.replace(attempt, status=SAME_MOTION)
+            if any(_agree(candidate, other) for other in known):
+                self.candidates[number] = dataclasses.replace(
+                    candidate, status=SAME_MOTION
+                )
             else:
-                known.append(attempt)
-                self._waiting.append((number, attempt))
+                known.append(candidate)
+                self._waiting.append((number, candidate))
         return list(self._waiting)
 
-    def may_win(self, attempt: Candidate) -> bool:
-        """Tell whether an attempt may be faster than the best motion."""
+    def may_win(self, candidate: Candidate) -> bool:
+        """Tell whether a candidate may be faster than the best motion."""
         if self.best is None or not self.content:
             return True
         if (
-            attempt.keeps_knots
+            candidate.keeps_knots
             and self.best.keeps_knots
-            and attempt.in_chart
+            and candidate.in_chart
             and self.best.in_chart
         ):
             return (
-                attempt.coarse < (1.0 - _WORTH_IT) * self.best.coarse
+                candidate.coarse < (1.0 - _WORTH_IT) * self.best.coarse
             )  # what else they gain, both gain
-        return attempt.coarse * self._gain < (1.0 - _WORTH_IT) * self.best.t_end
+        return candidate.coarse * self._gain < (1.0 - _WORTH_IT) * self.best.t_end
 
     def drop(self, solved: Sequence[Numbered]) -> None:
-        """Put down that attempts need not be finished."""
+        """Put down that candidates need not be finished."""
         dropped = {number for number, _ in solved}
         self._waiting = [item for item in self._waiting if item[0] not in dropped]
 
-    def finish(self, number: int, attempt: Candidate) -> None:
-        """Put down what became of an attempt, and keep the best one."""
-        self.drop([(number, attempt)])
-        self.attempts[number] = attempt
-        if attempt.trajectory is None:
+    def finish(self, number: int, candidate: Candidate) -> None:
+        """Put down what became of a candidate, and keep the best one."""
+        self.drop([(number, candidate)])
+        self.candidates[number] = candidate
+        if candidate.trajectory is None:
             return
-        if not attempt.keeps_knots:
+        if not candidate.keeps_knots:
             self._gain = min(
-                self._gain, (1.0 - _GAIN_SLACK) * attempt.t_end / attempt.coarse
+                self._gain, (1.0 - _GAIN_SLACK) * candidate.t_end / candidate.coarse
             )
-        if self.best is None or self._merit(attempt) < self._merit(self.best):
-            self.best = attempt
+        if self.best is None or self._merit(candidate) < self._merit(self.best):
+            self.best = candidate
 
     def cut_short(self, time_limit: float) -> bool:
         """Tell whether the time for the search ended every solve, of which each may take so long by itself, s."""
-        last = [attempt.reports[-1] for attempt in self.attempts if attempt.reports]
+        last = [
+            candidate.reports[-1] for candidate in self.candidates if candidate.reports
+        ]
         cut = [
             each.status is SolveStatus.TIME_LIMIT and each.wall_time < time_limit
             for each in last
@@ -175,7 +181,7 @@ class Record:
             parts.append(
                 f"the lattice of {' | '.join(self._left_out)} was not searched to its end"
             )
-        total = len(self.attempts)
+        total = len(self.candidates)
         waiting = len(self._waiting)
         counts = [f"{self._unsolved} not planned"] * bool(self._unsolved) + [
             f"{waiting} not refined"
@@ -184,7 +190,7 @@ class Record:
             unseen = max(
                 0,
                 self._unsolved
-                - sum(attempt.status == NOT_TRIED for attempt in self.attempts),
+                - sum(candidate.status == NOT_TRIED for candidate in self.candidates),
             )
             parts.append(
                 f"of {write_count(total + unseen, 'candidate')} {', '.join(counts)}"
@@ -192,16 +198,20 @@ class Record:
         return (*parts, "what search.effort asks for was not tried to its end")
 
     def in_order(self) -> tuple[Candidate, ...]:
-        """All attempts, the fastest verified one first, without their programs."""
+        """All candidates, the fastest verified one first, without their programs."""
 
-        def rank(attempt: Candidate) -> tuple[float, ...]:
+        def rank(candidate: Candidate) -> tuple[float, ...]:
             return (
-                not attempt.verified,
-                *map(round_end_time, (attempt.t_end, attempt.coarse, attempt.estimate)),
+                not candidate.verified,
+                *map(
+                    round_end_time,
+                    (candidate.t_end, candidate.coarse, candidate.estimate),
+                ),
             )
 
         return tuple(
-            attempt.without_programs() for attempt in sorted(self.attempts, key=rank)
+            candidate.without_programs()
+            for candidate in sorted(self.candidates, key=rank)
         )
 
 
@@ -211,7 +221,7 @@ def round_end_time(time: float) -> float:
 
 
 def _agree(first: Candidate, second: Candidate) -> bool:
-    """Tell whether an attempt is the same motion as another, and not faster."""
+    """Tell whether a candidate is the same motion as another, and not faster."""
     same = (first.redundant_joints, first.branch) == (
         second.redundant_joints,
         second.branch,
@@ -223,10 +233,10 @@ def _agree(first: Candidate, second: Candidate) -> bool:
     ):
         return False
     postures = []
-    for attempt in (first, second):
-        if attempt.program is not None:
+    for candidate in (first, second):
+        if candidate.program is not None:
             try:
-                (state,) = attempt.program.states(attempt.reports[-1].x)
+                (state,) = candidate.program.states(candidate.reports[-1].x)
             except UnreachableError:
                 return False
             postures.append(state.q)
@@ -240,7 +250,7 @@ STATUS = "status"
 
 
 def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Return a row of text for each candidate, as `Attempt.to_dict` gives it; the same motion is listed once."""
+    """Return a row of text for each candidate, as `Candidate.to_dict` gives it; the same motion is listed once."""
     return [
         (
             coordinates(

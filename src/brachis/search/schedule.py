@@ -40,7 +40,7 @@ class Batch:
 
     Attributes
     ----------
-    starts : tuple of Start
+    starts : tuple of InitialGuess
         With the solvers that plan from them.
     refined : int
         How many of them are refined and verified at most once a motion is verified.

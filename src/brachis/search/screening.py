@@ -57,7 +57,7 @@ def screened(
 
     Parameters
     ----------
-    starts : sequence of Start
+    starts : sequence of InitialGuess
         At least one.
     most : int
         How many to keep at most; not more than so many are not looked at.
@@ -66,7 +66,7 @@ def screened(
 
     Returns
     -------
-    list of Start
+    list of InitialGuess
         With the joint paths that the quick solves led to, and their end times as estimates; the fastest first.
     """
     if len(starts) <= most:

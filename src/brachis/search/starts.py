@@ -57,7 +57,7 @@ def lattice_starts(
 
     Returns
     -------
-    list of Start or DeadEnd
+    list of InitialGuess or DeadEnd
         Empty where the time was up.
     """
     cells = level.cells_per_turn
@@ -157,7 +157,7 @@ def numeric_starts(
 
     Returns
     -------
-    list of Start
+    list of InitialGuess
     """
     start = decomposition.problem.start
     if start is None:
@@ -245,7 +245,7 @@ def joint_space_start(problem: Problem) -> InitialGuess:
 
     Returns
     -------
-    Start
+    InitialGuess
 
     Raises
     ------

@@ -89,13 +89,13 @@ def _is_bound(start: InitialGuess) -> bool:
 
 
 def out_of_reach(
-    attempts: Sequence[Candidate], solve: Callable[[InitialGuess], Candidate]
+    candidates: Sequence[Candidate], solve: Callable[[InitialGuess], Candidate]
 ) -> TooFast | None:
-    """Tell which least speed no attempt could hold, by a plan without it from the start of the most promising one.
+    """Tell which least speed no candidate could hold, by a plan without it from the start of the most promising one.
 
     Parameters
     ----------
-    attempts : sequence of Attempt
+    candidates : sequence of Candidate
         That failed.
     solve : callable
         Plans from a start at the first collocation points.
@@ -106,9 +106,9 @@ def out_of_reach(
         None where no least speed is asked for, or another reason is to blame.
     """
     starts = [
-        attempt.start
-        for attempt in attempts
-        if attempt.start is not None and attempt.solver
+        candidate.start
+        for candidate in candidates
+        if candidate.start is not None and candidate.solver
     ]
     if not starts or not any(
         limit.longer_time == "violates" for limit in starts[0].problem.limits
@@ -116,12 +116,12 @@ def out_of_reach(
         return None
     start = min(starts, key=lambda start: start.estimate)
     problem = dataclasses.replace(start.problem, limits=tuple(_others(start.problem)))
-    attempt = solve(dataclasses.replace(start, problem=problem))
-    if not attempt.usable or attempt.program is None:
+    candidate = solve(dataclasses.replace(start, problem=problem))
+    if not candidate.usable or candidate.program is None:
         return None
     (phase,), (motion,) = (
-        attempt.program.phases,
-        attempt.program.motions(attempt.reports[-1].x),
+        candidate.program.phases,
+        candidate.program.motions(candidate.reports[-1].x),
     )
     t = np.linspace(0.0, motion.t_end, _SAMPLES)
     try:

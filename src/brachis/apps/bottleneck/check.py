@@ -171,7 +171,7 @@ def check_sensitivities(
     Parameters
     ----------
     refined : Refined
-        ``result.attempt.refined``.
+        ``result.candidate.refined``.
     predictions : Sensitivities, optional
         What is checked; by default what `sensitivities` says.
     step : float, optional

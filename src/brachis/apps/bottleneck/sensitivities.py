@@ -391,7 +391,7 @@ def sensitivities(refined: Refined) -> Sensitivities:
     Parameters
     ----------
     refined : Refined
-        ``result.attempt.refined``.
+        ``result.candidate.refined``.
 
     Returns
     -------

@@ -232,7 +232,7 @@ class Panel:
     show : callable
         Called when the user has chosen another instant.
     candidates : sequence of mapping
-        What the search looked at, as `Attempt.to_dict` gives it.
+        What the search looked at, as `Candidate.to_dict` gives it.
     notes : sequence of str
         What else the user should know.
     verified : bool or None

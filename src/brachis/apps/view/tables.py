@@ -52,7 +52,7 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
-    """List what the search looked at, as `Attempt.to_dict` gives it, the fastest verified one first.
+    """List what the search looked at, as `Candidate.to_dict` gives it, the fastest verified one first.
 
     The same motion is listed once.
     """

@@ -32,7 +32,7 @@ class Viewer:
     ----------
     trajectory : Trajectory
     candidates : sequence of mapping, optional
-        What the search looked at, as `Attempt.to_dict` gives it.
+        What the search looked at, as `Candidate.to_dict` gives it.
     verified : bool, optional
         Whether the motion passed the verification, where that is known.
     degrees : bool, optional
