@@ -45,7 +45,7 @@ class Result(PlannedMotion):
     not_completed : tuple of str
         What was left undone, in plain words.
     warnings : tuple of Remark
-        What of robot, task and motion is hardly meant.
+        What of robot, task and motion is implausible.
 
     Examples
     --------
@@ -74,7 +74,7 @@ class Result(PlannedMotion):
         Raises
         ------
         UnknownNameError
-            There is no such plot.
+            The plot does not exist.
         """
         if kind == CANDIDATES:
             return plots.plot_candidates(self.candidates)
