@@ -12,6 +12,7 @@ import brachis
 from brachis.common.deadline import NEVER, Deadline
 from brachis.optimise import mesh
 from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
+from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
     MeshOptions,
     adapt_mesh,
@@ -58,7 +59,7 @@ def solve(program, x):
 def solved():
     """Problem of 10 even intervals, and its solve."""
     program, _ = brachis.transcribe(robot(), task(intervals=10))
-    return program, solve(program, next(starting_points(program)))
+    return SolvedProgram(program, (solve(program, next(starting_points(program))),))
 
 
 def failing(program, x):
@@ -102,8 +103,8 @@ def test_a_motion_along_a_branch_boundary_is_verified_too():
 
 
 def test_intervals_are_refined_where_the_motion_switches(solved):
-    program, report = solved
-    finer, *_ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.02), NEVER)
+    program = solved.program
+    finer = refine_mesh(solved, solve, MeshOptions(tolerance=0.02), NEVER).program
     lengths = np.diff(finer.phases[0].breaks)
     assert len(lengths) < 60
     assert lengths.max() >= 4.0 * lengths.min()
@@ -114,69 +115,64 @@ def test_intervals_are_refined_where_the_motion_switches(solved):
 
 
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
-    program, report = solved
-    rough, reports, _ = refine_mesh(
-        program, report, solve, MeshOptions(tolerance=0.1), NEVER
-    )
-    fine, more, _ = refine_mesh(
-        program, report, solve, MeshOptions(tolerance=0.01), NEVER
-    )
-    assert program.intervals < rough.intervals < fine.intervals
-    assert more[-1].objective < reports[-1].objective < report.objective
-    assert reports[0] is report
-    assert reports[-1].x.shape == (rough.variables,)
-    assert rough.phases[0].violation(reports[-1].x).max() < 1e-5
+    program = solved.program
+    report = solved.report
+    rough = refine_mesh(solved, solve, MeshOptions(tolerance=0.1), NEVER)
+    fine = refine_mesh(solved, solve, MeshOptions(tolerance=0.01), NEVER)
+    assert program.intervals < rough.program.intervals < fine.program.intervals
+    assert fine.report.objective < rough.report.objective < report.objective
+    assert rough.reports[0] is report
+    assert rough.x.shape == (rough.program.variables,)
+    assert rough.program.phases[0].violation(rough.x).max() < 1e-5
 
 
 def test_a_round_beyond_its_end_gains_little(solved):
-    program, report = solved
     tolerance = 0.02
-    mesh, reports, _ = refine_mesh(
-        program, report, solve, MeshOptions(tolerance), NEVER
-    )
-    again, further, _ = refine_mesh(
-        mesh, reports[-1], solve, MeshOptions(tolerance), NEVER
-    )
-    assert again.intervals > mesh.intervals
-    assert further[-1].objective > (1.0 - tolerance) * reports[-1].objective
+    fine = refine_mesh(solved, solve, MeshOptions(tolerance), NEVER)
+    first = SolvedProgram(fine.program, (fine.report,))
+    again = refine_mesh(first, solve, MeshOptions(tolerance), NEVER)
+    assert again.program.intervals > fine.program.intervals
+    assert again.t_end > (1.0 - tolerance) * fine.t_end
 
 
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
-    program, report = solved
-    mesh, reports, _ = refine_mesh(program, report, failing, MeshOptions(), NEVER)
-    assert mesh is program
-    assert reports[-1] is report
-    assert len(reports) == 2
-    same, reports, _ = optimise_knots(
-        program, report, failing, 0.1, RefinementOptions()
-    )
-    assert same is program
-    assert reports[-1] is report
+    program = solved.program
+    report = solved.report
+    same = refine_mesh(solved, failing, MeshOptions(), NEVER)
+    assert same.program is program
+    assert same.report is report
+    assert len(same.reports) == 2
+    same = optimise_knots(solved, failing, 0.1, RefinementOptions())
+    assert same.program is program
+    assert same.report is report
 
 
 def test_no_interval_is_so_short_that_points_fall_together(solved):
-    program, report = solved
-    moved, *_ = optimise_knots(program, report, solve, 1e-9, RefinementOptions())
-    assert np.diff(moved.phases[0].breaks).min() == pytest.approx(5e-5, rel=1e-3)
+    moved = optimise_knots(solved, solve, 1e-9, RefinementOptions())
+    assert np.diff(moved.program.phases[0].breaks).min() == pytest.approx(
+        5e-5, rel=1e-3
+    )
 
 
 def test_free_knots_without_a_motion_within_the_limits_are_given_up(
     solved, monkeypatch
 ):
-    program, report = solved
+    program = solved.program
+    report = solved.report
     monkeypatch.setattr(
         mesh,
         "refine",
         lambda *given: dataclasses.replace(refine(*given), violation=0.5),
     )
-    kept, reports, _ = optimise_knots(program, report, solve, 0.1, RefinementOptions())
-    assert kept is program
-    assert reports[-1] is report
-    assert len(reports) > 2
+    kept = optimise_knots(solved, solve, 0.1, RefinementOptions())
+    assert kept.program is program
+    assert kept.report is report
+    assert len(kept.reports) > 2
 
 
 def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
-    program, report = solved
+    program = solved.program
+    report = solved.report
 
     def stalling(tried, x):
         answer = solve(tried, x)
@@ -185,12 +181,12 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
             dataclasses.replace(answer, status=SolveStatus.STALLED) if free else answer
         )
 
-    moved, reports, _ = optimise_knots(
-        program, report, stalling, 0.1, RefinementOptions()
+    moved = optimise_knots(solved, stalling, 0.1, RefinementOptions())
+    assert moved.usable
+    assert moved.report.objective < 0.95 * report.objective
+    assert moved.program.variables == program.variables, (
+        "the knots should be fixed again"
     )
-    assert reports[-1].status.usable
-    assert reports[-1].objective < 0.95 * report.objective
-    assert moved.variables == program.variables, "the knots should be fixed again"
 
 
 @pytest.mark.parametrize("intervals", [20, 53, 100])
@@ -215,8 +211,10 @@ def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     program, _ = brachis.transcribe(robot(), task(intervals=intervals))
     coarse = coarsest(program).with_margin(0.05)
     report = solve(coarse, next(starting_points(coarse)))
-    nested, reports, undone = solve_nested(program, coarse, report, solve)
-    assert not undone
+    solved = solve_nested(program, SolvedProgram(coarse, (report,)), solve)
+    nested = solved.program
+    reports = solved.reports
+    assert not solved.not_completed
     np.testing.assert_array_equal(nested.phases[0].knots, program.phases[0].knots)
     np.testing.assert_array_equal(nested.phases[0].t_norm, program.phases[0].t_norm)
     assert nested.safeguard_bounds == coarse.safeguard_bounds
@@ -235,17 +233,21 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
     def small_ones_only(tried, x):
         return solve(tried, x) if tried.variables < 150 else failing(tried, x)
 
-    nested, reports, undone = solve_nested(program, coarse, report, small_ones_only)
-    assert nested.intervals == 50
+    first = SolvedProgram(coarse, (report,))
+    nested = solve_nested(program, first, small_ones_only)
+    reports = nested.reports
+    assert nested.program.intervals == 50
     assert [later.status for later in reports][-2:] == [
         SolveStatus.FAILED,
         SolveStatus.OPTIMAL,
     ]
-    assert reports[-1].x.shape == (nested.variables,)
-    assert undone == "the motion has 50 of 100 intervals, of which more were not solved"
+    assert reports[-1].x.shape == (nested.program.variables,)
+    assert (
+        nested.not_completed
+        == "the motion has 50 of 100 intervals, of which more were not solved"
+    )
     settled = adapt_mesh(
-        coarse,
-        (report,),
+        first,
         failing,
         SplineSettings(),
         RefinementOptions(),
@@ -259,24 +261,25 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
 
 
 def test_no_level_is_begun_after_the_deadline(solved):
-    program, report = solved
+    program = solved.program
+    report = solved.report
 
     def never(*_arguments):
         raise AssertionError("solved after the deadline")
 
     target, _ = brachis.transcribe(robot(), task(intervals=60))
     coarse = coarsest(target)
-    first = solve(coarse, next(starting_points(coarse)))
+    first = SolvedProgram(coarse, (solve(coarse, next(starting_points(coarse))),))
     over = RefinementOptions(deadline=Deadline(0.0))
-    assert solve_nested(target, coarse, first, never, over.deadline).not_completed
+    assert solve_nested(target, first, never, over.deadline).not_completed
     for spline in (
         SplineSettings(knots="free", intervals=10),
         SplineSettings(intervals="auto"),
     ):
-        kept, reports, undone = adapt_mesh(program, (report,), never, spline, over)
-        assert kept is program
-        assert reports == (report,)
-        assert undone
+        kept = adapt_mesh(solved, never, spline, over)
+        assert kept.program is program
+        assert kept.reports == (report,)
+        assert kept.not_completed
     assert refine(program, report, never, over).reports == (report,)
 
 
@@ -290,28 +293,22 @@ def test_many_intervals_are_planned_from_few():
 
 
 def test_settings_choose_what_is_done(solved):
-    program, report = solved
+    program = solved.program
+    report = solved.report
     options = RefinementOptions()
     given = SplineSettings(intervals=10)
-    assert adapt_mesh(program, (report,), solve, given, options) == (
-        program,
-        (report,),
-        "",
-    )
-    unusable = (report, failing(program, report.x))
+    assert adapt_mesh(solved, solve, given, options).reports == (report,)
+    unusable = SolvedProgram(program, (report, failing(program, report.x)))
     freed = SplineSettings(knots="free", intervals=10)
-    assert adapt_mesh(program, unusable, solve, freed, options) == (
-        program,
-        unusable,
-        "",
-    )
+    assert adapt_mesh(unusable, solve, freed, options) is unusable
     before = dataclasses.replace(report)
-    free, reports, _ = adapt_mesh(program, (before, report), solve, freed, options)
-    assert reports[0] is before
-    assert free.intervals == program.intervals
+    known = SolvedProgram(program, (before, report))
+    free = adapt_mesh(known, solve, freed, options)
+    assert free.reports[0] is before
+    assert free.program.intervals == program.intervals
     auto = SplineSettings(intervals="auto", tolerance=0.1)
-    mesh, *_ = adapt_mesh(program, (before, report), solve, auto, options)
-    assert mesh.intervals > program.intervals
+    finer = adapt_mesh(known, solve, auto, options)
+    assert finer.program.intervals > program.intervals
 
 
 def test_auto_begins_coarse():

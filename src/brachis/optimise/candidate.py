@@ -13,8 +13,8 @@ from brachis.common.summary import Summary
 from brachis.errors import write_count
 from brachis.kinematics import CHART, ChartMap, ClosedFormMap, JointSpaceMap
 from brachis.optimise.backends import SolverReport
+from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Refined
 from brachis.problem.problem import Problem
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
@@ -98,7 +98,7 @@ class Candidate(Summary):
         Of all solves: with ever smaller branch margins, on ever finer meshes, then of the refinement rounds.
     coarse : float
         End time at the first collocation points, s; infinite where there is none.
-    refined : Refined or None
+    refined : SolvedProgram or None
         The last program, its answer and its multipliers; None while it is not finished.
     trajectory : Trajectory or None
         None while it is not finished, and where none came out.
@@ -126,7 +126,7 @@ class Candidate(Summary):
     target: Program | None = None
     reports: tuple[SolverReport, ...] = ()
     coarse: float = np.inf
-    refined: Refined | None = None
+    refined: SolvedProgram | None = None
     trajectory: Trajectory | None = None
     verification: Verification | None = None
     not_completed: str = ""
@@ -208,7 +208,7 @@ class Candidate(Summary):
         self,
         *,
         reports: tuple[SolverReport, ...],
-        refined: Refined,
+        refined: SolvedProgram,
         trajectory: Trajectory | None,
         verification: Verification | None,
         tolerance: float,

@@ -10,8 +10,9 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, interpolate
 from brachis.optimise.backends import SolverReport
 from brachis.optimise.candidate import Candidate, InitialGuess
+from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Refined, RefinementOptions, Solve, refine
+from brachis.optimise.refine import RefinementOptions, refine
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
 from brachis.verify import verify_trajectory
 
@@ -19,13 +20,13 @@ _SAME_TIME = 1e-7
 _BESIDE = 1e-4
 
 
-def extract(start: InitialGuess, refined: Refined) -> Trajectory:
+def extract(start: InitialGuess, refined: SolvedProgram) -> Trajectory:
     """Turn the answer of a program into a trajectory that can be evaluated without the closed form.
 
     Parameters
     ----------
     start : Start
-    refined : Refined
+    refined : SolvedProgram
 
     Returns
     -------
@@ -132,7 +133,7 @@ def refine_and_verify(
 
 
 def _verified(
-    attempt: Candidate, before: tuple[SolverReport, ...], refined: Refined
+    attempt: Candidate, before: tuple[SolverReport, ...], refined: SolvedProgram
 ) -> Candidate:
     """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
     start = attempt.start

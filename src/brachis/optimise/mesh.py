@@ -14,78 +14,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
-from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.bspline import clamped_knots, spread
+from brachis.optimise.improve import (
+    Change,
+    Solve,
+    SolvedProgram,
+    attempt_once,
+    improve,
+    with_early_end_accepted,
+    with_last,
+)
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Refined, RefinementOptions, Solve, merged, refine
+from brachis.optimise.refine import RefinementOptions, merged, refine
 from brachis.task import SplineSettings
 
 SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
-
-
-class Answer(NamedTuple):
-    """What came of the knots.
-
-    Attributes
-    ----------
-    program : Program
-    reports : tuple of SolverReport
-        Of all solves; the last one belongs to `program`.
-    not_completed : str
-        What the time, or a solve that failed, left undone, in words; empty where nothing.
-    """
-
-    program: Program
-    reports: tuple[SolverReport, ...]
-    not_completed: str = ""
-
-
-_EARLY = (
-    SolveStatus.ITERATION_LIMIT,
-    SolveStatus.TIME_LIMIT,
-    SolveStatus.STALLED,
-    SolveStatus.FAILED,
-)
-"""How a solve ends that is not done; a solver that breaks down at last may have come far."""
-
-
-def accept_early_end(report: SolverReport, before: SolverReport) -> SolverReport:
-    """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
-    better = report.feasible and report.objective < before.objective
-    early = report.status in _EARLY
-    return (
-        replace(report, status=SolveStatus.ACCEPTABLE) if better and early else report
-    )
-
-
-def end_time(refined: Refined, refinement: RefinementOptions) -> float:
-    """End time of a motion that holds the limits, infinite for others."""
-    holds = refined.converged and (
-        refined.violation <= refinement.tolerance or not refinement.max_rounds
-    )
-    return refined.t_end if holds else np.inf
-
-
-def gain(before: Refined, after: Refined, refinement: RefinementOptions) -> float:
-    """Part of the end time that is gained; NaN where neither motion holds the limits."""
-    if not np.isfinite(end_time(before, refinement)):
-        return 1.0 if np.isfinite(end_time(after, refinement)) else np.nan
-    return 1.0 - end_time(after, refinement) / end_time(before, refinement)
-
-
-def with_last(
-    last: SolverReport, reports: list[SolverReport]
-) -> tuple[SolverReport, ...]:
-    """Move one of the reports to the end."""
-    return (*(report for report in reports if report is not last), last)
 
 
 _FEWEST, _WITH_LEAST_SPEED = 12, 36
@@ -99,59 +49,53 @@ def coarsest(program: Program) -> Program:
 
 def solve_nested(
     target: Program,
-    coarse: Program,
-    report: SolverReport,
+    coarse: SolvedProgram,
     solve: Solve,
     deadline: Deadline = NEVER,
-) -> Answer:
+) -> SolvedProgram:
     """Solve a program from the answer of its coarsest one, level by level.
 
     Parameters
     ----------
     target : Program
-    coarse : Program
-        ``coarsest(target)``, perhaps with another branch margin, which is kept.
-    report : SolverReport
-        Of the coarse program's solve.
+    coarse : SolvedProgram
+        ``coarsest(target)`` solved, perhaps with another branch margin, which is kept.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
-
     deadline : Deadline, optional
         No level is begun after it.
 
     Returns
     -------
-    Answer
+    SolvedProgram
         Over the target's knots; over those of the last level that was solved, where one could not be.
     """
-    reports = [report]
-    solved = report
-    for level in _levels(target):
-        if level.intervals <= coarse.intervals:
-            continue
-        if deadline.passed:
-            break
-        pairs = list(zip(coarse.split(solved.x), level.phases, strict=True))
-        finer = coarse.with_phases(
-            own.with_knots(fine.knots, fine.t_norm) for (own, _), fine in pairs
-        )
-        start = finer.variables_from(
-            [own.motion(part).over(fine.knots) for (own, part), fine in pairs]
-        )
-        report = accept_early_end(solve(finer, start), solved)
-        reports.append(report)
-        if not report.status.usable:
-            break
-        coarse = finer
-        solved = report
-    reached = coarse.intervals
-    asked = target.intervals
-    not_completed = (
-        f"the motion has {reached} of {asked} intervals, of which more were not solved"
-        if reached < asked
-        else ""
+
+    def change_to(level: Program) -> Change:
+        return lambda solved: _over_level(solved, level)
+
+    finer = (
+        change_to(level)
+        for level in _levels(target)
+        if level.intervals > coarse.program.intervals
     )
-    return Answer(coarse, with_last(solved, reports), not_completed)
+    attempt = attempt_once(solve, accept_early_end=True)
+    reached = improve(coarse, finer, attempt, deadline=deadline)
+    intervals = reached.program.intervals
+    if intervals == target.intervals:
+        return reached
+    not_completed = f"the motion has {intervals} of {target.intervals} intervals, of which more were not solved"
+    return replace(reached, not_completed=not_completed)
+
+
+def _over_level(solved: SolvedProgram, level: Program) -> tuple[Program, np.ndarray]:
+    """Write a solved program, and its answer, over the knots and points of a finer one."""
+    pairs = list(zip(solved.program.split(solved.x), level.phases, strict=True))
+    finer = solved.program.with_phases(
+        own.with_knots(fine.knots, fine.t_norm) for (own, _), fine in pairs
+    )
+    motions = [own.motion(part).over(fine.knots) for (own, part), fine in pairs]
+    return finer, finer.variables_from(motions)
 
 
 def _levels(program: Program) -> Iterator[Program]:
@@ -220,12 +164,8 @@ class MeshOptions:
 
 
 def refine_mesh(
-    program: Program,
-    first: SolverReport,
-    solve: Solve,
-    options: MeshOptions,
-    deadline: Deadline,
-) -> Answer:
+    solved: SolvedProgram, solve: Solve, options: MeshOptions, deadline: Deadline
+) -> SolvedProgram:
     """Insert knots into a solved program until that gains little.
 
     Every round halves the intervals that lose most, and solves again from the same motion. Rounds end when the last two
@@ -233,9 +173,8 @@ def refine_mesh(
 
     Parameters
     ----------
-    program : Program
-    first : SolverReport
-        Of the program's solve.
+    solved : SolvedProgram
+        Of one report.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     options : MeshOptions
@@ -244,37 +183,31 @@ def refine_mesh(
 
     Returns
     -------
-    Answer
+    SolvedProgram
         Over all knots.
     """
-    reports = [first]
-    last = first
-    gains = [1.0]
-    is_settled = False
-    for _ in range(_MOST_ROUNDS):
-        if _GROWTH * last.wall_time > deadline.left:
-            return Answer(program, with_last(last, reports), _UNDONE)
-        intervals = (
-            _every_h_refinement(program)
-            if is_settled
-            else _losers(program, last.x, options)
-        )
-        finer, x = _halved(program, last.x, intervals, options)
-        if finer.variables > _MOST_VARIABLES:
-            return Answer(program, with_last(last, reports), _UNDONE)
-        if finer.variables == program.variables:
-            break
-        report = accept_early_end(solve(finer, x), last)
-        reports.append(report)
-        if not report.status.usable:
-            break
-        gains.append(1.0 - report.objective / last.objective)
-        program = finer
-        last = report
-        is_settled = sum(gains[-2:]) < _ENOUGH * options.tolerance
+
+    def halve(solved: SolvedProgram) -> tuple[Program, np.ndarray] | str | None:
+        program = solved.program
+        times = np.array([report.objective for report in solved.reports])
+        gains = 1.0 - times[1:] / times[:-1]
+        is_settled = len(gains) > 1 and gains[-2:].sum() < _ENOUGH * options.tolerance
         if is_settled and 2 * program.variables > _FEW_VARIABLES:
-            break
-    return Answer(program, with_last(last, reports))
+            return None
+        if _GROWTH * solved.report.wall_time > deadline.left:
+            return _UNDONE
+        intervals = (
+            _every_interval(program)
+            if is_settled
+            else _losers(program, solved.x, options)
+        )
+        finer, x = _halved(program, solved.x, intervals, options)
+        if finer.variables > _MOST_VARIABLES:
+            return _UNDONE
+        return None if finer.variables == program.variables else (finer, x)
+
+    attempt = attempt_once(solve, accept_early_end=True)
+    return improve(solved, [halve] * _MOST_ROUNDS, attempt)
 
 
 def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.ndarray]:
@@ -286,7 +219,7 @@ def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.nd
             for phase, part in program.split(x)
         ]
     except UnreachableError:  # between the collocation points
-        return _every_h_refinement(program)
+        return _every_interval(program)
     together = np.concatenate(lost)
     order = np.argsort(-together, kind="stable")
     most = np.searchsorted(np.cumsum(together[order]), _SHARE * together.sum()) + 1
@@ -308,7 +241,7 @@ def _lost(phase: Phase, x: np.ndarray) -> np.ndarray:
     return np.asarray(np.ptp(within, axis=2).sum(axis=1) * np.diff(breaks))
 
 
-def _every_h_refinement(program: Program) -> list[np.ndarray]:
+def _every_interval(program: Program) -> list[np.ndarray]:
     return [np.arange(phase.intervals) for phase in program.phases]
 
 
@@ -342,17 +275,18 @@ def _with_halves(phase: Phase, intervals: np.ndarray, options: MeshOptions) -> P
 
 
 _ROUNDS = 5
+_BEYOND_LIMITS = 1e9
+"""Stands for the end time of motions beyond the limits, s: any motion within them is better."""
 _WORTH_IT = 2e-4
 """Knots are moved again as long as that shortens the motion by this part of it."""
 
 
 def optimise_knots(
-    program: Program,
-    first: SolverReport,
+    solved: SolvedProgram,
     solve: Solve,
     shortest: float,
     refinement: RefinementOptions,
-) -> Answer:
+) -> SolvedProgram:
     """Optimise the interval lengths of a solved program together with the motion.
 
     Collocation points keep their places within their intervals while the knots move. The knots are then fixed and the
@@ -361,10 +295,8 @@ def optimise_knots(
 
     Parameters
     ----------
-    program : Program
+    solved : SolvedProgram
         With fixed knots.
-    first : SolverReport
-        Of the program's solve.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     shortest : float
@@ -374,62 +306,64 @@ def optimise_knots(
 
     Returns
     -------
-    Answer
+    SolvedProgram
         With knots fixed where they are best; the given program if moving them led to no motion within the limits.
     """
-    given = program
-    reports = [first]
-    best = None
-    x = first.x
-    shortest = max(
-        shortest, SHORTEST * max(phase.intervals for phase in program.phases)
-    )
-    for _ in range(_ROUNDS):
-        if refinement.deadline.passed:
-            break
-        free = program.with_free_knots(shortest)
-        moved = solve(free, free.variables_from(program.motions(x)))
+    most = max(phase.intervals for phase in solved.program.phases)
+    shortest = max(shortest, SHORTEST * most)
+
+    def free_knots(solved: SolvedProgram) -> tuple[Program, np.ndarray]:
+        free = solved.program.with_free_knots(shortest)
+        return free, free.variables_from(solved.program.motions(solved.x))
+
+    def move_fix_and_refine(free: Program, x: np.ndarray) -> SolvedProgram:
+        moved = solve(free, x)
         fixed, start = free.frozen(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
-        report = accept_early_end(solve(fixed, start), reports[-1])
-        reports += [moved, report]
-        if not report.status.usable:
-            break
+        report = with_early_end_accepted(solve(fixed, start), free.end_time(x))
         refined = refine(fixed, report, solve, refinement)
-        reports += refined.reports[1:]
-        gained = np.inf if best is None else gain(best, refined, refinement)
-        if best is None or gained > 0.0:
-            best = refined
-        if not gained > _WORTH_IT:
-            break
-        program = refined.program
-        x = refined.x
+        return replace(refined, reports=(moved, *refined.reports))
+
+    def judge(candidate: SolvedProgram) -> float:
+        if not np.isfinite(candidate.violation):
+            return np.inf
+        if refinement.max_rounds and candidate.violation > refinement.tolerance:
+            return _BEYOND_LIMITS
+        return candidate.t_end
+
+    best = improve(
+        solved,
+        [free_knots] * _ROUNDS,
+        move_fix_and_refine,
+        least_gain=0.0,
+        go_on_above=_WORTH_IT,
+        judge=judge,
+        deadline=refinement.deadline,
+    )
     not_completed = (
         "the knots were not moved as far as that pays"
         if refinement.deadline.passed
         else ""
     )
-    if best is None or not np.isfinite(end_time(best, refinement)):
-        return Answer(given, with_last(first, reports), not_completed)
-    return Answer(best.program, with_last(best.reports[-1], reports), not_completed)
+    if judge(best) < _BEYOND_LIMITS:
+        return SolvedProgram(best.program, best.reports, not_completed)
+    reports = with_last(solved.report, best.reports)
+    return SolvedProgram(solved.program, reports, not_completed)
 
 
 def adapt_mesh(
-    program: Program,
-    reports: tuple[SolverReport, ...],
+    solved: SolvedProgram,
     solve: Solve,
     spline: SplineSettings,
     refinement: RefinementOptions,
     *,
     target: Program | None = None,
-) -> Answer:
+) -> SolvedProgram:
     """Do with the knots of a solved program what a task's ``spline`` part asks for: nothing, free them, or refine.
 
     Parameters
     ----------
-    program : Program
-    reports : tuple of SolverReport
-        The last one is of the problem's solve.
+    solved : SolvedProgram
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     spline : SplineSettings
@@ -440,29 +374,25 @@ def adapt_mesh(
 
     Returns
     -------
-    Answer
+    SolvedProgram
         With fixed knots; the reports are those given, and those of further solves.
     """
-    if not reports[-1].status.usable:
-        return Answer(program, reports)
-    nested = Answer(program, reports[-1:])
+    if not solved.usable:
+        return solved
+    nested = SolvedProgram(solved.program, (solved.report,))
     if target is not None:
-        nested = solve_nested(target, program, reports[-1], solve, refinement.deadline)
-    last = nested.reports[-1]
+        nested = solve_nested(target, nested, solve, refinement.deadline)
+    last = SolvedProgram(nested.program, (nested.report,))
     if spline.knots == "free":
-        adapted = optimise_knots(
-            nested.program, last, solve, spline.shortest_interval, refinement
-        )
+        adapted = optimise_knots(last, solve, spline.shortest_interval, refinement)
     elif spline.intervals == "auto":
         options = MeshOptions(spline.tolerance, spline.points_per_interval)
-        adapted = refine_mesh(nested.program, last, solve, options, refinement.deadline)
+        adapted = refine_mesh(last, solve, options, refinement.deadline)
     else:
-        adapted = Answer(nested.program, (last,))
-    not_completed = "; ".join(
-        filter(None, (nested.not_completed, adapted.not_completed))
-    )
-    return Answer(
+        adapted = last
+    messages = filter(None, (nested.not_completed, adapted.not_completed))
+    return SolvedProgram(
         adapted.program,
-        (*reports[:-1], *nested.reports[:-1], *adapted.reports),
-        not_completed,
+        (*solved.reports[:-1], *nested.reports[:-1], *adapted.reports),
+        "; ".join(messages),
     )

@@ -14,17 +14,16 @@ therefore taken for the cubic that its velocities and accelerations define.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
 from brachis.kinematics import JointState
 from brachis.optimise.backends import SolverReport
 from brachis.optimise.bspline import spread
+from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.robot import Friction
@@ -308,7 +307,6 @@ def merged(phase: Phase, extra: np.ndarray) -> np.ndarray:
     return np.union1d(t_norm, extra[apart.min(axis=1) > _CLOSEST])
 
 
-Solve = Callable[[Program, np.ndarray], SolverReport]
 _LONGEST = 0.01
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
@@ -339,45 +337,12 @@ class RefinementOptions:
     longest: float = np.inf
 
 
-@dataclass(frozen=True, repr=False)
-class Refined(Summary):
-    """A solve and what refinement made of it.
-
-    Attributes
-    ----------
-    program : Program
-        With all collocation points.
-    reports : tuple of SolverReport
-        Of every round, the first one included.
-    x : (v,) ndarray
-        The answer.
-    violation : float
-        Largest violation of a limit on the dense grid, as a fraction of it; infinite where out of reach.
-    time_scaled : float
-        Factor by which t_E was lengthened at the very end, 1 if not at all.
-    """
-
-    program: Program
-    reports: tuple[SolverReport, ...]
-    x: np.ndarray
-    violation: float
-    time_scaled: float
-
-    @property
-    def t_end(self) -> float:
-        """End time of the answer, s."""
-        return self.program.end_time(self.x)
-
-    @property
-    def converged(self) -> bool:
-        """True where the first solve ended well, so that `x` is a motion and not a mere iterate."""
-        return self.reports[0].status.usable
-
-
 def refine(
     program: Program, first: SolverReport, solve: Solve, options: RefinementOptions
-) -> Refined:
+) -> SolvedProgram:
     """Add collocation points to a solved program until the limits hold on the dense grid.
+
+    This does not look for a better motion, as `improve` does: from round to round motions get slower, until they hold.
 
     Parameters
     ----------
@@ -390,39 +355,30 @@ def refine(
 
     Returns
     -------
-    Refined
+    SolvedProgram
+        With all collocation points. Its reports are the first one, and one for every round.
     """
+    if not first.status.usable:
+        return SolvedProgram(program, (first,), violation=np.inf)
     dense = program.with_grid(
         [dense_grid(phase, options.density) for phase in program.phases]
     )
     goal = options.tolerance * _GOAL
     reports = [first]
-    if not first.status.usable:
-        return Refined(program, (first,), first.x, np.inf, 1.0)
     for _ in range(options.max_rounds):
         answer = reports[-1].x
-        violation, places = violations(dense, answer, goal)
-        longest = min(
-            program.end_time(answer) * (1.0 + options.tolerance), options.longest
+        violation, missing = violations(dense, answer, goal)
+        factor, remaining = _lengthen(
+            dense, answer, violation, options, options.tolerance
         )
-        x, remaining = _time_scaled(dense, answer, violation, goal, longest)
         if remaining <= goal:
-            return Refined(
-                program,
-                tuple(reports),
-                x,
-                remaining,
-                program.end_time(x) / program.end_time(answer),
+            return SolvedProgram(
+                program, tuple(reports), violation=remaining, time_scaled=factor
             )
-        extended = [
-            merged(phase, extra)
-            for phase, extra in zip(program.phases, places, strict=True)
-        ]
-        finer = program.with_grid(extended)
-        if (
-            finer.collocation_points == program.collocation_points
-            or options.deadline.passed
-        ):
+        pairs = zip(program.phases, missing, strict=True)
+        finer = program.with_grid([merged(phase, extra) for phase, extra in pairs])
+        is_same = finer.collocation_points == program.collocation_points
+        if is_same or options.deadline.passed:
             break
         report = solve(finer, answer)
         if not report.status.usable and not _still_good(report, reports[-1]):
@@ -431,17 +387,10 @@ def refine(
         reports.append(report)
     answer = reports[-1].x
     violation, _ = violations(dense, answer, goal)
-    longest = min(
-        program.end_time(answer) * (1.0 + (_LONGEST if options.max_rounds else 0.0)),
-        options.longest,
-    )
-    x, remaining = _time_scaled(dense, answer, violation, goal, longest)
-    return Refined(
-        program,
-        tuple(reports),
-        x,
-        remaining,
-        program.end_time(x) / program.end_time(answer),
+    by = _LONGEST if options.max_rounds else 0.0
+    factor, remaining = _lengthen(dense, answer, violation, options, by)
+    return SolvedProgram(
+        program, tuple(reports), violation=remaining, time_scaled=factor
     )
 
 
@@ -450,23 +399,30 @@ def _still_good(report: SolverReport, before: SolverReport) -> bool:
     return report.feasible and report.objective <= before.objective * (1.0 + _LONGEST)
 
 
-def _time_scaled(
-    dense: Program, x: np.ndarray, violation: float, goal: float, longest: float
-) -> tuple[np.ndarray, float]:
-    """Lengthen the time to `longest`, s, at most where that brings the violation to the goal.
+def _lengthen(
+    dense: Program,
+    x: np.ndarray,
+    violation: float,
+    options: RefinementOptions,
+    by: float,
+) -> tuple[float, float]:
+    """Find the factor, up to 1 + `by`, by which a longer time brings the violation to the goal, and what is left of it.
 
     A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
     gravity or friction add to by less, and least speeds not at all. So this is tried, and the best is kept.
     """
-    best = x, violation
+    goal = options.tolerance * _GOAL
+    longest = min(dense.end_time(x) * (1.0 + by), options.longest)
+    factor = 1.0
+    best = (factor, violation)
     while goal < violation:
-        factor = 1.0 + violation - 0.5 * goal
+        before = violation
+        factor *= 1.0 + violation - 0.5 * goal
         if not dense.end_time(x) * factor <= longest:
             break
-        x = dense.with_time_scaled(x, factor)
-        before = violation
-        (violation, _) = violations(dense, x, goal)
-        best = min(best, (x, violation), key=lambda pair: pair[1])
+        violation, _ = violations(dense, dense.with_time_scaled(x, factor), goal)
+        if violation < best[1]:
+            best = (factor, violation)
         if violation > 0.99 * before:
             break
     return best

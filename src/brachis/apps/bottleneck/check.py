@@ -34,8 +34,8 @@ from brachis.apps.bottleneck.sensitivities import (
 from brachis.common.summary import Summary
 from brachis.errors import PlanningError, UnreachableError
 from brachis.optimise.backends import SolverOptions, residual, solver_named
+from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Refined
 
 _NEAR = 0.1
 """Rows farther from their bounds are left out at first; dimensionless."""
@@ -164,13 +164,16 @@ class SensitivityCheck(Summary):
 
 
 def check_sensitivities(
-    refined: Refined, predictions: Sensitivities | None = None, *, step: float = STEP
+    refined: SolvedProgram,
+    predictions: Sensitivities | None = None,
+    *,
+    step: float = STEP,
 ) -> SensitivityCheck:
     """Solve the refined program again with every limit raised, and compare with what the multipliers predict.
 
     Parameters
     ----------
-    refined : Refined
+    refined : SolvedProgram
         ``result.candidate.refined``.
     predictions : Sensitivities, optional
         What is checked; by default what `sensitivities` says.
@@ -193,7 +196,7 @@ def check_sensitivities(
 
 
 def _check_limits(
-    refined: Refined, predictions: Sensitivities, step: float
+    refined: SolvedProgram, predictions: Sensitivities, step: float
 ) -> SensitivityCheck:
     """Compare limit by limit."""
     began = time.perf_counter()

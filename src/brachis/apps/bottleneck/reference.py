@@ -35,9 +35,10 @@ from brachis.optimise.backends import (
 from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import fit_curves, shortest_time, worst_time_scaling_ratio
+from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.phase import Motion, Phase
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Refined, RefinementOptions, Solve, refine
+from brachis.optimise.refine import RefinementOptions, refine
 from brachis.search.phase_plane import fastest
 from brachis.trajectory import Trajectory
 
@@ -71,7 +72,7 @@ class Reference:
         Largest violation of a limit on a dense grid, as a fraction of it.
     wall_time : float
         s.
-    refined : Refined
+    refined : SolvedProgram
         The problem and its answer.
     """
 
@@ -81,7 +82,7 @@ class Reference:
     intervals: int
     violation: float
     wall_time: float
-    refined: Refined
+    refined: SolvedProgram
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -97,7 +98,7 @@ class Reference:
 
 
 def find_reference(
-    refined: Refined,
+    refined: SolvedProgram,
     *,
     tolerance: float = 1e-4,
     intervals: int = INTERVALS,
@@ -107,7 +108,7 @@ def find_reference(
 
     Parameters
     ----------
-    refined : Refined
+    refined : SolvedProgram
         ``result.candidate.refined``.
     tolerance : float, optional
         Largest violation of a limit, as a fraction of it.
@@ -128,7 +129,7 @@ def find_reference(
 
 
 def _find_faster(
-    refined: Refined, tolerance: float, intervals: int, time_limit: float
+    refined: SolvedProgram, tolerance: float, intervals: int, time_limit: float
 ) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
@@ -188,7 +189,7 @@ def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
 
 def _plan_on_mesh(
     phase: Phase, motion: Motion, tolerance: float, deadline: float
-) -> Refined | None:
+) -> SolvedProgram | None:
     """Solve from a motion and refine, with one backend after the other, until one gives a motion within the rows.
 
     It need not be an optimum: any motion within the limits is as good a reference as it is fast.
@@ -237,7 +238,7 @@ def _limit_time(backend: Callable[..., SolverReport], deadline: float) -> Solve:
     return solve
 
 
-def _violation(answer: Refined) -> float:
+def _violation(answer: SolvedProgram) -> float:
     """Largest violation of a limit on a dense grid and on both sides of every knot; infinite where out of reach."""
     ((phase, x),) = answer.program.split(answer.x)
     grid = np.linspace(0.0, 1.0, 30 * phase.intervals + 1)

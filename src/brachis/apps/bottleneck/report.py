@@ -40,9 +40,10 @@ from brachis.kinematics import (
 )
 from brachis.limits import Role
 from brachis.optimise.backends import solver_named
+from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase import Motion
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Refined, RefinementOptions, refine
+from brachis.optimise.refine import RefinementOptions, refine
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
@@ -60,7 +61,7 @@ _KEPT = 1e-4
 """A motion keeps a branch margin of which it falls short by less: solvers and interpolation are not exact."""
 
 
-def solved_again(trajectory: Trajectory) -> Refined:
+def solved_again(trajectory: Trajectory) -> SolvedProgram:
     """Solve the problem of a saved motion from where it ended.
 
     Parameters
@@ -70,7 +71,7 @@ def solved_again(trajectory: Trajectory) -> Refined:
 
     Returns
     -------
-    Refined
+    SolvedProgram
         As ``result.candidate.refined`` of the plan.
 
     Raises
@@ -137,7 +138,7 @@ def _chart(problem: Problem, trajectory: Trajectory) -> ChartMap:
     return chart_around(problem.task_map, problem.path, s, trajectory.q, rows)
 
 
-def _came_back(refined: Refined, trajectory: Trajectory) -> bool:
+def _came_back(refined: SolvedProgram, trajectory: Trajectory) -> bool:
     """Tell whether an answer is the fastest motion that a saved one was made from."""
     slower = trajectory.t_end / refined.t_end - 1.0
     return -_SAME <= slower <= trajectory.task.search.slower + _SAME
@@ -145,7 +146,7 @@ def _came_back(refined: Refined, trajectory: Trajectory) -> bool:
 
 def _answers(
     program: Program, x: np.ndarray, trajectory: Trajectory
-) -> Iterator[Refined]:
+) -> Iterator[SolvedProgram]:
     """Solve and refine with one backend after the other, until one comes back to the motion."""
     task = trajectory.task
     deadline = Deadline.after(task.search.time_limit)

@@ -28,8 +28,8 @@ import numpy as np
 
 from brachis.common.summary import Summary
 from brachis.limits import Bound, Label, Limit, Role
+from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
-from brachis.optimise.refine import Refined
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -251,7 +251,7 @@ def _balancing(
     )
 
 
-def multipliers_of_answer(refined: Refined) -> Multipliers:
+def multipliers_of_answer(refined: SolvedProgram) -> Multipliers:
     """Find the multipliers of a refined answer, before its end time was lengthened."""
     report = refined.reports[-1]
     return multipliers_of(refined.program, report.x, report.multipliers)
@@ -385,12 +385,12 @@ class Sensitivities(Summary):
         }
 
 
-def sensitivities(refined: Refined) -> Sensitivities:
+def sensitivities(refined: SolvedProgram) -> Sensitivities:
     """Derive from a refined answer what every limit costs.
 
     Parameters
     ----------
-    refined : Refined
+    refined : SolvedProgram
         ``result.candidate.refined``.
 
     Returns

@@ -1,0 +1,190 @@
+"""Solve again, and keep the better motion.
+
+Finer meshes, free knots, smaller branch margins, another chart, other joints: each of these is a change of a solved
+program. `improve` tries such changes in turn, and its answer is a `SolvedProgram`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brachis.common.deadline import NEVER, Deadline
+from brachis.common.summary import Summary
+from brachis.optimise.backends import SolverReport, SolveStatus
+from brachis.optimise.program import Program
+
+
+@dataclass(frozen=True, repr=False)
+class SolvedProgram(Summary):
+    """A program and its answer, or the last attempt at one.
+
+    Attributes
+    ----------
+    program : Program
+    reports : tuple of SolverReport
+        Of all solves that led here; the last one belongs to `program`. Empty where nothing is solved yet.
+    not_completed : str
+        What the time, or a solve that failed, left undone, in words; empty where nothing.
+    violation : float
+        Largest violation of a limit between the collocation points, as a fraction of it; infinite where the motion
+        leaves the closed form's reach, NaN where nobody looked (see `refine`).
+    time_scaled : float
+        Factor by which refinement lengthened the motion at the very end.
+    """
+
+    program: Program
+    reports: tuple[SolverReport, ...] = ()
+    not_completed: str = ""
+    violation: float = np.nan
+    time_scaled: float = 1.0
+
+    @property
+    def report(self) -> SolverReport:
+        """Report of the program's own solve."""
+        return self.reports[-1]
+
+    @property
+    def usable(self) -> bool:
+        """Whether the program's own solve ended with a motion."""
+        return bool(self.reports) and self.report.status.usable
+
+    @property
+    def x(self) -> np.ndarray:
+        """The answer, (v,)."""
+        return self.program.with_time_scaled(self.report.x, self.time_scaled)
+
+    @property
+    def t_end(self) -> float:
+        """End time of the answer, s."""
+        return self.program.end_time(self.x)
+
+    @property
+    def converged(self) -> bool:
+        """True where the first solve ended well, so that `x` is a motion and not a mere iterate."""
+        return self.reports[0].status.usable
+
+
+Solve = Callable[[Program, np.ndarray], SolverReport]
+"""Solves a program from a point x, (v,)."""
+Attempt = Callable[[Program, np.ndarray], SolvedProgram]
+"""Solves a changed program from a point x, (v,), perhaps in several steps, in which the program may change again."""
+Change = Callable[[SolvedProgram], tuple[Program, np.ndarray] | str | None]
+"""Changes what was kept so far into a program and the point from which it is solved.
+
+Where no further change is worth trying it returns None, or in words what is left undone.
+"""
+
+
+def improve(
+    first: SolvedProgram,
+    changes: Iterable[Change],
+    attempt: Attempt,
+    *,
+    least_gain: float = -np.inf,
+    go_on_above: float | None = -np.inf,
+    judge: Callable[[SolvedProgram], float] | None = None,
+    deadline: Deadline = NEVER,
+) -> SolvedProgram:
+    """Try changes of a solved program in turn, and keep the better motion each time.
+
+    Parameters
+    ----------
+    first : SolvedProgram
+        As long as its solve, or those that were tried since, gave no motion, the next one takes its place.
+    changes : iterable of callable
+        Each one gets what was kept so far.
+    attempt : callable
+        Solves what a change proposes; see `attempt_once`.
+    least_gain : float, optional
+        A motion is kept that is shorter by more than this fraction; by default every motion is, however long.
+    go_on_above : float or None, optional
+        The next change is tried after a gain of more than this fraction; by default after every motion. With None all
+        changes are tried.
+    judge : callable, optional
+        Number by which answers are compared, the less the better, and infinite for what is no motion; by default the
+        objective of a solve that ended well.
+    deadline : Deadline, optional
+        No change is tried after it.
+
+    Returns
+    -------
+    SolvedProgram
+        What was kept, with the reports of all solves, the one of its own last.
+    """
+    judge = judge or _objective
+    kept = first
+    best = judge(kept)
+    not_completed = ""
+    for change in changes:
+        proposal = None if deadline.passed else change(kept)
+        if proposal is None:
+            break
+        if isinstance(proposal, str):
+            not_completed = proposal
+            break
+        tried = attempt(*proposal)
+        value = judge(tried)
+        gain = 1.0 - value / best if np.isfinite(best) else -np.inf
+        if not np.isfinite(best) and np.isfinite(value):
+            gain = 1.0
+        was_usable = kept.usable
+        if gain > least_gain or not was_usable:
+            kept = replace(tried, reports=(*kept.reports, *tried.reports))
+            best = value
+        else:
+            reports = (*kept.reports, *tried.reports)
+            kept = replace(kept, reports=with_last(kept.report, reports))
+        if was_usable and go_on_above is not None and not gain > go_on_above:
+            break
+    return replace(kept, not_completed=not_completed)
+
+
+def _objective(solved: SolvedProgram) -> float:
+    """Objective of a solve that ended well, infinite for others."""
+    return solved.report.objective if solved.usable else np.inf
+
+
+def attempt_once(solve: Solve, *, accept_early_end: bool = False) -> Attempt:
+    """Make an attempt of a single solve.
+
+    Parameters
+    ----------
+    solve : callable
+    accept_early_end : bool, optional
+        Whether a solve counts that ended early with a feasible motion faster than the one it began with.
+    """
+
+    def attempt(program: Program, x: np.ndarray) -> SolvedProgram:
+        report = solve(program, x)
+        if accept_early_end:
+            report = with_early_end_accepted(report, program.end_time(x))
+        return SolvedProgram(program, (report,))
+
+    return attempt
+
+
+_EARLY = (
+    SolveStatus.ITERATION_LIMIT,
+    SolveStatus.TIME_LIMIT,
+    SolveStatus.STALLED,
+    SolveStatus.FAILED,
+)
+"""How a solve ends that is not done; a solver that breaks down at last may have come far."""
+
+
+def with_early_end_accepted(report: SolverReport, before: float) -> SolverReport:
+    """Call a solve that ended early acceptable where its motion is feasible, and shorter than `before`, s."""
+    is_better = report.feasible and report.objective < before
+    if is_better and report.status in _EARLY:
+        return replace(report, status=SolveStatus.ACCEPTABLE)
+    return report
+
+
+def with_last(
+    last: SolverReport, reports: Sequence[SolverReport]
+) -> tuple[SolverReport, ...]:
+    """Move one of the reports to the end."""
+    return (*(report for report in reports if report is not last), last)
