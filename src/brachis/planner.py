@@ -91,8 +91,8 @@ def plan(
         Limits of your own beside those of the task: objects whose ``bind(robot)`` returns a `brachis.limits.Limit`.
         They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
     listener : callable, optional
-        Called with what happens, a line of text at a time; ``logging`` has it under the name ``brachis``, stages at level
-        INFO and iterations at DEBUG.
+        Called with what happens, a line of text at a time; ``logging`` has it under the name ``brachis``, stages at
+        level INFO and iterations at DEBUG.
     progress : bool, optional
         Whether to show on standard error, or below a notebook's cell, what happens. Left out: in notebooks, unless
         there is a listener.
@@ -234,9 +234,8 @@ def _read(
 
 def _report_plan(robot: Robot, task: Task, report: Listener) -> None:
     """Report for what is planned."""
-    space = task.task_space
-    if not isinstance(space, str):
-        space = f"[{', '.join(space)}]"
+    given = task.task_space
+    space = given if isinstance(given, str) else f"[{', '.join(given)}]"
     joints = write_count(robot.n, "joint")
     segments = write_count(len(task.path), "segment")
     report(f"planning for {joints} along a path of {segments}, task space {space}")

@@ -124,13 +124,14 @@ def explain_holding(
     figure = _figure(load.limit, load.column)
     low, high = (f"{figure * ratio:.4g}" for ratio in (load.least, load.largest))
     taken = f"{low} to {high}" if low != high else low
+    mean = f"{load.mean * figure:.4g}"
     remedies = load_remedies(
         starts[0].problem.robot, load.limit, load.column, load.mean
     )
     return Failure(
         f"the {label.kind} limit of {label.subject!r} is too low to hold the arm against gravity along the path",
         where=label.key or load.limit.name,
-        found=f"{taken} {label.unit} to hold the arm, {load.mean * figure:.4g} {label.unit} on average (root mean square)",
+        found=f"{taken} {label.unit} to hold the arm, {mean} {label.unit} on average (root mean square)",
         needed=f"{figure:.4g} {label.unit}",
         hint="Lead the path through postures that take less, or mount the robot otherwise",
         remedies=tuple(remedies),
@@ -259,10 +260,11 @@ def _explain_end_speed(
         return None
     unit = problem.task.speed_unit
     speeds = {key: getattr(problem.task.boundary, key) for key in shares}
+    most = f"{share * speeds[key]:.3g} {unit}"
     return Failure(
         f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
-        found=f"{speeds[key]:g} {unit}, where one joint path was estimated to allow about {share * speeds[key]:.3g} {unit}",
+        found=f"{speeds[key]:g} {unit}, where one joint path was estimated to allow about {most}",
         hint="Raise the limits that hold the motion back",
         remedies=tuple(
             Remedy(f"boundary.{key}", speed, _FIRST * shares[key] * speed, unit)

@@ -282,7 +282,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
 
 
 def _least_speed_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
-    """Curves along the joint path, (S, c), and their times, (S,), s; None without a limit that asks for a least speed."""
+    """Curves along the joint path, (S, c), and their times, (S,), s; None if no limit asks for a least speed."""
     has_least_speed = any(
         limit.longer_time == "violates" for limit in start.problem.limits
     )

@@ -125,7 +125,7 @@ def batches(
 
 
 def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
-    """Tell whether motions are planned in charts: the task leaves the choice of joints open, and there is redundancy."""
+    """Tell whether motions are planned in charts: the task leaves the joints open, and the robot is redundant."""
     task = problem.task
     is_open = (task.redundant_joints, task.branch, task.search.guesses) == (
         "auto",
@@ -238,7 +238,8 @@ def _from_lattices(
     lattices: Lattices = ()
     for decomposition, found in zip(decompositions, list(outcomes), strict=True):
         if isinstance(found, DeadEnd) or not found:
-            lattices += ((decomposition, found or None),)
+            dead_end = found if isinstance(found, DeadEnd) else None
+            lattices += ((decomposition, dead_end),)
         if isinstance(found, DeadEnd):
             continue
         # Those that another process found have a copy of the problem.

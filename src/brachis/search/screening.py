@@ -16,6 +16,7 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
+from brachis.kinematics import ChartMap
 from brachis.optimise.backends import SolverOptions, solver_named
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.session import SolverSession
@@ -106,9 +107,11 @@ def _solve_quickly(
             return hopeless
         (motion,) = solved.program.motions(solved.report.x)
         (phase,) = solved.program.phases
+        chart = phase.joint_map
+        assert isinstance(chart, ChartMap)
         return dataclasses.replace(
             start,
-            joint_map=phase.joint_map,
+            joint_map=chart,
             joint_path=motion.at(np.linspace(0.0, motion.t_end, 97))[0],
             estimate=float(solved.report.objective),
             timed=True,

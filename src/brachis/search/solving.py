@@ -31,7 +31,7 @@ from brachis.kinematics import (
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.guess import fit_curves, shortest_time
-from brachis.optimise.improve import Solve, SolvedProgram, attempt_once, improve
+from brachis.optimise.improve import Change, Solve, SolvedProgram, attempt_once, improve
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import phase_in
 from brachis.problem.problem import Problem
@@ -163,11 +163,11 @@ def solve_in_chart(
     out_of_time = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
     solved = solve_first(program, x)
     if not solved.usable and solved.report.status not in out_of_time:
-        solved = improve(solved, [lambda _kept: (program, x)], solve_further)
+        solved = improve(solved, [_go_to((program, x))], solve_further)
     solved = improve(solved, 3 * [follow], solve_first, go_on_above=WORTH_IT)
     if solved.usable and _is_held_back(solved):
         point = solved.program, solved.report.x
-        solved = improve(solved, [lambda _kept: point], solve_further)
+        solved = improve(solved, [_go_to(point)], solve_further)
     return solved
 
 
@@ -194,11 +194,16 @@ def best_of_joints(
     points = [move_to_chart(problem, solved, rows) for rows in _select_joints(solved)]
     return improve(
         solved,
-        [lambda _kept, point=point: point for point in points if point is not None],
+        [_go_to(point) for point in points if point is not None],
         solve_again,
         least_gain=0.0,
         go_on_above=None,
     )
+
+
+def _go_to(point: tuple[Program, np.ndarray]) -> Change:
+    """Change to a program and a point, whatever was kept so far."""
+    return lambda _kept: point
 
 
 def move_to_chart(

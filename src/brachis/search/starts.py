@@ -77,7 +77,8 @@ def lattice_starts(
                 _guess_on_branch(decomposition, joint_path, f"lattice {number}")
                 for number, joint_path in enumerate(found, 1)
             ]
-    return found
+        dead_end = found
+    return dead_end
 
 
 def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -195,8 +196,10 @@ def chart_starts(
         found = lattice.joint_paths(SCREENED * level.in_charts)
         if not isinstance(found, DeadEnd):
             break
-    if isinstance(found, DeadEnd) or not found:
+    if isinstance(found, DeadEnd):
         return found
+    if not found:
+        return []
     named = [
         (f"lattice {number}" + (f", from {each.seed}" if each.seed else ""), each)
         for number, each in enumerate(found, 1)
