@@ -6,7 +6,7 @@ import pytest
 
 import brachis
 from brachis import Line
-from brachis.search import GIVEN
+from brachis.search.given_motion import GIVEN
 from brachis.task import task_with
 
 TASK = task_with(

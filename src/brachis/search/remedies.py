@@ -119,16 +119,30 @@ def is_planned(
     return None if most or problem.robot.n > problem.task_map.m else False
 
 
-def _try_numbers(
-    remedy: Remedy,
-    is_enough: Callable[[float, int | None], bool | None],
-    deadline: Deadline,
-) -> str:
-    """Look for the smallest change that is enough, and say which it is; empty where none was found.
+IsEnough = Callable[[float, int | None], bool | None]
+"""Tells whether a number is enough, by so many batches of the search, None: all; None where a plan may exist."""
 
-    `is_enough` takes a number and how many batches of the search are tried, None for all. It returns None where a plan
-    may exist.
-    """
+
+def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str:
+    """Look for the smallest change that is enough, and say which it is; empty where none was found."""
+    good, bad = _bracket(remedy, is_enough, deadline)
+    if good is None:
+        return ""
+    verified = "(a plan with it was verified"
+    # Quick trials may miss a plan: only after a whole search the message says that it found none.
+    if remedy.is_refined and bad != remedy.asked and not deadline.passed:
+        outcome = is_enough(bad, None)
+        if outcome:
+            good = bad
+        elif outcome is False:
+            verified += f"; there was none with {bad:g} {remedy.unit}".rstrip()
+    return f"{good:g} {remedy.unit}".rstrip() + f" {verified})"
+
+
+def _bracket(
+    remedy: Remedy, is_enough: IsEnough, deadline: Deadline
+) -> tuple[float | None, float]:
+    """Find the smallest change known to be enough, None without any, and the largest one that is not."""
     lowers = remedy.guess < remedy.asked
     away = -1.0 if lowers else 1.0
     good: float | None = None
@@ -154,18 +168,7 @@ def _try_numbers(
         value = _round(value, down=lowers)
         # While all numbers are enough, or none, the steps grow.
         step = min(step**3, 2.0)
-    if good is None:
-        return ""
-    unit = f" {remedy.unit}" if remedy.unit else ""
-    verified = "(a plan with it was verified"
-    # Quick trials may miss a plan: only after a whole search the message says that it found none.
-    if remedy.is_refined and bad != remedy.asked and not deadline.passed:
-        outcome = is_enough(bad, None)
-        if outcome:
-            good = bad
-        elif outcome is False:
-            verified += f"; there was none with {bad:g}{unit}"
-    return f"{good:g}{unit} {verified})"
+    return good, bad
 
 
 def _round(value: float, *, down: bool) -> float:

@@ -8,6 +8,7 @@ redundant joints or its branch gets these alone. Along a path of joints there is
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -174,7 +175,6 @@ def _in_closed_forms(
     listener: Listener,
 ) -> Iterator[Batch]:
     """Yield batches of guesses on the branches of closed forms, then of numeric guesses and with other solvers."""
-    is_numeric = decompositions[0].problem.task.search.guesses == "numeric"
     known: list[InitialGuess] = []
     for level in levels:
         if level.fallback:
@@ -185,12 +185,8 @@ def _in_closed_forms(
         # Decompositions without a joint path make room for others.
         for first in range(0, len(decompositions), level.decompositions):
             own = decompositions[first : first + level.decompositions]
-            if is_numeric:
-                for decomposition in own:
-                    starts += numeric_starts(decomposition, level.joint_paths, deadline)
-            else:
-                starts, more = _from_lattices(own, level, deadline, listener)
-                lattices += more
+            starts, more = _on_branches(own, level, deadline, listener)
+            lattices += more
             if starts:
                 break
         known += starts
@@ -213,7 +209,7 @@ def _in_closed_forms(
     yield Batch.of(known[:2], solvers[2:], many)
 
 
-def _from_lattices(
+def _on_branches(
     decompositions: Sequence[Decomposition],
     level: SearchLevel,
     deadline: Deadline,
@@ -224,6 +220,10 @@ def _from_lattices(
     Also return the lattices that gave none.
     """
     search = decompositions[0].problem.task.search
+    if search.guesses == "numeric":
+        most = level.joint_paths
+        numeric = (numeric_starts(each, most, deadline) for each in decompositions)
+        return list(itertools.chain(*numeric)), ()
     deadline = deadline.part(_LATTICE_SHARE)
     outcomes = each(
         _starts_of,
