@@ -217,7 +217,7 @@ class Compared:
 
 def compared(name: str, result: Result) -> list[Compared]:
     """Print a line for every limit that costs time."""
-    refined = result.attempt.refined
+    refined = result.candidate.refined
     assert refined is not None
     found = sensitivities(refined)
     checks = [

@@ -94,7 +94,7 @@ def main() -> None:
         result = planned(intervals=intervals)
         state = "verified" if result.verified else "not verified"
         print(
-            f"N = {intervals:3d}: {result.t_end:.3f} s, {state}, on branch {result.attempt.branch} ",
+            f"N = {intervals:3d}: {result.t_end:.3f} s, {state}, on branch {result.candidate.branch} ",
             end="",
         )
         print(f"in {result.timing['total']:.1f} s (published: {PUBLISHED_S} s)")

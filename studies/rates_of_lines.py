@@ -37,7 +37,7 @@ def planned(angle_deg: float, **limits: float) -> tuple[brachis.Result, float]:
 
 def understated(result: brachis.Result) -> np.ndarray:
     """By how much differences understate the jerk between neighbouring points, as parts of the limit."""
-    refined = result.attempt.refined
+    refined = result.candidate.refined
     assert refined is not None
     (phase,) = refined.program.phases
     t_norm = np.linspace(0.0, 1.0, 3 * phase.intervals + 1)

@@ -49,8 +49,8 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
             )
             if x is None:
                 continue
-            _, reports = solve_by_margin_continuation(program, x, solve, MARGINS)
-            found.append(reports[-1].objective if reports[-1].status.usable else np.inf)
+            solved = solve_by_margin_continuation(program, x, solve, MARGINS)
+            found.append(solved.report.objective if solved.usable else np.inf)
             if len(found) == count:
                 break
         times[decomposition.name] = np.array(found)
@@ -73,7 +73,7 @@ def main() -> None:
         result = plan(robot, task)
         coarse = min(
             report.objective
-            for report in result.attempt.reports
+            for report in result.candidate.reports
             if report.status.usable
         )
         times = restarts(Problem.of(robot, load_task(task)), count)

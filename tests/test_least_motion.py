@@ -82,7 +82,7 @@ def result(request):
 
 
 def test_no_joint_swings_to_and_fro_and_the_motion_is_as_fast(result):
-    fastest = result.attempt.trajectory
+    fastest = result.candidate.trajectory
     assert max(reversals(fastest)) > 2, "the fastest motion has nothing to calm"
     assert max(reversals(result.trajectory)) <= 2
     assert result.verified
@@ -98,13 +98,13 @@ def test_no_joint_swings_to_and_fro_and_the_motion_is_as_fast(result):
 
 def test_bottlenecks_are_those_of_the_fastest_motion(result):
     assert (
-        result.attempt.refined.program.objective(result.attempt.refined.x)
-        == result.attempt.refined.t_end
+        result.candidate.refined.program.objective(result.candidate.refined.x)
+        == result.candidate.refined.t_end
     )
-    assert result.attempt.refined.t_end == pytest.approx(
-        result.attempt.trajectory.t_end, rel=1e-9
+    assert result.candidate.refined.t_end == pytest.approx(
+        result.candidate.trajectory.t_end, rel=1e-9
     )
-    fastest = dataclasses.replace(result, trajectory=result.attempt.trajectory)
+    fastest = dataclasses.replace(result, trajectory=result.candidate.trajectory)
     ours, theirs = (
         brachis.bottleneck.report(each).sensitivities for each in (result, fastest)
     )
@@ -117,13 +117,13 @@ def test_bottlenecks_are_those_of_the_fastest_motion(result):
 def test_it_can_be_switched_off():
     result = brachis.plan(scara(least_motion=False))
     assert result.least_motion is None
-    assert result.trajectory is result.attempt.trajectory
+    assert result.trajectory is result.candidate.trajectory
     assert result.to_dict()["least_motion"] is None
 
 
 def test_the_fastest_motion_stays_where_there_is_nothing_to_gain():
     result = brachis.plan(scara())
-    assert result.trajectory is result.attempt.trajectory
+    assert result.trajectory is result.candidate.trajectory
     assert result.least_motion.reduction == result.least_motion.later == 0.0
     assert len(result.least_motion.reports) == 1
     assert "stays" in result.least_motion.status
@@ -132,8 +132,8 @@ def test_the_fastest_motion_stays_where_there_is_nothing_to_gain():
 def test_a_slower_motion_is_calmer(tmp_path):
     result = brachis.plan(scara(slower="1 %"))
     assert result.verified
-    assert 1.005 < result.t_end / result.attempt.t_end <= 1.01
-    assert np.all(rms(result.trajectory) < 0.9 * rms(result.attempt.trajectory))
+    assert 1.005 < result.t_end / result.candidate.t_end <= 1.01
+    assert np.all(rms(result.trajectory) < 0.9 * rms(result.candidate.trajectory))
     result.trajectory.save(tmp_path / "result.npz")
     again = brachis.bottleneck.report(
         Trajectory.load(tmp_path / "result.npz")
@@ -147,8 +147,8 @@ def test_without_time_or_a_verified_motion_the_fastest_stays():
     task = brachis.load_task(scara(least_motion=False))
     kept = []
 
-    def keep(attempt, *_) -> None:
-        kept.append(attempt)
+    def keep(candidate, *_) -> None:
+        kept.append(candidate)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("brachis.planner.find_least_motion", keep)

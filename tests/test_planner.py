@@ -83,7 +83,7 @@ def test_without_refinement_the_answer_is_left_as_it_is():
     )
     assert not result.verified
     assert result.verification.worst_ratio > 1.01
-    assert result.attempt.time_scaled == 1.0
+    assert result.candidate.time_scaled == 1.0
     assert sum(np.isfinite(candidate.t_end) for candidate in result.candidates) == 1
 
 
@@ -111,8 +111,8 @@ def test_every_solve_is_reported():
     result = brachis.plan(
         robot(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}])
     )
-    reports = result.attempt.reports
-    assert len(reports) > 1 + result.attempt.refinement_rounds, (
+    reports = result.candidate.reports
+    assert len(reports) > 1 + result.candidate.refinement_rounds, (
         "the branch margin holds this motion back"
     )
     assert result.to_dict()["iterations"] == sum(

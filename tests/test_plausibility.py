@@ -291,9 +291,7 @@ def test_a_plausible_plan_has_no_warnings():
 
 
 def test_strict_refuses_before_anything_is_planned(monkeypatch):
-    monkeypatch.setattr(
-        "brachis.planner.find_fastest", lambda *_: pytest.fail("planned")
-    )
+    monkeypatch.setattr("brachis.planner.Search", lambda *_: pytest.fail("planned"))
     with pytest.raises(PlausibilityError, match=r"scale\.velocity") as caught:
         brachis.plan(with_limits(scale={"velocity": 50}), strict=True)
     assert caught.value.exit_code == 2

@@ -12,7 +12,7 @@ Many plans         sweep, SweepResult: keys of a task varied over grids and draw
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
-What comes out     Result, Trajectory, Samples, Attempt, Verification, BottleneckReport
+What comes out     Result, Trajectory, Samples, Candidate, Verification, BottleneckReport
 What runs today    import_motion, from a CSV file; compare it with a plan along its path: Comparison
 To look at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
 What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning
@@ -89,9 +89,9 @@ _MODULES = {
 }
 _HOME = {
     "Arc": "task.constructors",
-    "Attempt": "optimise.candidate",
     "BottleneckReport": "apps.bottleneck",
     "BrachisError": "errors",
+    "Candidate": "optimise.candidate",
     "Circle": "task.constructors",
     "Comparison": "apps.comparison",
     "Helix": "task.constructors",

@@ -383,7 +383,7 @@ class UnreachableError(BrachisError):
 
 
 class PlanningError(BrachisError):
-    """The input was sound, yet no plan could be made; the message says which attempts were made.
+    """The input was sound, yet no plan could be made; the message says what was tried.
 
     Examples
     --------

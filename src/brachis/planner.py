@@ -1,9 +1,4 @@
-"""Plan a motion: the whole pipeline, step by step in the order in which it runs.
-
-1. `plan` reads the task and the robot.
-2. `_plan` builds the problem: path, limits, decompositions into redundant joints.
-3. `find_fastest` finds joint paths, solves from them, and refines and verifies the most promising ones.
-4. `find_least_motion` looks for the calmest motion that is as fast.
+"""Plan a motion: the steps of `plan` stand in the order in which they run.
 
 `transcribe` stops before the solve; `plan_many` plans many tasks in several processes.
 """
@@ -20,13 +15,10 @@ from typing import Any, Unpack
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik
-from brachis.common import interrupts
 from brachis.common.arguments import check_callable, check_list, count
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, report_progress
 from brachis.errors import BrachisError, InputError, write_count
-from brachis.optimise.backends import solver_named
-from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.optimise.layout import SHORTEST_TIME
 from brachis.optimise.least_motion import find_least_motion
 from brachis.optimise.program import Program
@@ -38,25 +30,18 @@ from brachis.problem.plausibility import (
     of_robot,
     of_task,
 )
-from brachis.problem.problem import Decomposition, Problem, decompositions_of
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
-from brachis.robot.from_task import robot_for, robot_from_settings
+from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import tell
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
-from brachis.search import (
-    GIVEN,
-    find_fastest,
-    first_map,
-    given_start,
-    is_planned,
-    try_remedies,
-)
-from brachis.search.processes import each, processes
+from brachis.search import Search, first_map, try_remedies
+from brachis.search.processes import each, ignore, processes
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
-from brachis.trajectory import Motion, Trajectory, motion_of
+from brachis.trajectory import Motion, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
@@ -106,13 +91,13 @@ def plan(
         Limits of your own beside those of the task: objects whose ``bind(robot)`` returns a `brachis.limits.Limit`.
         They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
     listener : callable, optional
-        Told what happens, in a line of text at a time; ``logging`` has it under the name ``brachis``, stages at level
-        INFO and iterations at DEBUG.
+        Called with what happens, a line of text at a time; ``logging`` has it under the name ``brachis``, stages at
+        level INFO and iterations at DEBUG.
     progress : bool, optional
         Whether to show on standard error, or below a notebook's cell, what happens. Left out: in notebooks, unless
         there is a listener.
     check_advice : bool, optional
-        Where there is no plan: whether numbers that the error advises are first tried in plans, for up to 20 s. False:
+        If no plan is found: whether numbers that the error advises are first tried in plans, for up to 20 s. False:
         the error names what to change, but not how far.
     **keywords
         Keys of the task, without their sections: ``path``, ``start``, ``task_space``, ``limits``, ``intervals``,
@@ -130,12 +115,12 @@ def plan(
         `Robot` and the task's ``robot`` part contradict each other (`TaskError`); the start posture looks like
         degrees, or with ``strict=True`` another figure is implausible (`PlausibilityError`).
     PlanningError
-        No attempt gave a motion within the limits.
+        No candidate gave a motion within the limits.
 
     Warns
     -----
     PlausibilityWarning
-        A figure is hardly meant.
+        A figure is implausible.
 
     Examples
     --------
@@ -147,42 +132,79 @@ def plan(
     >>> again.t_end < result.t_end
     True
     """
-    # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     check_callable(listener, "listener")
+    check_list(families, "families", "closed forms")
+    # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     with (
         ThreadpoolController().limit(limits=1, user_api="blas"),
-        report_progress(listener, progress) as tell,
+        report_progress(listener, progress) as report,
     ):
         began = time.perf_counter()
-        check_list(families, "families", "closed forms")
         robot, asked = _read(robot_or_task, task, keywords)
         known = None if start_from is None else motion_of(start_from, "start_from")
         loaded = time.perf_counter()
         deadline = Deadline.after(asked.search.time_limit - (loaded - began))
-
-        def is_task_planned(
-            changed: Task, limit: Deadline, most: int | None
-        ) -> bool | None:
-            return _is_planned(robot, asked, changed, families, own_limits, limit, most)
-
         try:
-            return _plan(
-                robot,
-                asked,
-                families,
-                own_limits,
-                known,
-                tell,
-                (began, loaded),
-                deadline,
+            remarks = of_robot(robot) + of_task(asked)
+            remarks = tell(remarks, strict=asked.strict, stacklevel=3)
+            _report_plan(robot, asked, report)
+            problem = Problem.of(robot, asked, own_limits)
+            places = of_places(
+                problem.task_map,
+                problem.path,
+                problem.start,
+                problem.end,
+                asked.path_start,
             )
+            remarks += tell(places, strict=asked.strict, stacklevel=3)
+            decompositions = decompositions_of(problem, families)
+            check_within_reach(problem.task_map, problem.path)
+
+            search = Search(problem, decompositions, deadline, report)
+            with search.end_early():
+                for batch in search.find_starts(known):
+                    search.solve_candidates(batch)
+                    search.refine_and_verify(batch)
+            best = search.best
+            if best is None:
+                raise search.explain().error()
+            searched = time.perf_counter()
+
+            smoothed = None
+            if asked.search.least_motion:
+                report("looking for the calmest motion that is as fast")
+                left = Deadline(0.0) if search.interrupted else deadline
+                smoothed = find_least_motion(best, left, report)
+            ended = time.perf_counter()
+            end_time = of_end_time(best.t_end, SHORTEST_TIME)
+            remarks += tell(end_time, strict=asked.strict, stacklevel=3)
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)
-            try:
-                try_remedies(error, asked, robot.joint_names, is_task_planned, until)
-            except KeyboardInterrupt:
-                interrupts.clear()
+            try_remedies(error, robot, asked, families, own_limits, until)
             raise
+        total = time.perf_counter() - began
+        report(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
+        motion = best if smoothed is None else smoothed
+        assert best.start is not None
+        assert motion.trajectory is not None and motion.verification is not None
+        return Result(
+            task=problem.task,
+            trajectory=motion.trajectory,
+            verification=motion.verification,
+            family=best.start.family,
+            candidate=best.without_programs(),
+            least_motion=smoothed,
+            timing={
+                "load": loaded - began,
+                "search": searched - loaded,
+                "least_motion": ended - searched,
+                "total": total,
+            },
+            candidates=search.in_order(),
+            interrupted=search.interrupted,
+            not_completed=search.not_completed(),
+            warnings=remarks,
+        )
 
 
 def _read(
@@ -190,153 +212,33 @@ def _read(
 ) -> tuple[Robot, Task]:
     """Return the robot, and the task with all that the robot was made with."""
     check_keywords(keywords, "plan", _OWN_KEYWORDS)
-    if is_robot(keywords.get("robot")):
-        allowed = (
-            "a robot comes first, without a name: brachis.plan('scara3', path=...)"
-        )
-        found = (
-            repr(keywords["robot"])
-            if isinstance(keywords["robot"], str)
-            else type(keywords["robot"]).__name__
-        )
+    section = keywords.get("robot")
+    if is_robot(section):
         raise InputError(
             "this is the section of a task, a mapping",
             where="robot",
-            found=found,
-            allowed=allowed,
+            found=repr(section) if isinstance(section, str) else type(section).__name__,
+            allowed="a robot comes first, without a name: brachis.plan('scara3', path=...)",
         )
     # Everything else than a robot is a task.
-    alone = task is None and first is not None and not is_robot(first)
-    given, source = (None, first) if alone else (first, task)
-    named = locate(given)  # type: ignore[arg-type]
+    if task is None and first is not None and not is_robot(first):
+        task = first  # type: ignore[assignment]
+        first = None
+    named = locate(first)  # type: ignore[arg-type]
     if isinstance(named, str | os.PathLike):
         read_file(Path(named))  # a missing file is the first thing to say
-    asked = task_with(source, **keywords)  # type: ignore[arg-type]
+    asked = task_with(task, **keywords)
     robot = robot_for(named, asked.robot)
     return robot, asked.model_copy(update={"robot": robot.settings})
 
 
-def _plan(
-    robot: Robot,
-    task: Task,
-    families: Sequence[ik.Family],
-    own_limits: Sequence[LimitModel],
-    known: Trajectory | None,
-    listener: Listener,
-    times: tuple[float, float],
-    deadline: Deadline,
-) -> Result:
-    """Run the pipeline stage by stage; `times` are those when it began and when the task was read, s."""
-    began, loaded = times
-    remarks = of_robot(robot) + of_task(task)
-    remarks = tell(remarks, strict=task.strict, stacklevel=4)
+def _report_plan(robot: Robot, task: Task, report: Listener) -> None:
+    """Report for what is planned."""
+    given = task.task_space
+    space = given if isinstance(given, str) else f"[{', '.join(given)}]"
     joints = write_count(robot.n, "joint")
     segments = write_count(len(task.path), "segment")
-    listener(
-        f"planning for {joints} along a path of {segments}, task space {_space(task)}"
-    )
-    problem = Problem.of(robot, task, own_limits)
-    places = of_places(
-        problem.task_map, problem.path, problem.start, problem.end, task.path_start
-    )
-    remarks += tell(places, strict=task.strict, stacklevel=4)
-    decompositions = decompositions_of(problem, families)
-    check_within_reach(problem.task_map, problem.path)
-    first = None if known is None else _first(problem, decompositions, known)
-    warm = first if isinstance(first, InitialGuess) else None
-    found = find_fastest(
-        problem,
-        decompositions,
-        deadline,
-        listener,
-        warm,
-    )
-    best = found.best
-    assert best is not None and best.start is not None
-    assert best.trajectory is not None and best.verification is not None
-    searched = time.perf_counter()
-    over = Deadline(0.0) if found.interrupted else deadline
-    if task.search.least_motion:
-        listener("looking for the calmest motion that is as fast")
-    least = (
-        find_least_motion(best, over, listener) if task.search.least_motion else None
-    )
-    calmed = time.perf_counter()
-    end_time = of_end_time(best.t_end, SHORTEST_TIME)
-    remarks += tell(end_time, strict=task.strict, stacklevel=4)
-    total = time.perf_counter() - began
-    listener(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
-    return Result(
-        task=problem.task,
-        trajectory=best.trajectory if least is None else least.trajectory,
-        verification=best.verification if least is None else least.verification,
-        family=best.start.family,
-        attempt=best.without_programs(),
-        least_motion=least,
-        timing={
-            "load": loaded - began,
-            "search": searched - loaded,
-            "least_motion": calmed - searched,
-            "total": total,
-        },
-        candidates=found.in_order(),
-        interrupted=found.interrupted,
-        not_completed=(*_not_used(first, best), *found.not_completed()),
-        warnings=remarks,
-    )
-
-
-def _space(task: Task) -> str:
-    return (
-        task.task_space
-        if isinstance(task.task_space, str)
-        else f"[{', '.join(task.task_space)}]"
-    )
-
-
-def _first(
-    problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory
-) -> InitialGuess | str:
-    """Make a start of a known motion, for the solver that is tried first; or say why there is none."""
-    curved = any(limit.guarantee.is_mean for limit in problem.limits)
-    solver = solver_named(problem.task.solver.name, curved=curved)[0]
-    start = given_start(problem, decompositions, known)
-    return start if isinstance(start, str) else start.with_solver(solver.name)
-
-
-def _not_used(first: InitialGuess | str | None, best: Candidate) -> tuple[str, ...]:
-    """Say where the plan was to start from a known motion and does not."""
-    if first is None or best.origin == GIVEN:
-        return ()
-    reason = first if isinstance(first, str) else "it led to no verified plan"
-    return (
-        f"the plan does not start from the given motion: {reason}; it was searched for as usual",
-    )
-
-
-def _is_planned(
-    robot: Robot,
-    task: Task,
-    changed: Task,
-    families: Sequence[ik.Family],
-    own_limits: Sequence[LimitModel],
-    deadline: Deadline,
-    most: int | None,
-) -> bool | None:
-    """Tell whether a plan of a task that was changed is verified; see `brachis.search.is_planned`."""
-    changed = task_with(changed, effort="single") if most else changed
-    same = changed.robot == task.robot
-    problem = Problem.of(
-        robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf),
-        changed,
-        own_limits,
-    )
-    return is_planned(
-        problem,
-        decompositions_of(problem, families),
-        deadline,
-        most,
-    )
+    report(f"planning for {joints} along a path of {segments}, task space {space}")
 
 
 def transcribe(
@@ -415,7 +317,7 @@ def plan_many(
     Raises
     ------
     InputError
-        One task is given in place of several, `jobs` is no number of processes, or there is no such keyword.
+        One task is given in place of several, `jobs` is not a number of processes, or a keyword does not exist.
     KeyboardInterrupt
         Ctrl-C ends all.
 
@@ -436,44 +338,37 @@ def plan_many(
     >>> [type(outcome).__name__ for outcome in outcomes]
     ['Result', 'PathError']
     """
-    if isinstance(tasks, str | os.PathLike | Mapping):
+    is_one = isinstance(tasks, str | os.PathLike | Mapping)
+    if is_one or not isinstance(tasks, Iterable):
         raise InputError(
-            "is one task",
+            "is one task" if is_one else "wrong type",
             where="tasks",
-            found=type(tasks).__name__,
+            found=type(tasks).__name__ if is_one else repr(tasks),
             allowed="a list of tasks",
-        )
-    if not isinstance(tasks, Iterable):
-        raise InputError(
-            "wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks"
         )
     check_keywords(keywords, "plan_many", ("jobs", "progress"))
     given = list(tasks)
-    jobs = processes(count(jobs, "jobs"))
+    work = each(
+        _plan_one,
+        given,
+        keywords,
+        jobs=processes(count(jobs, "jobs")),
+        listener=ignore,
+    )
     outcomes: list[Outcome] = []
-    work = _outcome, given, keywords
-    if callable(progress):
-        heard = progress
-        progress = False
-    else:
-        heard = None
     with (
-        report_progress(None, progress) as tell,
-        closing(each(*work, jobs=jobs, listener=_deaf)) as made,
+        report_progress(None, False if callable(progress) else progress) as report,
+        closing(work) as made,
     ):
         for outcome in made:
             outcomes.append(outcome)
-            tell(f"planned {len(outcomes)} of {write_count(len(given), 'task')}")
-            if heard is not None:
-                heard(len(outcomes), len(given), outcome)
+            report(f"planned {len(outcomes)} of {write_count(len(given), 'task')}")
+            if callable(progress):
+                progress(len(outcomes), len(given), outcome)
     return outcomes
 
 
-def _deaf(_text: str) -> None:
-    """Listen to nothing."""
-
-
-def _outcome(
+def _plan_one(
     given: Any, keywords: TaskKeywords, listener: Callable[[str], None]
 ) -> Outcome:
     """Plan one task."""

@@ -32,20 +32,20 @@ class Result(PlannedMotion):
     verification : Verification
     family : str
         Family of the closed form; ``chart`` where there was none.
-    attempt : Attempt
+    candidate : Candidate
         The fastest one, with its solved program and its motion.
     least_motion : LeastMotion or None
         How the calmest motion that is as fast was found; None where it was not asked for.
     timing : dict of str to float
         Wall time of every stage, s.
-    candidates : tuple of Attempt
+    candidates : tuple of Candidate
         All that the search looked at, the fastest verified one first; without their programs.
     interrupted : bool
         True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
     not_completed : tuple of str
         What was left undone, in plain words.
     warnings : tuple of Remark
-        What of robot, task and motion is hardly meant.
+        What of robot, task and motion is implausible.
 
     Examples
     --------
@@ -74,7 +74,7 @@ class Result(PlannedMotion):
         Raises
         ------
         UnknownNameError
-            There is no such plot.
+            The plot does not exist.
         """
         if kind == CANDIDATES:
             return plots.plot_candidates(self.candidates)

@@ -20,7 +20,7 @@ LARGE = 1e-4
 
 
 def holds(result, least):
-    found = check_sensitivities(result.attempt.refined)
+    found = check_sensitivities(result.candidate.refined)
     large = [entry for entry in found.entries if abs(entry.re_solved) > LARGE]
     assert len(large) >= least
     assert all(entry.optimal for entry in large)
@@ -64,7 +64,7 @@ def test_range_of_a_joint(slide):
 
 
 def test_a_wrong_prediction_is_found(scara):
-    refined = scara("j3").attempt.refined
+    refined = scara("j3").candidate.refined
     honest = sensitivities(refined)
     doubled = tuple(
         dataclasses.replace(entry, derivative=2.0 * entry.derivative)
@@ -75,7 +75,7 @@ def test_a_wrong_prediction_is_found(scara):
 
 
 def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
-    refined = scara("j1").attempt.refined
+    refined = scara("j1").candidate.refined
     program, x = refined.program, refined.x
     entry = sensitivities(refined).of("j2", "torque")
     other = program.relax(entry.limit, entry.bound, 0.25 * entry.bound.whole)
@@ -97,7 +97,7 @@ def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
 def test_report_needs_the_solved_problem(scara):
     result = scara("j3")
     bare = dataclasses.replace(
-        result, attempt=dataclasses.replace(result.attempt, refined=None)
+        result, candidate=dataclasses.replace(result.candidate, refined=None)
     )
     with pytest.raises(InputError, match="no solved problem"):
         brachis.bottleneck.report(bare)
@@ -110,7 +110,7 @@ def test_another_limit_that_takes_over_within_the_step(slide):
     assert result.t_end == pytest.approx(free.t_end, rel=1e-6), (
         "the velocity limit does not hold it back yet"
     )
-    found = check_sensitivities(result.attempt.refined, step=0.05)
+    found = check_sensitivities(result.candidate.refined, step=0.05)
     (entry,) = [entry for entry in found.entries if entry.predicted]
     assert entry.predicted == pytest.approx(-0.025 * found.t_end, rel=1e-4)
     assert entry.deviation > 0.1, "the multipliers know nothing of the velocity limit"
@@ -122,14 +122,14 @@ def test_another_limit_that_takes_over_within_the_step(slide):
 def test_linearised_changes_promise_no_more_than_multipliers(scara, joint):
     for step, rel in ((0.01, 0.05), (1e-5, 1e-3)):
         for entry in check_sensitivities(
-            scara(joint).attempt.refined, step=step
+            scara(joint).candidate.refined, step=step
         ).entries:
             assert entry.predicted * (1.0 + 1e-4) <= entry.linearised <= 0.0
             assert entry.linearised == pytest.approx(entry.predicted, rel=rel, abs=1e-8)
 
 
 def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch):
-    refined = scara("j3").attempt.refined
+    refined = scara("j3").candidate.refined
     honest, valley = check._solve_again, 2e-3
 
     def wandering(program, x):
@@ -154,7 +154,7 @@ def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch
 
 
 def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monkeypatch):
-    refined = scara("j3").attempt.refined
+    refined = scara("j3").candidate.refined
 
     class Broken:
         name = "broken"

@@ -15,7 +15,7 @@ from .conftest import FORCE, LENGTH, MASS
 def test_the_slide_comes_to_bang_bang_itself(slide):
     result = slide(intervals=10, rest="full")
     best = 2.0 * np.sqrt(2.0 * MASS * LENGTH / FORCE)
-    reference = find_reference(result.attempt.refined, intervals=40)
+    reference = find_reference(result.candidate.refined, intervals=40)
     assert reference.degree == 2, (
         "parabolas alone can jump from full force forwards to full force back"
     )
@@ -30,7 +30,7 @@ def test_planar_line(scara):
     assert 2.32 < reference.t_end < 2.34
     assert reference.intervals == 100
     (motion,) = reference.refined.program.motions(reference.refined.x)
-    joint_map = scara("j3").attempt.refined.program.phases[0].joint_map
+    joint_map = scara("j3").candidate.refined.program.phases[0].joint_map
     t = np.sort(np.random.default_rng(3).uniform(0.0, motion.t_end, 4000))
     state = joint_map.state(*motion.at(t), t=t)
     torque = dynamics.torque(joint_map.robot, state.q, state.qdot, state.qddot)
@@ -46,7 +46,7 @@ def test_planar_line(scara):
 def test_nothing_faster_is_said(slide):
     # Parabolas on a mesh with a knot in the middle are at the optimum already.
     result = slide(degree=2, intervals=4)
-    reference = find_reference(result.attempt.refined, intervals=8)
+    reference = find_reference(result.candidate.refined, intervals=8)
     assert reference is None or reference.distance < 2e-4
 
 
@@ -62,7 +62,7 @@ def test_end_posture_is_kept(slide):
         robot={"limits": limits},
     )
     np.testing.assert_array_equal(
-        free.attempt.refined.program.phases[0].boundary.end, [1.0, np.nan]
+        free.candidate.refined.program.phases[0].boundary.end, [1.0, np.nan]
     )
     task = free.task.to_dict()
     task["end"] = {"joints": [0.1, LENGTH - 0.1]}

@@ -83,4 +83,4 @@ def test_a_motion_of_another_branch_is_refused(scara, tmp_path):
 def test_the_trajectory_of_a_plan_need_not_be_saved(scara):
     result = scara("j1")
     again = brachis.bottleneck.solved_again(result.trajectory)
-    np.testing.assert_allclose(again.x, result.attempt.refined.x, atol=1e-6)
+    np.testing.assert_allclose(again.x, result.candidate.refined.x, atol=1e-6)

@@ -23,7 +23,7 @@ CARRIED = 2.0 * MASS
 
 
 def found_of(result):
-    return sensitivities(result.attempt.refined)
+    return sensitivities(result.candidate.refined)
 
 
 @pytest.mark.parametrize("rest", ["full", "velocity"])
@@ -136,7 +136,7 @@ def test_control_points_near_zero_on_a_fine_mesh_do_not_press(scara):
     task = scara("j1").task.to_dict()
     task["spline"]["intervals"] = "auto"
     result = brachis.plan(scara("j1").trajectory.robot, task)
-    refined = result.attempt.refined
+    refined = result.candidate.refined
     program, x = refined.program, refined.reports[-1].x
     assert 0.0 < x[program.phases[0].slices[0]][0] < 1e-5, "else this tests nothing"
     found = sensitivities(refined)
@@ -152,7 +152,7 @@ def test_rows_that_nothing_can_change_do_not_press(slide, end):
     limits = {"torque": {"j1": 30.0}, "position": {"j1": [lower, upper]}}
     refined = slide(
         (X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}
-    ).attempt.refined
+    ).candidate.refined
     program, x = refined.program, refined.reports[-1].x
     active_set = ActiveSet.at(program, x, 1e-5)
     assert np.abs(active_set.slopes).max(axis=1).min() > 0.0
@@ -165,7 +165,7 @@ def test_rows_that_nothing_can_change_do_not_press(slide, end):
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
 def test_least_squares_agree_with_the_solver(scara, joint):
-    refined = scara(joint).attempt.refined
+    refined = scara(joint).candidate.refined
     program, report = refined.program, refined.reports[-1]
     own, fitted = (
         multipliers_of(program, report.x, report.multipliers),
@@ -191,7 +191,7 @@ def test_a_solver_without_multipliers(slide):
 
 
 def test_an_answer_that_is_no_optimum_is_told(scara):
-    refined = scara("j3").attempt.refined
+    refined = scara("j3").candidate.refined
     report = refined.reports[-1]
     x = report.x.copy()
     x[0] *= 1.02  # slower: no torque is at its limit any more
@@ -201,7 +201,7 @@ def test_an_answer_that_is_no_optimum_is_told(scara):
 
 
 def test_multipliers_of_wrong_sign_are_not_believed(scara):
-    refined = scara("j3").attempt.refined
+    refined = scara("j3").candidate.refined
     report = refined.reports[-1]
     wrong = multipliers_of(refined.program, report.x, -report.multipliers)
     assert wrong.source == "least squares"
@@ -223,7 +223,7 @@ def test_two_rows_that_hold_alike_give_way_together_only():
 
 
 def test_branch_boundary_is_told_apart(scara):
-    refined = scara("j3").attempt.refined
+    refined = scara("j3").candidate.refined
     program, report = refined.program, refined.reports[-1]
     tight = program.with_margin(0.2)
     answer = solver_named("uno")[0].solve(tight, report.x, SolverOptions(), None)

@@ -200,8 +200,8 @@ def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
 
     def lengthened(*arguments, time_scaled, **options):
         result = honest(*arguments, **options)
-        refined = replace(result.attempt.refined, time_scaled=time_scaled)
-        return replace(result, attempt=replace(result.attempt, refined=refined))
+        refined = replace(result.candidate.refined, time_scaled=time_scaled)
+        return replace(result, candidate=replace(result.candidate, refined=refined))
 
     for time_scaled, expected in ((1.0, False), (1.00004, True)):
         monkeypatch.setattr(

@@ -232,7 +232,7 @@ def test_error_as_json(run, task, write, tmp_path, monkeypatch):
 
 
 def test_fault_of_our_own_is_not_a_traceback(run, task, write, monkeypatch):
-    monkeypatch.setattr("brachis.planner.find_fastest", lambda *_args, **_kwargs: 1 / 0)
+    monkeypatch.setattr("brachis.planner.Search", lambda *_args, **_kwargs: 1 / 0)
     outcome = run("plan", write(task))
     assert outcome.code == 1
     assert "internal error: ZeroDivisionError" in outcome.err

@@ -294,7 +294,7 @@ def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):
     assert result.verified, result.verification
     assert result.t_end > free.t_end * 1.001
     assert 0.999 < peaks(result.trajectory)["rms_torque"][0] / figures[0] < 1.0 + 1e-4
-    residual = brachis.apps.bottleneck.sensitivities(result.attempt.refined).residual
+    residual = brachis.apps.bottleneck.sensitivities(result.candidate.refined).residual
     assert residual < 1e-4, (
         "the gradient is balanced, flat though the end time is around the optimum"
     )

@@ -288,7 +288,7 @@ def test_many_intervals_are_planned_from_few():
     assert result.verified
     assert result.t_end == pytest.approx(2.1421, abs=5e-4)
     assert len(np.unique(result.trajectory.knots)) == 101
-    reports = result.attempt.reports
+    reports = result.candidate.reports
     assert len(reports[0].x) < 0.4 * len(reports[-1].x)
 
 

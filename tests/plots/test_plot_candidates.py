@@ -12,8 +12,8 @@ from brachis.optimise.candidate import Candidate
 from brachis.search.record import SAME_MOTION
 
 
-def attempt(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):
-    """An attempt with times of its own."""
+def candidate(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):
+    """A candidate with times of its own."""
 
     class Made(Candidate):
         pass
@@ -35,8 +35,8 @@ def drawn(candidates):
 @pytest.mark.parametrize("t_end", [2.002, 1.9])
 def test_no_first_plan_is_left_of_the_fastest_for_its_few_collocation_points(t_end):
     """Refining the fastest made its time longer, or a finer mesh shorter: so it would with the others."""
-    fastest = attempt("j1", 2.0, t_end, verified=True)
-    marks, _ = drawn([fastest, attempt("j2", 2.0005), attempt("j3", 2.5)])
+    fastest = candidate("j1", 2.0, t_end, verified=True)
+    marks, _ = drawn([fastest, candidate("j2", 2.0005), candidate("j3", 2.5)])
     (star,) = marks["the fastest"]
     assert star == t_end
     (planned,) = (
@@ -47,16 +47,16 @@ def test_no_first_plan_is_left_of_the_fastest_for_its_few_collocation_points(t_e
 
 
 def test_one_motion_is_drawn_once():
-    fastest = attempt("j1", 2.0, 2.002, verified=True)
-    marks, rows = drawn([fastest, attempt("j2", 1.9999, status=SAME_MOTION)])
+    fastest = candidate("j1", 2.0, 2.002, verified=True)
+    marks, rows = drawn([fastest, candidate("j2", 1.9999, status=SAME_MOTION)])
     assert marks == {"the fastest": [2.002]}
     assert rows == ["j1: elbow_up"]
 
 
 def test_refined_times_are_drawn_as_they_are():
-    fastest = attempt("j1", 2.0, 2.002, verified=True)
+    fastest = candidate("j1", 2.0, 2.002, verified=True)
     marks, _ = drawn(
-        [fastest, attempt("j2", 2.3, 2.4, verified=True), attempt("j3", 2.1, 2.2)]
+        [fastest, candidate("j2", 2.3, 2.4, verified=True), candidate("j3", 2.1, 2.2)]
     )
     assert marks["refined and verified"] == [2.4]
     (failed,) = (
@@ -66,7 +66,7 @@ def test_refined_times_are_drawn_as_they_are():
 
 
 def test_without_a_motion_nothing_is_scaled():
-    marks, _ = drawn([attempt("j1", 2.0), attempt("j2", math.inf)])
+    marks, _ = drawn([candidate("j1", 2.0), candidate("j2", math.inf)])
     (planned,) = (
         times for label, times in marks.items() if label.startswith("planned")
     )

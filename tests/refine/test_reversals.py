@@ -85,5 +85,5 @@ def test_plans_under_narrow_friction_are_verified_by_refinement_alone(
     task["search"] = {"effort": "single"}
     result = brachis.plan(task)
     assert result.verified
-    assert result.attempt.refinement_rounds >= 2
-    assert result.verification.worst_ratio - 1.0 <= result.attempt.violation + 1e-5
+    assert result.candidate.refinement_rounds >= 2
+    assert result.verification.worst_ratio - 1.0 <= result.candidate.violation + 1e-5

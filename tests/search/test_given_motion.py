@@ -6,7 +6,7 @@ import pytest
 
 import brachis
 from brachis import Line
-from brachis.search import GIVEN
+from brachis.search.given_motion import GIVEN
 from brachis.task import task_with
 
 TASK = task_with(
@@ -44,7 +44,7 @@ def test_a_known_motion_takes_the_place_of_the_search(known, name):
     )
     assert result.verified
     assert result.not_completed == ()
-    assert [attempt.origin for attempt in result.candidates] == [GIVEN]
+    assert [candidate.origin for candidate in result.candidates] == [GIVEN]
     assert not any("lattice" in text for text in told), "nothing was searched for"
     if not CHANGES[name]:
         assert result.t_end <= 1.0005 * known.t_end
@@ -53,7 +53,7 @@ def test_a_known_motion_takes_the_place_of_the_search(known, name):
 def test_saved_motions_will_do(known, tmp_path):
     known.save(tmp_path / "result.npz")
     for motion in (known.trajectory, tmp_path / "result.npz"):
-        assert brachis.plan(TASK, start_from=motion).attempt.origin == GIVEN
+        assert brachis.plan(TASK, start_from=motion).candidate.origin == GIVEN
 
 
 @pytest.mark.parametrize("space", ["pose_with_yaw", "joints"])
@@ -68,7 +68,7 @@ def test_of_other_task_spaces(space):
         line = {"task_space": ["x", "y", "yaw"], "path": Line(by=[0.0, 0.3, 0.1])}
     first = brachis.plan(TASK, **line)
     again = brachis.plan(TASK, **line, limits={"torque": 12.0}, start_from=first)
-    assert again.attempt.origin == GIVEN
+    assert again.candidate.origin == GIVEN
     assert again.verified
     assert again.t_end < first.t_end
 

@@ -16,7 +16,7 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
-from brachis.search.failure import no_motion
+from brachis.search.failure import explain_no_motion
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import lattice_starts
@@ -210,9 +210,10 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     }
     given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
     dead_ends = {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})}
-    reason = no_motion(
+    failure = explain_no_motion(
         given, decompositions_of(given), [], dead_ends, Deadline.after(10.0)
     )
+    reason = failure.error()
     assert isinstance(reason, PathError)
     assert "EAIK is not installed" in str(reason)
     assert "[panda_joint5], [panda_joint6]" in str(reason)

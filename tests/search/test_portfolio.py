@@ -21,9 +21,9 @@ from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search import candidates, chart_starts, record, schedule, starts
+from brachis.search import candidates, portfolio, schedule, starts
 from brachis.search.closed_form_lattice import ClosedFormLattice
-from brachis.search.failure import reason_out_of_reach
+from brachis.search.failure import explain_reach
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.posture_lattice import PostureLattice
@@ -229,7 +229,7 @@ class NoPosture:
 def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(
     robot, monkeypatch
 ):
-    monkeypatch.setattr(chart_starts, "PostureLattice", NoPosture)
+    monkeypatch.setattr(starts, "PostureLattice", NoPosture)
     result = brachis.plan(robot, task())
     assert result.verified
     assert {candidate.redundant_joints for candidate in result.candidates} == {
@@ -253,7 +253,7 @@ def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
     robot, monkeypatch, asked, lattices
 ):
     monkeypatch.setattr(starts, "ClosedFormLattice", NoPosture)
-    monkeypatch.setattr(chart_starts, "PostureLattice", NoPosture)
+    monkeypatch.setattr(starts, "PostureLattice", NoPosture)
     result = brachis.plan(robot, task(**asked))
     assert result.verified
     assert result.candidates[0].origin.startswith("numeric")
@@ -440,11 +440,8 @@ def test_the_search_for_a_reason_ends_with_the_time(robot):
         robot, load_task(task(path=[{"line": {"length": 3.0, "angle_deg": 0}}]))
     )
     decomposition = decompositions_of(problem, ())[0]
-    joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
-    assert "s = 0" in str(reason_out_of_reach(joint_map, problem.limits))
-    assert "raise search.time_limit" in reason_out_of_reach(
-        joint_map, problem.limits, deadline=Deadline(0.0)
-    )
+    assert "s = 0" in str(explain_reach(decomposition))
+    assert "raise search.time_limit" in explain_reach(decomposition, Deadline(0.0))
 
 
 def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(
@@ -560,7 +557,7 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monke
     monkeypatch.setitem(
         SEARCH_LEVELS, "fast", (dataclasses.replace(fast, refined=100),)
     )
-    monkeypatch.setattr(record, "_WORTH_IT", -100.0)
+    monkeypatch.setattr(portfolio, "WORTH_IT", -100.0)
     every = brachis.plan(robot, task())
     finished = [
         candidate for candidate in every.candidates if math.isfinite(candidate.t_end)

@@ -10,11 +10,11 @@ import pytest
 import brachis
 from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, Remedy
-from brachis.search import try_remedies
+from brachis.robot.from_task import robot_for
+from brachis.search import remedies as module
 
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 IIWA = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
-JOINTS = ("j1", "j2", "j3")
 
 
 @pytest.fixture
@@ -35,8 +35,18 @@ def task():
 
 
 def hint(task, remedies, is_planned, *, seconds=60.0) -> str:
+    """Return the hint where `is_planned` says of a changed task, a deadline and a number of batches what is planned."""
     error = PlanningError("no motion", hint="Try another path").with_remedies(*remedies)
-    try_remedies(error, task, JOINTS, is_planned, Deadline.after(seconds))
+    robot = robot_for(None, task.robot)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            module,
+            "is_planned",
+            lambda _robot, changed, _families, _limits, *rest: is_planned(
+                changed, *rest
+            ),
+        )
+        module.try_remedies(error, robot, task, [], [], Deadline.after(seconds))
     assert str(error).endswith(error.hint)
     return error.hint
 
@@ -138,7 +148,9 @@ def test_a_payload_that_the_arm_can_hold_is_advised(monkeypatch):
 @pytest.mark.parametrize("way", ["plan", "plan_many", "sweep"])
 def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
     trials = []
-    monkeypatch.setattr("brachis.planner.is_planned", lambda *_: bool(trials.append(1)))
+    monkeypatch.setattr(
+        "brachis.search.remedies.is_planned", lambda *_: bool(trials.append(1))
+    )
     task = {
         "brachis": 1,
         "robot": {

@@ -12,8 +12,8 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import screening
-from brachis.search.chart_starts import chart_starts
 from brachis.search.levels import SEARCH_LEVELS
+from brachis.search.starts import chart_starts
 from brachis.task import load_task
 
 MOST = 2
@@ -50,7 +50,7 @@ def starts():
 
 
 def test_the_fastest_that_differ_are_kept(starts):
-    kept = screening.screened(starts, MOST, NEVER, quiet)
+    kept = screening.screen(starts, MOST, NEVER, quiet)
     assert 1 <= len(kept) <= MOST
     estimates = [start.estimate for start in kept]
     assert estimates == sorted(estimates)
@@ -62,18 +62,18 @@ def test_the_fastest_that_differ_are_kept(starts):
 
 
 def test_few_starts_are_not_looked_at(starts):
-    assert screening.screened(starts[:MOST], MOST, NEVER, quiet) == starts[:MOST]
+    assert screening.screen(starts[:MOST], MOST, NEVER, quiet) == starts[:MOST]
 
 
 def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatch):
-    late = screening.screened(starts, MOST, Deadline(0.0), quiet)
+    late = screening.screen(starts, MOST, Deadline(0.0), quiet)
     assert [start.origin for start in late] == [start.origin for start in starts[:MOST]]
 
     def missing(*_arguments: object) -> None:
         raise ImportError("unopy")
 
     monkeypatch.setattr(screening, "solve_in_chart", missing)
-    without = screening.screened(starts, MOST, NEVER, quiet)
+    without = screening.screen(starts, MOST, NEVER, quiet)
     assert [start.origin for start in without] == [
         start.origin for start in starts[:MOST]
     ]
@@ -89,7 +89,7 @@ def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeyp
         raise ImportError("unopy")
 
     monkeypatch.setattr(screening, "solve_in_chart", once)
-    first, *others = screening.screened(starts, MOST, NEVER, quiet)
+    first, *others = screening.screen(starts, MOST, NEVER, quiet)
     assert first.origin == starts[0].origin
     assert others == [], "what was not solved is slower for all that is known"
 
@@ -115,8 +115,8 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
             start, estimate=[1.5, 1.0, np.inf, 1.001, 1.002, 1.0][len(looked_at) - 1]
         )
 
-    monkeypatch.setattr(screening, "_quickly", quickly)
+    monkeypatch.setattr(screening, "_solve_quickly", quickly)
     monkeypatch.setattr(screening, "_same", lambda *_starts: False)
-    kept = screening.screened(starts, MOST, NEVER, quiet)
+    kept = screening.screen(starts, MOST, NEVER, quiet)
     assert len(looked_at) == 6
     assert [start.estimate for start in kept] == [1.0, 1.0]

@@ -90,10 +90,10 @@ def test_no_number_is_advised_where_the_time_is_up(monkeypatch):
 def test_a_number_that_was_not_verified_is_not_advised(monkeypatch):
     """Only half of what the phase plane allows leads to a plan here."""
 
-    def is_planned(problem, *_):
-        return problem.task.tool_limits.process_speed[0].speed < 0.16
+    def is_planned(_robot, task, *_):
+        return task.tool_limits.process_speed[0].speed < 0.16
 
-    monkeypatch.setattr("brachis.planner.is_planned", is_planned)
+    monkeypatch.setattr("brachis.search.remedies.is_planned", is_planned)
     with pytest.raises(brachis.PlanningError) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
     assert 0.15 < advised(caught.value, "tool_limits.process_speed[0].speed") < 0.16
@@ -167,7 +167,7 @@ def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is
     monkeypatch,
 ):
     monkeypatch.setattr(
-        "brachis.search.screening.screened", lambda *_: pytest.fail("a plan was tried")
+        "brachis.search.starts.screen", lambda *_: pytest.fail("a plan was tried")
     )
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     content = {

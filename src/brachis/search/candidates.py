@@ -1,4 +1,4 @@
-"""What is done with a start: it is solved, and, where it is worth it, refined and verified.
+"""What is done with an initial guess: it is solved, and, if it is worth it, refined and verified.
 
 1. `solve_candidate` solves from a joint path at the first collocation points.
 2. `finish_candidate` adapts the mesh, refines and verifies.
@@ -32,123 +32,112 @@ from brachis.search.solving import (
     solve_without_third_order_limits,
 )
 
-_MANY_VARIABLES = 150
-"""Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
-_KNOT_TIME = 0.4
-"""Part of the remaining time that may go into the knots."""
-
 
 def solve_candidate(
     start: InitialGuess, deadline: Deadline, listener: Listener
 ) -> Candidate:
-    """Solve from a start, at the first collocation points.
+    """Solve from a guess, at the first collocation points.
 
     Parameters
     ----------
-    start : Start
+    start : InitialGuess
     deadline : Deadline
     listener : callable
 
     Returns
     -------
-    Attempt
+    Candidate
     """
     problem = start.problem
     target = program_of(problem, start.joint_map, initial_knots(start))
-    program = coarsest(target) if target.variables > _MANY_VARIABLES else target
+    # With more variables a cold solve takes seconds: it is first solved over some of its knots.
+    program = coarsest(target) if target.variables > 150 else target
     x = initial_guess(program, start)
     if x is None:
         return Candidate.of(
             start, "the splines through the joint path leave the branch, or the chart"
         )
-    session = _session(start, deadline, listener)
+    session = _open_session(start, deadline, listener)
     try:
         x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
-        if start.in_chart and not start.timed:
-            program, reports = solve_in_chart(problem, program, x, session)
-            joint_map = program.phases[0].joint_map
+        if _is_free_chart(start):
+            solved = solve_in_chart(problem, program, x, session)
+            joint_map = solved.program.phases[0].joint_map
             target = target.with_phases(
                 phase_in(problem, joint_map, phase.grid) for phase in target.phases
             )
         else:
-            program, reports = solve_by_margin_continuation(
-                program, x, session, MARGINS
-            )
+            solved = solve_by_margin_continuation(program, x, session, MARGINS)
     except ImportError as error:
         return Candidate.of(start, f"{start.solver}: not installed ({error})")
-    last = reports[-1]
-    reports = (*before, *reports)
-    coarse = last.objective if last.status.usable else np.inf
+    status = solved.report.status
+    words = status.name.lower().replace("_", " ")
+    if status is SolveStatus.OPTIMAL:
+        words = "planned"
+    elif status.usable:
+        words = f"planned, {words}"
     return Candidate.of(
         start,
-        _in_words(last.status),
-        program=program,
+        words,
+        program=solved.program,
         target=target,
-        reports=reports,
-        coarse=coarse,
+        reports=(*before, *solved.reports),
+        coarse=solved.report.objective if status.usable else np.inf,
     )
 
 
 def finish_candidate(
-    attempt: Candidate, deadline: Deadline, listener: Listener
+    candidate: Candidate, deadline: Deadline, listener: Listener
 ) -> Candidate:
-    """Adapt the mesh, refine and verify; only verify where the time is up.
+    """Adapt the mesh, refine and verify; only verify if the time is up.
 
     Parameters
     ----------
-    attempt : Attempt
+    candidate : Candidate
         A usable one.
     deadline : Deadline
     listener : callable
 
     Returns
     -------
-    Attempt
+    Candidate
     """
-    start = attempt.start
-    program = attempt.program
+    start = candidate.start
+    program = candidate.program
     assert start is not None and program is not None
     task = start.problem.task
     settings = task.refinement
-    soon = deadline.part(_KNOT_TIME)
+    # Of the time that is left, the knots may take this part.
+    soon = deadline.part(0.4)
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
-    session = _session(start, soon, listener)
-    reports = attempt.reports
-    target = attempt.target
-    if (
-        attempt.keeps_knots
-        and start.in_chart
-        and not start.timed
-        and not deadline.passed
-    ):
-        program, further = best_of_joints(start.problem, program, reports[-1], session)
-        reports = (*reports[:-1], *further)
-        target = program
-    solved = SolvedProgram(program, reports)
+    session = _open_session(start, soon, listener)
+    target = candidate.target
+    solved = SolvedProgram(program, candidate.reports)
+    if candidate.keeps_knots and _is_free_chart(start) and not deadline.passed:
+        solved = best_of_joints(start.problem, solved, session)
+        target = solved.program
     adapted = adapt_mesh(solved, session, task.spline, options, target=target)
-    attempt = dataclasses.replace(attempt, not_completed=adapted.not_completed)
+    candidate = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     options = dataclasses.replace(options, deadline=deadline)
     session = dataclasses.replace(session, deadline=deadline)
     return refine_and_verify(
-        attempt, adapted.program, adapted.reports, session, options
+        candidate, adapted.program, adapted.reports, session, options
     )
 
 
-def _session(
+def _is_free_chart(start: InitialGuess) -> bool:
+    """Tell whether the chart may still be changed: that around a motion is kept."""
+    return start.in_chart and not start.timed
+
+
+def _open_session(
     start: InitialGuess, deadline: Deadline, listener: Listener
 ) -> SolverSession:
-    """Open a session of the start's solver under the task's bounds."""
+    """Open a session of the guess's solver under the task's bounds."""
     (backend,) = solver_named(start.solver)
     settings = start.problem.task.solver
     return SolverSession.for_task(
         backend, settings, start.joint_map, deadline, listener
     )
-
-
-def _in_words(status: SolveStatus) -> str:
-    name = status.name.lower().replace("_", " ")
-    if not status.usable:
-        return name
-    return "planned" if status is SolveStatus.OPTIMAL else f"planned, {name}"

@@ -1,12 +1,13 @@
-"""Why no motion was found.
+"""Why there is no plan: the `Failure` that every explanation makes, and explanations of paths that cannot be followed.
 
-What of a path a decomposition reaches, by random postures: out of reach, joint ranges, branches, static torques.
+What a decomposition reaches of a path is found by random postures at stations along it: is a station out of reach,
+beyond the joint ranges, on another branch, or too heavy to hold?
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,203 +22,203 @@ from brachis.problem.feasibility import in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
 from brachis.robot.joints import in_turn_of
-from brachis.search.joint_path import ALL_POSTURES, DeadEnd
+from brachis.search.joint_path import ALL_POSTURES, DeadEnd, sampling_box
 from brachis.task import SolverSettings, Task
 
-_RANGE_SLACK = 1e-9
-_SEARCHED = 400
 _STATIONS = 101
-_TOGETHER = 20_000
-"""Postures that are looked for at once; the time is asked for in between."""
-_HELD_CHECKS = 60
-_FAR = 10.0  # m
 _NO_TIME = "There was no time to find out why: raise search.time_limit"
 
 
-def reason_out_of_reach(
-    joint_map: ClosedFormMap,
-    limits: Sequence[Limit],
-    *,
-    any_branch: bool = False,
-    given: str = "start",
-    deadline: Deadline = NEVER,
-) -> BrachisError | str:
-    """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no plan.
 
-    Redundant joints are searched at random at stations along the path, so "out of reach" means that none of many
-    postures reaches the target.
+    Attributes
+    ----------
+    cause : str
+        What is wrong, in words.
+    phase : {"path", "motion"}
+        Whether the path itself cannot be followed (`PathError`), or no motion along it was found (`PlanningError`).
+    s_interval : tuple of float or None
+        Where on the path.
+    where, found, needed : str or None
+        Key of the task, or name of the limit; what was found there, and what would be accepted.
+    hint : str
+        What to try.
+    remedies : tuple of Remedy
+        Numbers of the task to change.
+    share : float
+        How much of what is asked for is possible, where that is known.
+    """
+
+    cause: str
+    phase: str = "motion"
+    s_interval: tuple[float, float] | None = None
+    where: str | None = None
+    found: str | None = None
+    needed: str | None = None
+    hint: str = ""
+    remedies: tuple[Remedy, ...] = ()
+    share: float = 1.0
+
+    def error(self) -> BrachisError:
+        """Make the error that says so."""
+        facts = {
+            "where": self.where,
+            "found": self.found,
+            "allowed": self.needed,
+            "hint": self.hint,
+        }
+        error = (
+            PathError(self.cause, s_interval=self.s_interval, **facts)
+            if self.phase == "path"
+            else PlanningError(self.cause, **facts)
+        )
+        return error.with_remedies(*self.remedies)
+
+
+def explain_reach(
+    decomposition: Decomposition, deadline: Deadline = NEVER
+) -> Failure | str:
+    """Tell why a decomposition has no joint path.
 
     Parameters
     ----------
-    joint_map : ClosedFormMap
-    limits : sequence of Limit
-    any_branch : bool, optional
-        Whether a motion may be on any branch, not the decomposition's alone.
-    given : {"start", "end"}, optional
-        Whose posture the decomposition's branch is of.
+    decomposition : Decomposition
     deadline : Deadline, optional
         When the search for the reason ends; the advice then says so.
 
     Returns
     -------
-    BrachisError or str
+    Failure or str
+        Advice where every station is within reach.
     """
+    problem = decomposition.problem
+    given = "end" if problem.start is None else "start"
+    posture = problem.end if problem.start is None else problem.start
+    joint_map = decomposition.joint_map(
+        np.zeros(problem.robot.n) if posture is None else posture,
+        decomposition.branches[0],
+    )
     s = np.linspace(0.0, 1.0, _STATIONS)
-    found = _answers_along(joint_map, s, deadline, opened=False)
+    found = _sample_postures(joint_map, s, deadline)
     if found is None:
         return _NO_TIME
-    branches = (
-        slice(None) if any_branch else slice(joint_map.branch, joint_map.branch + 1)
-    )
-    own = _Answers(
-        *(part[:, :, branches] for part in (found.q, found.exists, found.inside))
-    )
-    # Where the redundant joints' ranges leave no answer, wider ones tell whether the ranges or the arm are to blame.
-    reached = found.exists.any(axis=(1, 2, 3)).all()
-    anywhere = found if reached else _answers_along(joint_map, s, deadline, opened=True)
-    if anywhere is None:
-        return _NO_TIME
-    within = np.asarray(found.within.any(axis=(1, 2, 3)))
-    label = joint_map.branch_label
-    reasons = (
-        (
-            found.exists.any(axis=(1, 2, 3)) | anywhere.exists.any(axis=(1, 2, 3)),
+    anywhere = found
+    if not _has_any(_exist(found)).all():
+        # Wider ranges tell whether the ranges of the redundant joints or the arm are to blame.
+        wider = _sample_postures(joint_map, s, deadline, opened=True)
+        if wider is None:
+            return _NO_TIME
+        anywhere = np.concatenate([found, wider], axis=1)
+    own = found if posture is None else found[:, :, joint_map.branch][:, :, None]
+
+    def list_reasons() -> Iterator[tuple[np.ndarray, str, str, list[Remedy]]]:
+        yield (
+            _has_any(_exist(anywhere)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
             "Shorten or move the path, or choose another start posture",
             [],
-        ),
-        (
+        )
+        within = _has_any(_are_within(problem.robot, found))
+        yield (
             within,
             "no posture within the joint ranges was found from s = {first:.3g} on"
-            + _beyond(joint_map, within, found, anywhere),
+            + _describe_nearest(problem.robot, anywhere[np.argmin(within)]),
             "Shorten or move the path, or widen the joint ranges",
             [],
-        ),
-        (
-            own.within.any(axis=(1, 2, 3)),
-            f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
+        )
+        yield (
+            _has_any(_are_within(problem.robot, own)),
+            f"the branch {joint_map.branch_label!r} of the {given} posture does not reach s = {{first:.3g}}",
             f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
             [],
-        ),
-        *(
-            (
-                allowed,
-                f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}",
-                "Lead the path elsewhere",
-                remedies,
-            )
-            for limit in limits
-            if limit.at_rest == "posture"
-            for allowed, nearest, remedies in [_allowed(joint_map.robot, limit, own)]
-        ),
-    )
-    for possible, problem, hint, remedies in reasons:
+        )
+        for limit in problem.limits:
+            if limit.at_rest == "posture":
+                allowed, nearest, remedies = _check_at_rest(problem.robot, limit, own)
+                cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
+                yield allowed, cause, "Lead the path elsewhere", remedies
+
+    for possible, cause, hint, remedies in list_reasons():
         if not possible.all():
-            first = float(s[int(np.argmin(possible))])
-            last = float(s[np.flatnonzero(~possible)[-1]])
-            error = PathError(
-                problem.format(first=first), s_interval=(first, last), hint=hint
+            first, last = s[np.flatnonzero(~possible)[[0, -1]]]
+            return Failure(
+                cause.format(first=first),
+                phase="path",
+                s_interval=(float(first), float(last)),
+                hint=hint,
+                remedies=tuple(remedies),
             )
-            return error.with_remedies(*remedies)
-    others = f"try {'other redundant joints, ' if joint_map.r else ''}another {given} posture"
-    return f"Every point of the path is within reach of this branch, but no joint path through them was found; {others}"
+    others = "other redundant joints, " if joint_map.r else ""
+    return (
+        "Every point of the path is within reach of this branch, but no joint path through them was found; "
+        f"try {others}another {given} posture"
+    )
 
 
-@dataclass(frozen=True)
-class _Answers:
-    """Closed-form postures at S stations for T random choices of the redundant joints, B branches and A alternatives.
-
-    Attributes
-    ----------
-    q : (S, T, B, A, n) ndarray
-    exists : (S, T, B, A) bool ndarray
-    inside : (S, T, B, A, n) bool ndarray
-        Which joints are within their ranges.
-    """
-
-    q: np.ndarray
-    exists: np.ndarray
-    inside: np.ndarray
-
-    @property
-    def within(self) -> np.ndarray:
-        """Which postures exist within all joint ranges, (S, T, B, A)."""
-        return np.asarray(self.exists & self.inside.all(axis=4))
+def _exist(q: np.ndarray) -> np.ndarray:
+    """Tell which postures, (..., n), exist, (...,) bool; the others are NaN."""
+    return np.asarray(np.isfinite(q).all(axis=-1))
 
 
-def _answers_along(
-    joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool
-) -> _Answers | None:
-    """Postures that reach stations s, (S,), with random redundant joints, angles turned into their ranges.
+def _are_within(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Tell which postures, (..., n), are within the joint ranges, (...,) bool."""
+    return np.asarray(_exist(q) & (_excess(robot, q) <= 1e-9).all(axis=-1))
 
-    None where the time is up.
 
-    `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
+def _excess(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """How far joints are beyond their ranges, (..., n), rad or m; negative within."""
+    limits = robot.limits
+    return np.maximum(limits.position_lower - q, q - limits.position_upper)
+
+
+def _has_any(those: np.ndarray) -> np.ndarray:
+    """Tell at which stations there is a posture, (S,), for random joints, branches and alternatives, (S, T, B, A)."""
+    return np.asarray(those.any(axis=(1, 2, 3)))
+
+
+def _sample_postures(
+    joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool = False
+) -> np.ndarray | None:
+    """Draw T random redundant joints: postures (S, T, B, A, n) that reach stations s, (S,), on all branches.
+
+    Angles are turned into their ranges, and what does not exist is NaN; None where the time is up. `opened` ignores the
+    ranges of the redundant joints; otherwise the start posture's are tried as well.
     """
     robot = joint_map.robot
     redundant = joint_map.redundant
-    rest = joint_map.nonredundant
-    lower = robot.limits.position_lower
-    upper = robot.limits.position_upper
-    turning = robot.revolute
-    wide = np.isin(np.arange(robot.n), redundant) & opened
-    near = np.clip(joint_map.start, lower, upper)
-    low = np.where(turning, -np.pi, near - _FAR)
-    high = np.where(turning, np.pi, near + _FAR)
-    low = np.where(
-        np.isfinite(lower) & ~wide,
-        np.where(turning, lower, np.maximum(lower, low)),
-        low,
-    )
-    high = np.where(
-        np.isfinite(upper) & ~wide,
-        np.where(turning, upper, np.minimum(upper, high)),
-        high,
-    )
-    tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
+    low, high = sampling_box(robot, joint_map.start, opened=redundant if opened else [])
+    tries = 400 * len(redundant) ** 2 if redundant else 1
     q_r = np.random.default_rng(0).uniform(
         low[redundant], high[redundant], (tries, len(redundant))
     )
     if not opened:
         q_r[0] = np.clip(joint_map.start, low, high)[redundant]
+    targets = joint_map.path.sample(s).target
     parts = []
-    for targets in np.array_split(
-        joint_map.path.sample(s).target, min(len(s), -(-len(s) * tries // _TOGETHER))
-    ):
+    # No more than 20,000 postures at once, so that the deadline is noticed.
+    for those in np.array_split(targets, min(len(s), -(-len(s) * tries // 20_000))):
         if deadline.passed:
             return None
         answers = joint_map.solver.solve(
-            np.repeat(targets, tries, axis=0), np.tile(q_r, (len(targets), 1))
+            np.repeat(those, tries, axis=0), np.tile(q_r, (len(those), 1))
         )
-        answers = answers.reshape(len(targets), tries, *answers.shape[1:])
+        answers = answers.reshape(len(those), tries, *answers.shape[1:])
         postures = np.empty((*answers.shape[:-1], robot.n))
         postures[..., redundant] = q_r[:, None, None]
-        postures[..., rest] = answers
-        parts.append(in_turn_of(postures, 0.5 * (low + high), turning))
-    turned = np.concatenate(parts)
-    inside = (turned >= lower - _RANGE_SLACK) & (turned <= upper + _RANGE_SLACK)
-    return _Answers(turned, np.asarray(np.isfinite(turned).all(axis=4)), inside)
+        postures[..., joint_map.nonredundant] = answers
+        parts.append(in_turn_of(postures, 0.5 * (low + high), robot.revolute))
+    return np.concatenate(parts)
 
 
-def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> str:
-    """Say in words which joint the posture that is nearest to the ranges has beyond its own, and by how much.
-
-    At the first station without a posture within them, `within` is (S,) bool.
-    """
-    robot = joint_map.robot
-    if within.all():
-        return ""
-    station = int(np.argmin(within))
-    q = np.concatenate(
-        [answers.q[station][answers.exists[station]] for answers in found]
-    )
+def _describe_nearest(robot: Robot, q: np.ndarray) -> str:
+    """Say which joint the posture nearest to the ranges, of (T, B, A, n), has beyond its own, and by how much."""
+    q = q[_exist(q)]
     if not len(q):
         return ""
-    beyond = np.maximum(
-        np.maximum(robot.limits.position_lower - q, q - robot.limits.position_upper),
-        0.0,
-    )
-    nearest = beyond[np.argmin(beyond.max(axis=1))]
+    excess = np.maximum(_excess(robot, q), 0.0)
+    nearest = excess[np.argmin(excess.max(axis=1))]
     joint = int(np.argmax(nearest))
     unit = robot.position_units[joint]
     low = robot.limits.position_lower[joint]
@@ -228,27 +229,27 @@ def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> s
     )
 
 
-def _allowed(
-    robot: Robot, limit: Limit, found: _Answers
+def _check_at_rest(
+    robot: Robot, limit: Limit, q: np.ndarray
 ) -> tuple[np.ndarray, str, list[Remedy]]:
-    """Tell at which stations a limit allows some posture at rest, (S,) bool; in words what is lacking, and what to do.
+    """Tell at which stations a limit allows some posture of (S, T, B, A, n) at rest, (S,) bool.
 
-    What is lacking is told of the station whose best posture is farthest beyond the limit.
+    Also say what is lacking at the station whose best posture is farthest beyond the limit, and what to change.
     """
-    allowed = np.zeros(len(found.q), dtype=bool)
+    allowed = np.zeros(len(q), dtype=bool)
     worst = 0.0
     lack = ""
     remedies: list[Remedy] = []
-    for station, (postures, exist) in enumerate(
-        zip(found.q, found.within, strict=True)
-    ):
-        values = limit.values(Moments.at_rest(postures[exist][:_HELD_CHECKS]))
+    for station, postures in enumerate(q):
+        # A few dozen postures tell enough.
+        within = postures[_are_within(robot, postures)][:60]
+        values = limit.values(Moments.at_rest(within))
         beyond = limit.violation(values)
         if not len(beyond):
             continue
         best = int(np.argmin(beyond.max(axis=1)))
         column = int(np.argmax(beyond[best]))
-        allowed[station] = bool(beyond[best, column] <= 0.0)
+        allowed[station] = beyond[best, column] <= 0.0
         if beyond[best, column] > worst:
             worst = float(beyond[best, column])
             label = limit.labels[column]
@@ -258,183 +259,133 @@ def _allowed(
     return allowed, lack, remedies
 
 
-_GOOD_PART = 0.1
-_LOOKED_AT = 2
-_MOST_EFFORT = "exhaustive"
-_SLOWER = 0.7
-"""Part of a speed at an end that is tried first."""
-
-
-def refuse_what_is_out_of_reach(
+def explain_first_failures(
     decompositions: Sequence[Decomposition],
     candidates: Sequence[Candidate],
     deadline: Deadline,
-) -> None:
-    """Raise the reason where the path is out of reach, so that further attempts would be in vain.
+) -> Failure | None:
+    """Tell whether the path is out of reach, so that further candidates would be in vain.
 
-    Where no lattice has a joint path, any part of it counts; where no lattice was looked at, a good part.
+    Where no lattice has a joint path, any part of the path counts; where no lattice was looked at, a tenth of it.
 
     Parameters
     ----------
     decompositions : sequence of Decomposition
-    candidates : sequence of Attempt
+    candidates : sequence of Candidate
         So far.
     deadline : Deadline
-        Nothing is refused for a reason that is not found by then.
-
-    Raises
-    ------
-    PathError
+        A reason that is not found by then is not given.
     """
-    if not decompositions or _some_joint_path(candidates):
-        return
-    reasons = [
-        _reason(decomposition, deadline)
-        for decomposition in decompositions[:_LOOKED_AT]
-    ]
-    clear = [
-        (reason.s_interval, reason)
-        for reason in reasons
-        if isinstance(reason, PathError) and reason.s_interval is not None
-    ]
-    if len(clear) < len(reasons):
-        return
-    if _lattices(candidates) or all(
-        end - begin > _GOOD_PART for (begin, end), _ in clear
-    ):
-        raise max(clear, key=lambda item: item[0][0])[1]
+    if not decompositions or _has_joint_path(candidates):
+        return None
+    failures = []
+    for decomposition in decompositions[:2]:
+        reason = explain_reach(decomposition, deadline)
+        if not isinstance(reason, Failure) or reason.s_interval is None:
+            return None
+        failures.append((reason.s_interval, reason))
+    is_clear = all(end - begin > 0.1 for (begin, end), _ in failures)
+    if not is_clear and not any(map(_is_of_lattice, candidates)):
+        return None
+    return max(failures, key=lambda item: item[0][0])[1]
 
 
-def no_motion(
+def explain_no_motion(
     problem: Problem,
     decompositions: Sequence[Decomposition],
     candidates: Sequence[Candidate],
     dead_ends: Mapping[str, DeadEnd],
     deadline: Deadline,
-) -> BrachisError:
-    """Return the error that says why no motion was found.
+) -> Failure:
+    """Tell why no motion was found.
 
     Parameters
     ----------
     problem : Problem
     decompositions : sequence of Decomposition
-    candidates : sequence of Attempt
+    candidates : sequence of Candidate
     dead_ends : mapping of str to DeadEnd
         Where the lattices end, by the names of the redundant joints.
     deadline : Deadline
         When the search for the reason ends.
-
-    Returns
-    -------
-    PathError or PlanningError
     """
-    joint_path = _some_joint_path(candidates)
-    search = bool(decompositions) and not joint_path
-    reason = (
-        _reason(decompositions[0], deadline)
-        if search
-        else _advice(problem.task, candidates)
-    )
-    if isinstance(reason, BrachisError):
+    has_joint_path = _has_joint_path(candidates)
+    reason: Failure | str = _advise(problem.task, candidates)
+    if decompositions and not has_joint_path:
+        reason = explain_reach(decompositions[0], deadline)
+    if isinstance(reason, Failure):
         return reason
-    if dead_ends and not joint_path:
-        name, furthest = min(
-            dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0]
-        )
+    missing = ""
+    if problem.task.redundant_joints == "auto":
+        missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
+    more = f". {missing}" if missing else ""
+    if dead_ends and not has_joint_path:
+        name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
         own = name if name == ALL_POSTURES else f"redundant joints {name}"
-        others = (
-            f" ({own}; the furthest of {len(dead_ends)} lattices)"
-            if len(dead_ends) > 1
-            else ""
-        )
+        others = f" ({own}; the furthest of {len(dead_ends)} lattices)"
         start = "" if problem.start is None else "start in another posture, "
-        return PathError(
-            f"no joint path was found: {furthest}{others}",
-            s_interval=furthest.interval,
-            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize()
-            + _what_is_missing(problem),
+        hint = f"{start}shorten or move the path, or widen the joint ranges"
+        return Failure(
+            f"no joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
+            phase="path",
+            s_interval=dead_ends[name].interval,
+            hint=hint.capitalize() + more,
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(
         status if n == 1 else f"{status} ({n} times)" for status, n in counts.items()
     )
-    along = " along any joint path" if joint_path else ""
-    error = PlanningError(
-        f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
-        hint=reason + _what_is_missing(problem),
-    )
-    ends = {
-        f"boundary.{key}": getattr(problem.task.boundary, key)
-        for key in ("start_speed", "end_speed")
+    along = " along any joint path" if has_joint_path else ""
+    boundary = problem.task.boundary
+    speeds = {
+        "boundary.start_speed": boundary.start_speed,
+        "boundary.end_speed": boundary.end_speed,
     }
-    remedies = [
-        Remedy(key, speed, _SLOWER * speed, problem.task.speed_unit)
-        for key, speed in ends.items()
-        if speed
-    ]
-    return error.with_remedies(*remedies)
+    return Failure(
+        f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
+        hint=reason + more,
+        remedies=tuple(
+            Remedy(key, speed, 0.7 * speed, problem.task.speed_unit)
+            for key, speed in speeds.items()
+            if speed
+        ),
+    )
 
 
-def out_of_time(task: Task, undone: Sequence[str]) -> PlanningError:
-    """Return the error that says that the time was up, and what was left undone."""
-    problem = f"no motion was found within the time limit of {task.search.time_limit:g} s: {'; '.join(undone)}"
-    return PlanningError(problem, hint="Raise search.time_limit")
+def explain_time_limit(task: Task, not_completed: Sequence[str]) -> Failure:
+    """Say that the time was up, and what was not completed."""
+    return Failure(
+        f"no motion was found within the time limit of {task.search.time_limit:g} s: {'; '.join(not_completed)}",
+        hint="Raise search.time_limit",
+    )
 
 
-def _advice(task: Task, candidates: Sequence[Candidate]) -> str:
+def _advise(task: Task, candidates: Sequence[Candidate]) -> str:
     """Say what may help where there are joint paths, but no motion along them: only what has not been tried."""
     statuses = " ".join(candidate.status for candidate in candidates)
-    few = SolverSettings.model_fields
-    tried = []
+    defaults = SolverSettings()
+    solver = task.solver
+    advice = []
     if (
         "iteration limit" in statuses
-        and task.solver.max_iterations < few["max_iterations"].default
+        and solver.max_iterations < defaults.max_iterations
     ):
-        tried.append(
-            f"raise solver.max_iterations, which is {task.solver.max_iterations}"
-        )
+        advice.append(f"raise solver.max_iterations, which is {solver.max_iterations}")
     if "time limit" in statuses:
-        name = (
-            "solver" if task.solver.time_limit < few["time_limit"].default else "search"
+        key = "solver" if solver.time_limit < defaults.time_limit else "search"
+        advice.append(
+            f"raise {key}.time_limit, which is {getattr(task, key).time_limit:g} s"
         )
-        tried.append(
-            f"raise {name}.time_limit, which is {getattr(task, name).time_limit:g} s"
-        )
-    if not tried and task.search.effort != _MOST_EFFORT:
-        tried.append(f"raise search.effort, which is {task.search.effort}")
-    if not tried:
-        tried.append("raise the limits, or try another start posture")
-    advice = ", or ".join(tried)
-    return advice[:1].upper() + advice[1:]
+    if not advice and task.search.effort != "exhaustive":
+        advice.append(f"raise search.effort, which is {task.search.effort}")
+    text = ", or ".join(advice) or "raise the limits, or try another start posture"
+    return text[:1].upper() + text[1:]
 
 
-def _what_is_missing(problem: Problem) -> str:
-    """Say which further choices of redundant joints EAIK might add where it is not installed."""
-    if problem.task.redundant_joints != "auto":
-        return ""
-    missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
-    return f". {missing}" if missing else ""
+def _is_of_lattice(candidate: Candidate) -> bool:
+    return candidate.origin.startswith("lattice")
 
 
-def _lattices(candidates: Sequence[Candidate]) -> list[Candidate]:
-    return [
-        candidate for candidate in candidates if candidate.origin.startswith("lattice")
-    ]
-
-
-def _some_joint_path(candidates: Sequence[Candidate]) -> bool:
+def _has_joint_path(candidates: Sequence[Candidate]) -> bool:
     """Tell whether a lattice that was looked at has a joint path."""
-    return any(candidate.branch for candidate in _lattices(candidates))
-
-
-def _reason(decomposition: Decomposition, deadline: Deadline) -> BrachisError | str:
-    problem = decomposition.problem
-    given = problem.end if problem.start is None else problem.start
-    posture = np.zeros(problem.robot.n) if given is None else given
-    return reason_out_of_reach(
-        decomposition.joint_map(posture, decomposition.branches[0]),
-        problem.limits,
-        any_branch=given is None,
-        given="end" if problem.start is None else "start",
-        deadline=deadline,
-    )
+    return any(each.branch for each in candidates if _is_of_lattice(each))

@@ -1,6 +1,6 @@
-"""The start from a motion that is known already, of the same task or of one like it.
+"""The initial guess from a motion that is known already, of the same task or of one like it.
 
-What is taken over are curves: the postures over the path coordinate, brought onto the path where it is another one, and
+What is taken over are curves: the postures over the path coordinate, brought onto the path if it is another one, and
 the time law. So limits, splines, coordinates and the path may be others than when the motion was planned.
 """
 
@@ -24,20 +24,18 @@ from brachis.kinematics import (
 from brachis.optimise.candidate import InitialGuess, PathMap
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
-from brachis.search.lattice import LARGEST_STEP
-from brachis.search.schedule import charts_allowed
+from brachis.search.schedule import has_charts, solvers_of
 from brachis.search.solving import SELECTABLE
-from brachis.search.starts import FAMILY
+from brachis.search.starts import FAMILY, bring_onto_path
 from brachis.trajectory import Trajectory
 
 GIVEN = "given motion"
-_TIMES = 401
 
 
-def given_start(
+def given_guess(
     problem: Problem, decompositions: Sequence[Decomposition], motion: Trajectory
 ) -> InitialGuess | str:
-    """Make a start of a known motion.
+    """Make an initial guess of a known motion.
 
     Parameters
     ----------
@@ -47,26 +45,32 @@ def given_start(
 
     Returns
     -------
-    Start or str
-        Why there is none, in plain words.
+    InitialGuess or str
+        For the solver that is tried first; or why the motion cannot be used, in plain words.
     """
-    robot = problem.robot
-    if motion.joint_names != robot.joint_names:
-        return f"its joints are {', '.join(motion.joint_names)}, the robot's {', '.join(robot.joint_names)}"
-    t = np.linspace(0.0, motion.t_end, _TIMES)
+    joints = problem.robot.joint_names
+    if motion.joint_names != joints:
+        return f"its joints are {', '.join(motion.joint_names)}, the robot's {', '.join(joints)}"
+    t = np.linspace(0.0, motion.t_end, 401)
     s = np.clip(motion.path_coordinate(t), 0.0, 1.0)
-    s[[0, -1]] = 0.0, 1.0
+    s[[0, -1]] = [0.0, 1.0]
     try:
         joint_map, curves, family = _in_coordinates(
             problem, decompositions, motion, s, motion.position(t)
         )
-        reached = np.isfinite(joint_map.postures(curves)).all()
+        if not np.isfinite(joint_map.postures(curves)).all():
+            return "its postures cannot be brought onto the path"
     except UnreachableError as error:
         return str(error)
-    if not reached:
-        return "its postures cannot be brought onto the path"
     return InitialGuess(
-        problem, joint_map, curves, motion.t_end, GIVEN, family, timed=True
+        problem,
+        joint_map,
+        curves,
+        motion.t_end,
+        GIVEN,
+        family,
+        solvers_of(problem)[0],
+        timed=True,
     )
 
 
@@ -80,69 +84,43 @@ def _in_coordinates(
     """Joint map, its curves (S, 1 + r), and family, for path coordinates (S,) and postures (S, n)."""
     if isinstance(problem.task_map, JointSpace):
         return JointSpaceMap(problem.robot, problem.path), s[:, None], FAMILY
-    q = _on_path(problem, s, q)
-    if charts_allowed(problem, decompositions):
-        chart = _chart(problem, motion, s, q)
+    first = q[0] if problem.start is None else problem.start
+    last = q[-1] if problem.end is None else problem.end
+    q = q + np.outer(1.0 - s, first - q[0]) + np.outer(s, last - q[-1])
+    is_reachable = problem.robot.n >= problem.task_map.m
+    newton = Newton(problem.task_map) if is_reachable else None
+    q = bring_onto_path(problem, newton, s, q)
+    if has_charts(problem, decompositions):
+        chart = _lay_chart(problem, motion, s, q)
         return chart, chart.curves(s, q), CHART
-    same = [
-        each
-        for each in decompositions
-        if each.match.redundant_joints == motion.redundant_joints
-    ]
-    chosen = (same or list(decompositions))[0]
+    chosen = next(
+        (
+            each
+            for each in decompositions
+            if each.match.redundant_joints == motion.redundant_joints
+        ),
+        decompositions[0],
+    )
     labels = chosen.match.solver.branches
-    branch = next(
-        (each for each in chosen.branches if labels[each] == motion.branch),
-        chosen.branches[0],
-    )
-    return (
-        chosen.joint_map(q[0], branch),
-        np.column_stack([s, q[:, list(chosen.redundant)]]),
-        chosen.match.family,
-    )
+    branches = [each for each in chosen.branches if labels[each] == motion.branch]
+    branch = (branches or chosen.branches)[0]
+    curves = np.column_stack([s, q[:, list(chosen.redundant)]])
+    return chosen.joint_map(q[0], branch), curves, chosen.match.family
 
 
-def _chart(
+def _lay_chart(
     problem: Problem, motion: Trajectory, s: np.ndarray, q: np.ndarray
 ) -> ChartMap:
-    """Lay a chart around postures, with the motion's own rows where these do for it."""
+    """Lay a chart around postures, with the motion's own rows if they are transversal along them."""
     robot = problem.robot
-    names = motion.redundant_joints
-    selected = np.eye(robot.n)[[robot.joint_names.index(name) for name in names]]
-    saved = (
-        ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
-        if len(motion.chart_rows)
-        else None
-    )
-    own = saved or (
-        ChartRows.constant(selected)
-        if len(names) == robot.n - problem.task_map.m
-        else None
-    )
-    if own is not None:
+    joints = [robot.joint_names.index(name) for name in motion.redundant_joints]
+    rows = None
+    if len(motion.chart_rows):
+        rows = ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
+    elif len(joints) == robot.n - problem.task_map.m:
+        rows = ChartRows.constant(np.eye(robot.n)[joints])
+    if rows is not None:
         null = null_spaces(Newton(problem.task_map).task_coordinates(q)[1])
-        if transversality(own.at(s)[0], null).min() < SELECTABLE:
-            own = None
-    return chart_around(problem.task_map, problem.path, s, q, own)
-
-
-def _on_path(problem: Problem, s: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Postures (S, n) on the path, near given ones, between the ends that the task gives.
-
-    Raises
-    ------
-    UnreachableError
-    """
-    given = problem.start, problem.end
-    ends = [
-        own if one is None else one for one, own in zip(given, q[[0, -1]], strict=True)
-    ]
-    q = q + np.outer(1.0 - s, ends[0] - q[0]) + np.outer(s, ends[1] - q[-1])
-    if problem.robot.n >= problem.task_map.m:
-        q = Newton(problem.task_map).nearest(problem.path.sample(s).target, q)
-    for place, posture in zip((0, -1), given, strict=True):
-        if posture is not None:
-            q[place] = posture
-    if not (np.isfinite(q).all() and np.abs(np.diff(q, axis=0)).max() <= LARGEST_STEP):
-        raise UnreachableError("its postures cannot be brought onto the path")
-    return q
+        if transversality(rows.at(s)[0], null).min() < SELECTABLE:
+            rows = None
+    return chart_around(problem.task_map, problem.path, s, q, rows)

@@ -1,4 +1,4 @@
-"""Joint paths of the redundant joints, which of them differ, and where there is none."""
+"""Joint paths, which of them differ, and why a lattice has none."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from brachis.limits import Limit
 from brachis.limits.joint import reciprocals_near
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
-
-_APART = 0.02
-_TINY = 1e-9
 
 ALL_POSTURES = "all postures"
 """What the lattice is called that keeps to no choice of redundant joints."""
@@ -112,8 +109,9 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
         distance = np.minimum(
             distance, np.where(branches == branches[best], apart, np.inf)
         )
-        best = int(np.argmax(distance / (length + _TINY)))
-        if distance[best] <= _APART * distance[np.isfinite(distance)].max(initial=0.0):
+        best = int(np.argmax(distance / (length + 1e-9)))
+        largest = distance[np.isfinite(distance)].max(initial=0.0)
+        if distance[best] <= 0.02 * largest:
             break
     return [joint_paths[one] for one in chosen]
 
@@ -121,11 +119,33 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
 def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.ndarray:
     """Weights of the joints, (n,), with which postures near `q`, (n,), are compared.
 
-    The reciprocal of the largest acceleration that a joint's own limits allow it alone; where there are none, that of
+    The reciprocal of the largest acceleration that a joint's own limits allow it alone; without such limits, that of
     the largest velocity.
     """
     by_acceleration, by_velocity = reciprocals_near(robot, limits, q)
     return by_acceleration if by_acceleration.any() else by_velocity
+
+
+def sampling_box(
+    robot: Robot, near: np.ndarray | None = None, opened: Sequence[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Box, (n,) and (n,), from which postures are drawn: the ranges, or a turn, or 10 m around a posture `near`.
+
+    `opened` joints are taken as if they had no range.
+    """
+    limits = robot.limits
+    is_open = np.isin(np.arange(robot.n), opened)
+    lower = np.where(is_open, -np.inf, limits.position_lower)
+    upper = np.where(is_open, np.inf, limits.position_upper)
+    reach = np.where(robot.revolute, np.pi, 10.0)
+    middle = np.zeros(robot.n)
+    if near is not None:
+        slides = np.clip(near, limits.position_lower, limits.position_upper)
+        middle = np.where(robot.revolute, 0.0, slides)
+    highest = np.where(np.isfinite(upper), upper, middle + reach)
+    low = np.where(np.isfinite(lower), lower, highest - 2.0 * reach)
+    high = np.where(np.isfinite(upper), upper, low + 2.0 * reach)
+    return low, high
 
 
 def causes_of(

@@ -17,7 +17,7 @@ class SearchLevel:
     joint_paths : int
         Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
     numeric : int
-        Joint paths by numeric inverse kinematics beside them, where the start posture is given.
+        Joint paths by numeric inverse kinematics as well, if the start posture is given.
     in_charts : int
         Plans in charts; four times as many joint paths are looked at.
     in_closed_forms : int
@@ -38,64 +38,25 @@ class SearchLevel:
     in_charts: int
     in_closed_forms: int
     refined: int
-    cells_per_turn: int
-    nodes: int
+    cells_per_turn: int = 72
+    nodes: int = 120
     only_minima: bool = True
     fallback: bool = False
 
 
-_LEVELS = {
-    "single": SearchLevel(
-        1,
-        joint_paths=1,
-        numeric=0,
-        in_charts=1,
-        in_closed_forms=1,
-        refined=1,
-        cells_per_turn=72,
-        nodes=120,
-    ),
-    "fast": SearchLevel(
-        6,
-        joint_paths=4,
-        numeric=0,
-        in_charts=4,
-        in_closed_forms=24,
-        refined=4,
-        cells_per_turn=72,
-        nodes=120,
-    ),
-    "thorough": SearchLevel(
-        20,
-        joint_paths=8,
-        numeric=8,
-        in_charts=8,
-        in_closed_forms=100,
-        refined=12,
-        cells_per_turn=96,
-        nodes=300,
-        only_minima=False,
-    ),
-    "exhaustive": SearchLevel(
-        10_000,
-        joint_paths=30,
-        numeric=8,
-        in_charts=12,
-        in_closed_forms=10_000,
-        refined=40,
-        cells_per_turn=144,
-        nodes=600,
-        only_minima=False,
-    ),
-}
+_SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
+_FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
+_THOROUGH = SearchLevel(
+    20, 8, 8, 8, 100, 12, cells_per_turn=96, nodes=300, only_minima=False
+)
+_EXHAUSTIVE = SearchLevel(
+    10_000, 30, 8, 12, 10_000, 40, cells_per_turn=144, nodes=600, only_minima=False
+)
 
 SEARCH_LEVELS = {
-    "single": (
-        _LEVELS["single"],
-        dataclasses.replace(_LEVELS["fast"], fallback=True),
-    ),
-    "fast": (_LEVELS["fast"],),
-    "thorough": (_LEVELS["fast"], _LEVELS["thorough"]),
-    "exhaustive": (_LEVELS["fast"], _LEVELS["thorough"], _LEVELS["exhaustive"]),
+    "single": (_SINGLE, dataclasses.replace(_FAST, fallback=True)),
+    "fast": (_FAST,),
+    "thorough": (_FAST, _THOROUGH),
+    "exhaustive": (_FAST, _THOROUGH, _EXHAUSTIVE),
 }
 """Levels that are gone through one after the other, by the task's ``search.effort``; so a good motion is known soon."""

@@ -29,7 +29,7 @@ class PlannedMotion(Summary):
     trajectory: Trajectory
     verification: Verification
     family: str
-    attempt: Candidate
+    candidate: Candidate
     least_motion: LeastMotion | None = None
     timing: dict[str, float] = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()
@@ -98,11 +98,11 @@ class PlannedMotion(Summary):
     @property
     def solver_report(self) -> SolverReport:
         """Report of the solve that gave the trajectory."""
-        return self.attempt.reports[-1]
+        return self.candidate.reports[-1]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of the plan as plain data for JSON."""
-        last = self.attempt
+        last = self.candidate
         return {
             "t_end": self.t_end,
             "redundant_joints": list(self.trajectory.redundant_joints),
@@ -125,7 +125,7 @@ class PlannedMotion(Summary):
             "fits": [fit.to_dict() for fit in self.fits],
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,
-            "not_completed": list(self.not_completed),
+            "undone": list(self.not_completed),
             "warnings": [remark.to_dict() for remark in self.warnings],
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,

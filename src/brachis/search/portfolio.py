@@ -1,54 +1,61 @@
-"""The search: starts from lattices, solved coarsely, ranked, the best finished.
+"""The search: initial guesses from lattices, solved coarsely, ranked, the best refined and verified.
 
-1. Lattices give starts (see `schedule`); they are solved at the first collocation points.
-2. Attempts that agree are merged. In the order of their end times the others are refined and verified, as long as they
-   may beat the best verified one: refinement adds rows, so that over the same knots and in the same coordinates the
-   coarse end time of an optimum bounds its refined one from below. In charts, where the coordinates may still be
-   changed, coarse end times are compared with each other.
-3. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
+1. `Search.find_starts`: lattices give initial guesses, batch by batch (see `schedule`).
+2. `Search.solve_candidates` solves them at the first collocation points. Candidates that agree are merged.
+3. `Search.refine_and_verify` goes through the others in the order of their end times as long as they may beat the best
+   verified one: refinement adds rows, so that over the same knots and in the same coordinates the coarse end time of an
+   optimum bounds its refined one from below. In charts, where the coordinates may still be changed, coarse end times
+   are compared with each other.
+4. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
-What comes out does not depend on the number of processes: work that one process would not have done is thrown away.
+The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterable, Sequence
+import contextlib
+import dataclasses
+from collections.abc import Iterator, Sequence
 from contextlib import closing
+
+import numpy as np
 
 from brachis.common import interrupts
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
+from brachis.errors import write_count
+from brachis.optimise.backends import SolveStatus
 from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import candidates
-from brachis.search.failure import no_motion, out_of_time, refuse_what_is_out_of_reach
-from brachis.search.holding import explain_holding
-from brachis.search.processes import each, processes
-from brachis.search.record import NOT_TRIED, Numbered, Record, round_end_time
+from brachis.search.failure import (
+    Failure,
+    explain_first_failures,
+    explain_no_motion,
+    explain_time_limit,
+)
+from brachis.search.given_motion import GIVEN, given_guess
+from brachis.search.hopeless import UNLIKELY, explain_holding, explain_speed
+from brachis.search.joint_path import ALL_POSTURES, DeadEnd
+from brachis.search.processes import each, ignore, processes
+from brachis.search.record import (
+    NOT_TRIED,
+    SAME_MOTION,
+    WORTH_IT,
+    is_same_motion,
+    round_end_time,
+)
 from brachis.search.schedule import Batch, batches
-from brachis.search.too_fast import out_of_reach, unlikely
+from brachis.trajectory import Trajectory
 
 _COARSE_SHARE = 0.6
-"""Part of the time limit after which no start is solved while nothing is verified."""
+"""Part of the time limit after which no guess is solved while nothing is verified."""
 _LEAST_SHARE = 2.0
-"""Seconds that the solve from any start may take, however many starts there are."""
-_LARGEST_SHARE = 0.15
-"""Part of the time limit that the solve from one start may take at most."""
-_GRACE = 1.0
-"""Seconds to finish the best attempt where the time is up and nothing is verified."""
-_LAST_CHANCES = 3
-"""Attempts of which one becomes the unverified motion where none could be finished."""
+"""Time that every guess may take, however many there are, s."""
 
 
-def find_fastest(
-    problem: Problem,
-    decompositions: Sequence[Decomposition],
-    deadline: Deadline,
-    listener: Listener,
-    first: InitialGuess | None = None,
-) -> Record:
-    """Search for the fastest verified motion.
+class Search:
+    """A search for the fastest verified motion.
 
     Parameters
     ----------
@@ -56,96 +63,18 @@ def find_fastest(
     decompositions : sequence of Decomposition
         The most promising first.
     deadline : Deadline
-        When to return the best motion so far; one that is not verified where none is.
+        When to end with the best motion so far; one that is not verified where none is.
     listener : callable
-    first : Start, optional
-        Tried alone; nothing else is where it leads to a verified motion.
 
-    Returns
-    -------
-    Record
-        With a best attempt: the fastest verified one, or the one nearest to the limits.
-
-    Raises
-    ------
-    PathError
-        The path is out of reach, or no posture along it is allowed at rest.
-    PlanningError
-        No motion was found.
-    KeyboardInterrupt
-        Ctrl-C before any motion was verified; its text tells of the best one, if there is one.
-    """
-    search = _Search(problem, decompositions, deadline, listener)
-    record = search.record
-    try:
-        if first is not None:
-            search.run([Batch((first,), 1)])
-        if not record.content:
-            search.run(
-                batches(
-                    problem, decompositions, deadline, listener, record.report_dead_end
-                )
-            )
-    except KeyboardInterrupt:
-        interrupts.clear()
-        record.interrupted = True
-        search.take_what_there_is()
-        if not record.content:
-            raise KeyboardInterrupt(record.best_in_words()) from None
-    if record.best is not None:
-        return record
-    if record.too_fast is not None:
-        raise record.too_fast.error
-    heavy = explain_holding(
-        [attempt.start for attempt in record.attempts if attempt.start is not None]
-    )
-    if heavy is not None:
-        raise heavy
-    if record.interrupted or record.cut_short(problem.task.solver.time_limit):
-        record.interrupted = True
-        raise out_of_time(problem.task, record.not_completed())
-    raise no_motion(
-        problem, decompositions, record.attempts, record.dead_ends, deadline
-    )
-
-
-def is_planned(
-    problem: Problem,
-    decompositions: Sequence[Decomposition],
-    deadline: Deadline,
-    most: int | None = None,
-) -> bool | None:
-    """Tell whether a verified motion is found by the first batches of a search.
-
-    Parameters
+    Attributes
     ----------
-    problem, decompositions, deadline
-        See `find_fastest`.
-    most : int, optional
-        How many batches are tried; all of them where it is left out.
-
-    Returns
-    -------
-    bool or None
-        None where there may be one yet: not all batches were tried, or the robot has more joint paths than these have.
+    candidates : list of Candidate
+        All that was looked at.
+    best : Candidate or None
+        The fastest verified one, or the one nearest to the limits.
+    interrupted : bool
+        Whether Ctrl-C or the time limit ended the search.
     """
-
-    def listener(_text: str) -> None:
-        """Hear nothing."""
-
-    search = _Search(problem, decompositions, deadline, listener)
-    schedule = batches(
-        problem, decompositions, deadline, listener, search.record.report_dead_end
-    )
-    search.run(itertools.islice(schedule, most))
-    best = search.record.best
-    if best is not None and best.verified:
-        return True
-    return None if most or problem.robot.n > problem.task_map.m else False
-
-
-class _Search:
-    """A search on its way."""
 
     def __init__(
         self,
@@ -154,128 +83,321 @@ class _Search:
         deadline: Deadline,
         listener: Listener,
     ) -> None:
+        self.candidates: list[Candidate] = []
+        self.best: Candidate | None = None
+        self.interrupted = False
+        self._problem = problem
         self._decompositions = decompositions
         self._deadline = deadline
         self._listener = listener
-        self._task = problem.task
-        self.record = Record(refined=self._task.refinement.max_rounds > 0)
+        self._dead_ends: dict[str, DeadEnd] = {}
+        self._unfinished_lattices: dict[str, None] = {}
+        self._too_fast: Failure | None = None
+        self._given_motion = ""
+        self._solved: dict[int, Candidate] = {}
+        self._waiting: list[int] = []
+        self._known: list[Candidate] = []
+        self._gain = 1.0
+
+    @property
+    def is_satisfied(self) -> bool:
+        """Whether a verified motion is known; without refinement any motion will do."""
+        return self.best is not None and self._merit(self.best)[0] == -np.inf
+
+    def _merit(self, candidate: Candidate) -> tuple[float, float]:
+        """By what motions are compared: violation of a limit, -inf for a motion that will do, and end time, s."""
+        assert candidate.verification is not None
+        if candidate.verified or not self._problem.task.refinement.max_rounds:
+            return -np.inf, candidate.t_end
+        return candidate.verification.worst_ratio - 1.0, candidate.t_end
+
+    def find_starts(self, given: Trajectory | None = None) -> Iterator[Batch]:
+        """Yield batches of initial guesses while they are worth solving.
+
+        Parameters
+        ----------
+        given : Trajectory, optional
+            A motion that is tried alone at first; nothing else is if it leads to a verified motion.
+
+        Raises
+        ------
+        PathError
+            The path is out of reach, or no posture along it is allowed at rest.
+        PlanningError
+            A speed, or a mean of a load, is far out of reach.
+        """
+        if given is not None:
+            guess = given_guess(self._problem, self._decompositions, given)
+            if isinstance(guess, InitialGuess):
+                yield Batch((guess,), 1)
+                guess = "it led to no verified plan"
+            self._given_motion = guess
+            if self.is_satisfied:
+                return
+        is_first_fallback = True
+        for batch in batches(
+            self._problem, self._decompositions, self._deadline, self._listener
+        ):
+            for decomposition, dead_end in batch.lattices:
+                self._add_lattice(decomposition, dead_end)
+            if batch.fallback and self.is_satisfied:
+                return
+            if self._deadline.passed:
+                self.interrupted = True
+                if not batch.fallback:
+                    self._add_starts(batch)
+                return
+            if batch.fallback and is_first_fallback:
+                is_first_fallback = False
+                self._refuse_what_is_out_of_reach()
+            yield batch
+
+    def solve_candidates(self, batch: Batch) -> None:
+        """Solve the guesses of a batch coarsely, and rank those that differ."""
+        first = self._add_starts(batch)
+        limit = self._deadline
+        if not self.is_satisfied:
+            limit = limit.part(_COARSE_SHARE)
+        # No guess may take more than 15 % of the time.
+        share = min(0.15, _COARSE_SHARE / max(1, len(batch.starts)))
+        seconds = max(_LEAST_SHARE, share * self._problem.task.search.time_limit)
+        work = each(
+            _solve_in_time,
+            batch.starts,
+            limit,
+            seconds,
+            jobs=self._jobs,
+            listener=self._listener,
+        )
+        with closing(work) as outcomes:
+            for number, candidate in enumerate(outcomes, first):
+                self.candidates[number] = candidate
+                if candidate.status == NOT_TRIED:
+                    self.interrupted = True
+                if candidate.usable:
+                    self._solved[number] = candidate
+        # As a fallback a motion that could not be verified gets another chance, with another solver.
+        known = [] if batch.fallback else self._known
+        self._waiting = []
+        for number in self._by_end_time(first):
+            candidate = self._solved[number]
+            if any(is_same_motion(candidate, other) for other in known):
+                self.candidates[number] = dataclasses.replace(
+                    candidate, status=SAME_MOTION
+                )
+            else:
+                known.append(candidate)
+                self._waiting.append(number)
+
+    def refine_and_verify(self, batch: Batch) -> None:
+        """Refine and verify the candidates of a batch in the order of their end times while they may be the fastest."""
+        jobs = self._jobs
+        left = batch.refined
+        while self._waiting and self._goes_on(left):
+            numbers = self._waiting[:jobs]
+            work = each(
+                candidates.finish_candidate,
+                [self._solved[number] for number in numbers],
+                self._latest,
+                jobs=jobs,
+                listener=self._listener,
+            )
+            with closing(work) as outcomes:
+                for number, candidate in zip(numbers, outcomes, strict=True):
+                    if number != numbers[0] and not self._goes_on(left):
+                        return
+                    left -= 1
+                    self._finish(number, candidate)
+                    self._listener(
+                        f"{candidate.solver}: t_E = {candidate.t_end:.4f} s, {candidate.status}"
+                    )
+
+    @contextlib.contextmanager
+    def end_early(self) -> Iterator[None]:
+        """Let Ctrl-C, or the end of the time, end the search with the best motion so far.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            Ctrl-C before any motion was verified; its text says what the best one is.
+        """
+        is_pressed = False
+        try:
+            yield
+        except KeyboardInterrupt:
+            interrupts.clear()
+            is_pressed = True
+            self.interrupted = True
+        if self.interrupted:
+            # One of the fastest three becomes the unverified motion.
+            for number in self._by_end_time()[:3]:
+                if self.best is None:
+                    solved = self._solved[number]
+                    self._finish(
+                        number,
+                        candidates.finish_candidate(solved, Deadline(0.0), ignore),
+                    )
+        if is_pressed and not self.is_satisfied:
+            raise KeyboardInterrupt(self._describe_best())
+
+    def explain(self) -> Failure:
+        """Tell why no motion was found."""
+        starts = [each.start for each in self.candidates if each.start is not None]
+        failure = self._too_fast or explain_holding(starts)
+        if failure is None and (self.interrupted or self._is_cut_short()):
+            self.interrupted = True
+            failure = explain_time_limit(self._problem.task, self.not_completed())
+        return failure or explain_no_motion(
+            self._problem,
+            self._decompositions,
+            self.candidates,
+            self._dead_ends,
+            self._deadline,
+        )
+
+    def not_completed(self) -> tuple[str, ...]:
+        """Say in plain words what was not completed."""
+        parts = []
+        best = self.best
+        if best is not None and self._given_motion and best.origin != GIVEN:
+            parts.append(
+                f"the plan does not start from the given motion: {self._given_motion}; it was searched for as usual"
+            )
+        if best is not None and best.not_completed:
+            parts.append(best.not_completed)
+        if not self.interrupted:
+            return tuple(parts)
+        if self._unfinished_lattices:
+            names = " | ".join(self._unfinished_lattices)
+            parts.append(f"the lattice of {names} was not searched to its end")
+        unsolved = sum(each.status == NOT_TRIED for each in self.candidates)
+        counts = {"planned": unsolved, "refined": len(self._waiting)}
+        if any(counts.values()):
+            total = write_count(len(self.candidates), "candidate")
+            left = [f"{n} not {what}" for what, n in counts.items() if n]
+            parts.append(f"of {total} {', '.join(left)}")
+        return (*parts, "what search.effort asks for was not tried to its end")
+
+    def in_order(self) -> tuple[Candidate, ...]:
+        """All candidates, the fastest verified one first, without their programs."""
+
+        def rank(candidate: Candidate) -> tuple[float, ...]:
+            times = candidate.t_end, candidate.coarse, candidate.estimate
+            return (not candidate.verified, *map(round_end_time, times))
+
+        ordered = sorted(self.candidates, key=rank)
+        return tuple(candidate.without_programs() for candidate in ordered)
 
     @property
     def _jobs(self) -> int:
-        return processes(self._task.search.jobs, self._deadline)
+        return processes(self._problem.task.search.jobs, self._deadline)
 
     @property
     def _latest(self) -> Deadline:
-        """When the last work ends: later while nothing is verified."""
-        return self._deadline if self.record.content else self._deadline.extend(_GRACE)
+        """When the last work ends: a second later while nothing is verified."""
+        return self._deadline if self.is_satisfied else self._deadline.extend(1.0)
 
-    def run(self, schedule: Iterable[Batch]) -> None:
-        """Try batch after batch."""
-        refused = False
-        for batch in schedule:
-            if batch.fallback and self.record.content:
-                return
-            if self._deadline.passed:
-                self.record.begin(0 if batch.fallback else len(batch.starts))
-                self.record.interrupted = True
-                break
-            if batch.fallback and not refused:
-                refuse_what_is_out_of_reach(
-                    self._decompositions, self.record.attempts, self._deadline
-                )
-                self._refuse_what_is_too_fast()
-                refused = True
-            self._finish(self._solve(batch), batch.refined)
-        if self.record.interrupted:
-            self.take_what_there_is()
-
-    def _refuse_what_is_too_fast(self) -> None:
-        """Find out whether a least speed is to blame that nothing was found, and refuse one that is far too high."""
-        limit = self._deadline.part(_COARSE_SHARE).within(_LEAST_SHARE)
-        record = self.record
-        record.too_fast = out_of_reach(
-            record.attempts,
-            lambda start: candidates.solve_candidate(start, limit, self._listener),
+    def _by_end_time(self, first: int = 0) -> list[int]:
+        """Numbers, from `first` on, of the candidates that were solved, the fastest one first."""
+        return sorted(
+            (number for number in self._solved if number >= first),
+            key=lambda number: (round_end_time(self._solved[number].coarse), number),
         )
-        if record.too_fast is not None and unlikely(record.too_fast):
-            raise record.too_fast.error
 
-    def _solve(self, batch: Batch) -> list[Numbered]:
-        """Solve the starts of a batch coarsely, and rank those that differ."""
-        record = self.record
-        known = len(self.record.solved)
-        record.begin(len(batch.starts))
-        limit = self._deadline if record.content else self._deadline.part(_COARSE_SHARE)
-        share = self._task.search.time_limit * min(
-            _LARGEST_SHARE, _COARSE_SHARE / max(1, len(batch.starts))
-        )
-        work = (
-            _solved_in_time,
-            batch.starts,
-            candidates.solve_candidate,
-            limit,
-            max(_LEAST_SHARE, share),
-        )
-        with closing(each(*work, jobs=self._jobs, listener=self._listener)) as outcomes:
-            for attempt in outcomes:
-                record.add(attempt)
-        # In the last resort a motion that could not be verified gets another chance, with another solver.
-        return record.ranked(record.solved[known:], again=batch.fallback)
+    def _add_starts(self, batch: Batch) -> int:
+        """Add guesses as candidates that were not tried yet; return the number of the first one."""
+        first = len(self.candidates)
+        self.candidates += [Candidate.of(start, NOT_TRIED) for start in batch.starts]
+        return first
 
-    def _finish(self, ranked: Sequence[Numbered], most: int) -> None:
-        """Refine and verify attempts in the order of their end times while they may be the fastest."""
-        jobs = self._jobs
-        left = most
-        for first in range(0, len(ranked), jobs):
-            batch = ranked[first : first + jobs]
-            if not self._goes_on(ranked[first:], left):
-                return
-            work = (
-                candidates.finish_candidate,
-                [attempt for _, attempt in batch],
-                self._latest,
+    def _add_lattice(
+        self, decomposition: Decomposition | None, dead_end: DeadEnd | None
+    ) -> None:
+        """Put down that a lattice has no joint path, or, without a dead end, that there was no time for it."""
+        name = ALL_POSTURES if decomposition is None else decomposition.name
+        if dead_end is None:
+            self._unfinished_lattices[name] = None
+            self.interrupted = True
+            return
+        self._dead_ends[name] = dead_end
+        joints = () if decomposition is None else decomposition.match.redundant_joints
+        self.candidates.append(
+            Candidate(joints, "", "lattice", "", np.inf, str(dead_end))
+        )
+
+    def _refuse_what_is_out_of_reach(self) -> None:
+        """Refuse paths out of reach, and least speeds far out of reach, before fallbacks are tried."""
+        failure = explain_first_failures(
+            self._decompositions, self.candidates, self._deadline
+        )
+        if failure is None:
+            limit = self._deadline.part(_COARSE_SHARE).within(_LEAST_SHARE)
+            self._too_fast = explain_speed(
+                self.candidates,
+                lambda start: candidates.solve_candidate(start, limit, self._listener),
             )
-            with closing(each(*work, jobs=jobs, listener=self._listener)) as outcomes:
-                for place, attempt in enumerate(outcomes):
-                    if place and not self._goes_on(ranked[first + place :], left):
-                        return
-                    left -= 1
-                    self.record.finish(batch[place][0], attempt)
-                    self._listener(
-                        f"{attempt.solver}: t_E = {attempt.t_end:.4f} s, {attempt.status}"
-                    )
+            if self._too_fast is not None and self._too_fast.share < UNLIKELY:
+                failure = self._too_fast
+        if failure is not None:
+            raise failure.error()
 
-    def _goes_on(self, ranked: Sequence[Numbered], left: int) -> bool:
-        """Tell whether the first one of the attempts that are left is worth finishing."""
-        if not self.record.may_win(ranked[0][1]) or (self.record.content and left <= 0):
-            self.record.drop(ranked)
+    def _goes_on(self, left: int) -> bool:
+        """Tell whether the first one of the waiting candidates is worth finishing."""
+        first = self._solved[self._waiting[0]]
+        if not self._may_win(first) or (self.is_satisfied and left <= 0):
+            self._waiting = []
             return False
         if self._latest.passed:
-            self.record.interrupted = True
+            self.interrupted = True
             return False
         return True
 
-    def take_what_there_is(self) -> None:
-        """Verify the best attempts as they are until one gives a motion, where none is known."""
-        over = Deadline(0.0)
-        for number, attempt in sorted(
-            self.record.solved, key=lambda item: round_end_time(item[1].coarse)
-        )[:_LAST_CHANCES]:
-            if self.record.best is not None:
-                return
-            self.record.finish(
-                number, candidates.finish_candidate(attempt, over, lambda _text: None)
-            )
+    def _may_win(self, candidate: Candidate) -> bool:
+        """Tell whether a candidate may be faster than the best motion."""
+        best = self.best
+        if best is None or not self.is_satisfied:
+            return True
+        both = candidate, best
+        if all(each.keeps_knots and each.in_chart for each in both):
+            # What else they gain, both gain.
+            return candidate.coarse < (1.0 - WORTH_IT) * best.coarse
+        return candidate.coarse * self._gain < (1.0 - WORTH_IT) * best.t_end
+
+    def _finish(self, number: int, candidate: Candidate) -> None:
+        """Put down what became of a candidate, and keep the best one."""
+        if number in self._waiting:
+            self._waiting.remove(number)
+        self.candidates[number] = candidate
+        if candidate.trajectory is None:
+            return
+        if not candidate.keeps_knots:
+            # Better knots shorten a motion: others may gain half a per cent more by them than any one so far.
+            gain = 0.995 * candidate.t_end / candidate.coarse
+            self._gain = min(self._gain, gain)
+        if self.best is None or self._merit(candidate) < self._merit(self.best):
+            self.best = candidate
+
+    def _is_cut_short(self) -> bool:
+        """Tell whether the time for the search ended every solve, of which each has a time limit of its own."""
+        last = [each.reports[-1] for each in self.candidates if each.reports]
+        return bool(last) and all(
+            report.status is SolveStatus.TIME_LIMIT
+            and report.wall_time < self._problem.task.solver.time_limit
+            for report in last
+        )
+
+    def _describe_best(self) -> str:
+        """Say how far the best motion is from a plan; empty without one."""
+        if self.best is None or self.best.verification is None:
+            return ""
+        over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)
+        return f"the best motion so far takes {self.best.t_end:.4f} s, and exceeds a limit by {over:.2g} % (unverified)"
 
 
-def _solved_in_time(
-    start: InitialGuess,
-    solve: Callable[[InitialGuess, Deadline, Listener], Candidate],
-    deadline: Deadline,
-    share: float,
-    listener: Listener,
+def _solve_in_time(
+    start: InitialGuess, deadline: Deadline, seconds: float, listener: Listener
 ) -> Candidate:
-    """Solve from a start within its share of the time, s, unless the time is up."""
+    """Solve from a guess within its share of the time, unless the time is up."""
     if deadline.passed:
         return Candidate.of(start, NOT_TRIED)
-    return solve(start, deadline.within(share), listener)
+    return candidates.solve_candidate(start, deadline.within(seconds), listener)

@@ -24,7 +24,7 @@ from brachis.kinematics import Newton, moving_most, null_spaces, solve_each
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.joints import TURN, complement
 from brachis.search.closed_form_lattice import Cells, cell_sizes
-from brachis.search.joint_path import JointPath, distinct
+from brachis.search.joint_path import JointPath, distinct, sampling_box
 from brachis.search.lattice import (
     LARGEST_STEP,
     Edges,
@@ -67,7 +67,8 @@ def start_postures(
     """
     target = problem.path.sample(np.zeros(1)).target
     if not decompositions:
-        drawn = _draw(problem, count, rng)
+        low, high = sampling_box(problem.robot)
+        drawn = rng.uniform(low, high, (count, problem.robot.n))
         q = newton.nearest(np.repeat(target, count, axis=0), drawn)
         q = q[np.isfinite(q).all(axis=1)]
         return q, np.full(len(q), -1)
@@ -85,21 +86,6 @@ def start_postures(
     return np.concatenate(found), np.repeat(
         np.arange(len(found)), [len(q) for q in found]
     )
-
-
-def _draw(problem: Problem, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Draw postures, (count, n), from the ranges; of joints without one from a turn or from twice the reach."""
-    limits = problem.robot.limits
-    reach = np.where(problem.robot.revolute, np.pi, 10.0)
-    lower = limits.position_lower
-    upper = limits.position_upper
-    low = np.where(
-        np.isfinite(lower),
-        lower,
-        np.where(np.isfinite(upper), upper, reach) - 2.0 * reach,
-    )
-    high = np.where(np.isfinite(upper), upper, low + 2.0 * reach)
-    return rng.uniform(low, high, (count, problem.robot.n))
 
 
 _SAME = 1e-3

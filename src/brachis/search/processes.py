@@ -94,7 +94,7 @@ def each(
 def processes(jobs: int, deadline: Deadline = NEVER) -> int:
     """Return the number of processes that is used where a task asks for `jobs`.
 
-    There are no more than processors, and only this one where the others would hardly have started by the deadline.
+    Never more than there are processors; only this one if the others would not have started by the deadline.
     """
     return 1 if deadline.left < _START else min(jobs, os.cpu_count() or 1)
 
@@ -112,8 +112,8 @@ def _within_a_worker() -> bool:
 def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
     """Run in a process of its own: one thread for linear algebra, nobody listening."""
     with ThreadpoolController().limit(limits=1, user_api="blas"):
-        return function(*arguments, _deaf)
+        return function(*arguments, ignore)
 
 
-def _deaf(_text: str) -> None:
+def ignore(_text: str) -> None:
     """Listen to nothing."""

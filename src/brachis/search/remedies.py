@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from brachis import ik
+from brachis.common import interrupts
 from brachis.common.deadline import Deadline
 from brachis.errors import BrachisError, Remedy
-from brachis.task import Task, load_task, with_keys
+from brachis.problem.problem import Problem, decompositions_of
+from brachis.robot import Robot
+from brachis.robot.custom_limits import LimitModel
+from brachis.robot.from_task import robot_from_settings
+from brachis.search.portfolio import Search
+from brachis.search.processes import ignore
+from brachis.task import Task, load_task, task_with, with_keys
 
 _TIME = 20.0
-"""Time, s, in which all numbers of one error are tried."""
-_SHARE = 0.4
-"""Part of the time that is left for one trial."""
+"""Time for all numbers of one error, s."""
 _TRIALS = 10
 """Largest number of trials of one number."""
 _NEAR = 1.04
 """The search ends where the smallest change that is enough is known up to this factor."""
-_FASTER = 3
-_LARGEST_STEP = 2.0
-"""Power by which the factor between two numbers grows while they are all enough, or none is; its largest value."""
-_ALONE = 3
-"""Share of the time for a number that is tried once, where others have as many as they have trials."""
-_DIGITS = 3
-_ROUNDING = 0.01
-"""Digits of numbers that are tried, and what they leave out of a ratio."""
-
-Trial = Callable[[Task, Deadline, int | None], bool | None]
-"""Says whether a plan of a task is found and verified before a deadline.
-
-The last argument is how many batches of the search are tried; None: all. It returns None where a plan may exist."""
 
 
 def try_remedies(
     error: BrachisError,
+    robot: Robot,
     task: Task,
-    joints: Sequence[str],
-    is_planned: Trial,
+    families: Sequence[ik.Family],
+    own_limits: Sequence[LimitModel],
     deadline: Deadline,
 ) -> None:
     """Try the changes of numbers that an error names, and say in its hint what came out.
@@ -45,56 +40,109 @@ def try_remedies(
     Parameters
     ----------
     error : BrachisError
+    robot : Robot
     task : Task
-        That could not be planned.
-    joints : sequence of str
-        Names of the robot's joints.
-    is_planned : callable
+        Could not be planned.
+    families, own_limits : sequence
+        As for `brachis.plan`.
     deadline : Deadline
+        After it the hint names what to change, but not how far.
     """
     deadline = deadline.within(_TIME)
     content = task.to_dict()
     advice: list[str] = []
-    weights = [_TRIALS if remedy.is_refined else _ALONE for remedy in error.remedies]
+    # A number that is tried once may take as long as three trials of one that is refined.
+    weights = [_TRIALS if remedy.is_refined else 3 for remedy in error.remedies]
     for number, remedy in enumerate(error.remedies):
         own = deadline.part(weights[number] / sum(weights[number:]))
 
         def is_enough(
-            value: float, most: int | None, remedy: Remedy = remedy, own: Deadline = own
+            value: float, most: int | None, key: str = remedy.key, own: Deadline = own
         ) -> bool | None:
-            limit = own.part(_SHARE) if most else own
+            limit = own.part(0.4) if most else own
             found: bool | None = False
             try:
-                changed = load_task(_with_number(content, joints, remedy.key, value))
-                found = is_planned(changed, limit, most)
+                changed = load_task(_with_number(content, robot, key, value))
+                same = changed.robot == task.robot
+                changed_robot = (
+                    robot
+                    if same
+                    else robot_from_settings(changed.robot, urdf_text=robot.urdf)
+                )
+                found = is_planned(
+                    changed_robot, changed, families, own_limits, limit, most
+                )
             except BrachisError:
                 pass
             return None if not found and limit.passed else found
 
-        found = _try_numbers(remedy, is_enough, own)
+        try:
+            found = _try_numbers(remedy, is_enough, own)
+        except KeyboardInterrupt:
+            interrupts.clear()
+            return
         if found:
             advice.append(f"{remedy.verb} {remedy.key} to {found}")
     # One number alone may not be enough.
     untried = " and ".join(
         f"{remedy.verb} {remedy.key}" for remedy in error.remedies if remedy.is_refined
     )
-    text = ", or ".join(advice) or (
-        untried and f"{untried} (how far was not found out)"
-    )
+    text = ", or ".join(advice)
+    if untried and not text:
+        text = f"{untried} (how far was not found out)"
     if text:
         error.put_advice(text[:1].upper() + text[1:])
 
 
-def _try_numbers(
-    remedy: Remedy,
-    is_enough: Callable[[float, int | None], bool | None],
+def is_planned(
+    robot: Robot,
+    task: Task,
+    families: Sequence[ik.Family],
+    own_limits: Sequence[LimitModel],
     deadline: Deadline,
-) -> str:
-    """Look for the smallest change that is enough, and say which it is; empty where none was found.
+    most: int | None,
+) -> bool | None:
+    """Tell whether the first `most` batches of a search, or all, lead to a verified plan.
 
-    `is_enough` takes a number and how many batches of the search are tried, as a `Trial` does.
+    Returns None where there may be one yet: not all batches were tried, or the robot has more joint paths than these
+    have.
     """
-    unit = f" {remedy.unit}" if remedy.unit else ""
+    if most:
+        task = task_with(task, effort="single")
+    problem = Problem.of(robot, task, own_limits)
+    search = Search(problem, decompositions_of(problem, families), deadline, ignore)
+    for batch in itertools.islice(search.find_starts(), most):
+        search.solve_candidates(batch)
+        search.refine_and_verify(batch)
+    if search.best is not None and search.best.verified:
+        return True
+    return None if most or problem.robot.n > problem.task_map.m else False
+
+
+IsEnough = Callable[[float, int | None], bool | None]
+"""Tells whether a number is enough, by so many batches of the search, None: all; None where a plan may exist."""
+
+
+def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str:
+    """Look for the smallest change that is enough, and say which it is; empty where none was found."""
+    good, bad = _bracket(remedy, is_enough, deadline)
+    if good is None:
+        return ""
+    verified = "(a plan with it was verified"
+    # Quick trials may miss a plan: only after a whole search the message says that it found none.
+    if remedy.is_refined and bad != remedy.asked and not deadline.passed:
+        outcome = is_enough(bad, None)
+        if outcome:
+            good = bad
+        elif outcome is False:
+            verified += f"; there was none with {bad:g} {remedy.unit}".rstrip()
+    return f"{good:g} {remedy.unit}".rstrip() + f" {verified})"
+
+
+def _bracket(
+    remedy: Remedy, is_enough: IsEnough, deadline: Deadline
+) -> tuple[float | None, float]:
+    """Find the smallest change known to be enough, None without any, and the largest one that is not."""
     lowers = remedy.guess < remedy.asked
     away = -1.0 if lowers else 1.0
     good: float | None = None
@@ -110,50 +158,38 @@ def _try_numbers(
             bad = value
         if good is None:
             value *= step**away
-        elif abs(math.log(good / bad)) <= math.log(_NEAR) + _ROUNDING:
+        elif abs(math.log(good / bad)) <= math.log(_NEAR) + 0.01:  # of the rounding
             break
         else:
-            middle = math.sqrt(good * bad)
+            value = math.sqrt(good * bad)
             back = good / step**away
-            value = (
-                back
-                if bad == remedy.asked and abs(back - good) < abs(middle - good)
-                else middle
-            )
+            if bad == remedy.asked and abs(back - good) < abs(value - good):
+                value = back
         value = _round(value, down=lowers)
-        step = min(step**_FASTER, _LARGEST_STEP)
-    if good is None:
-        return ""
-    text = f"{good:g}{unit} (a plan with it was verified"
-    # Quick trials may miss a plan; that there is none is said after a whole search alone.
-    if remedy.is_refined and bad != remedy.asked and not deadline.passed:
-        outcome = is_enough(bad, None)
-        if outcome:
-            text = f"{bad:g}{unit} (a plan with it was verified"
-        elif outcome is False:
-            text += f"; there was none with {bad:g}{unit}"
-    return f"{text})"
+        # While all numbers are enough, or none, the steps grow.
+        step = min(step**3, 2.0)
+    return good, bad
 
 
 def _round(value: float, *, down: bool) -> float:
-    """Round to few digits, towards the larger change."""
+    """Round to three digits, towards the larger change."""
     if value <= 0.0:
         return value
-    digits = _DIGITS - 1 - math.floor(math.log10(value))
+    digits = 2 - math.floor(math.log10(value))
     return (math.floor if down else math.ceil)(value * 10.0**digits) / 10.0**digits
 
 
 def _with_number(
-    content: Mapping[str, Any], joints: Sequence[str], key: str, value: float
+    content: Mapping[str, Any], robot: Robot, key: str, value: float
 ) -> dict[str, Any]:
     """Return a task, not checked yet, with a number changed; one for all joints is written joint by joint."""
     above, _, last = key.rpartition(".")
-    if last not in joints or not above.startswith("robot.limits."):
+    if last not in robot.joint_names or not above.startswith("robot.limits."):
         return with_keys(content, {key: value})
-    place: Any = content
+    given: Any = content
     for part in above.split("."):
-        place = place[part]
-    others = place if isinstance(place, Mapping) else {}
-    if isinstance(place, int | float):
-        others = dict.fromkeys(joints, place)
+        given = given[part]
+    if isinstance(given, int | float):
+        given = dict.fromkeys(robot.joint_names, given)
+    others = given if isinstance(given, Mapping) else {}
     return with_keys(content, {above: {**others, last: value}})

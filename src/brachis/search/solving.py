@@ -1,12 +1,13 @@
-"""Solve one NLP from one starting point, with ever smaller branch margins.
+"""Solve a program from a starting point, and solve again from the answer what may be better.
 
-A chart holds around its joint path. Where a solve ends far from that path, the chart's
-rows may no longer be transversal, or the least singular value may hold the motion back.
-Then a new chart is laid around the motion, and the solve goes on in it. At the optimum
-any rows that are transversal along the motion describe the same motions, but splines of
-their coordinates are not the same curves: over the same knots one measure of
-self-motion may be a few parts in a thousand faster than another. So several choices of
-single joints are tried, and the best one is kept.
+Branch margins: near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early
+creeps along it. Far from it the solve is easy, and its answer is a good start for a smaller margin.
+
+Charts: a chart holds around its joint path. If a solve ends far from that path, the chart's rows may no longer be
+transversal, or the least singular value may hold the motion back. Then a new chart is laid around the motion, and the
+solve goes on in it. At the optimum any rows that are transversal along the motion describe the same motions, but
+splines of their coordinates are not the same curves: over the same knots one measure of self-motion may be a few parts
+in a thousand faster than another. So several choices of single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -29,30 +31,25 @@ from brachis.kinematics import (
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.guess import fit_curves, shortest_time
-from brachis.optimise.improve import Solve
+from brachis.optimise.improve import Change, Solve, SolvedProgram, attempt_once, improve
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import phase_in
 from brachis.problem.problem import Problem
 
 MARGINS = (0.1, 0.02, MARGIN)
-"""Branch margins that are tried in turn; see `solve_by_margin_continuation`."""
-HELD_BACK = 1e-4
-"""A margin that is nearer to its bound than this holds the motion back."""
-_EASY = 2
-"""Order of the limits with which solves from afar are easy; see `solve_without_third_order_limits`."""
-_ON_ITS_WAY = 1e-3
+"""Branch margins that are tried in turn."""
 WORTH_IT = 2e-4
-"""A smaller branch margin that shortens the motion by less than this fraction is not worth its sharper turns."""
+"""A further solve that shortens the motion by less than this fraction of its time was not worth it."""
+SELECTABLE = 0.05
+"""Least transversality along the motion of joints that may take the place of the chart's rows."""
 
 
 def solve_by_margin_continuation(
     program: Program, x: np.ndarray, solve: Solve, margins: Sequence[float]
-) -> tuple[Program, tuple[SolverReport, ...]]:
+) -> SolvedProgram:
     """Solve with ever smaller branch margins, each from the last answer.
 
-    Near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early creeps along it.
-    Far from it the solve is easy, and its answer is a good start for a smaller margin. A margin that does not hold the
-    motion back, or that hardly shortens it, ends the continuation.
+    A margin that does not hold the motion back, or that hardly shortens it, ends the continuation.
 
     Parameters
     ----------
@@ -60,54 +57,48 @@ def solve_by_margin_continuation(
     x : (v,) ndarray
         Starting point.
     solve : callable
+        ``solve(program, x)`` returns a `SolverReport`.
     margins : sequence of float
         Least branch margins, descending.
 
     Returns
     -------
-    program : Program
+    SolvedProgram
         With the last margin for which the solve ended well; with the last one tried if none did.
-    reports : tuple of SolverReport
-        Of all solves; the last one belongs to `program`.
     """
-    solved: list[tuple[Program, SolverReport]] = []
-    failed: list[tuple[Program, SolverReport]] = []
-    bounds: set[tuple[float, ...]] = set()
-    for margin in margins:
-        tried = program.with_margin(margin)
-        if (
-            tried.safeguard_bounds in bounds
-        ):  # the closed form has no margins, or the start posture caps them
-            continue
-        bounds.add(tried.safeguard_bounds)
-        outcome = tried, solve(tried, x)
-        if outcome[1].status.usable:
-            if (
-                solved
-                and outcome[1].objective > (1.0 - WORTH_IT) * solved[-1][1].objective
-            ):
-                failed.append(outcome)
-                break
-            solved.append(outcome)
-            x = outcome[1].x
-            if tried.safeguard_slack(x) > HELD_BACK:
-                break
-        else:
-            failed.append(outcome)
-            if solved or outcome[1].status is SolveStatus.TIME_LIMIT:
-                break
-            if (
-                outcome[1].violation <= _ON_ITS_WAY
-            ):  # it ran out of iterations on its way
-                x = outcome[1].x
-    order = [*failed, *solved]
-    return order[-1][0], tuple(report for _, report in order)
+
+    def use(smaller: Program, kept: SolvedProgram) -> tuple[Program, np.ndarray] | None:
+        if not kept.reports:
+            return smaller, x
+        report = kept.report
+        is_free = kept.usable and not _is_held_back(kept)
+        if is_free or report.status is SolveStatus.TIME_LIMIT:
+            return None
+        # An unusable answer may have run out of iterations on its way.
+        return smaller, report.x if kept.usable or report.violation <= 1e-3 else x
+
+    # Closed forms may have no margins, or the start posture caps them.
+    programs = {
+        each.safeguard_bounds: each for each in map(program.with_margin, margins)
+    }
+    return improve(
+        SolvedProgram(program),
+        [partial(use, smaller) for smaller in programs.values()],
+        attempt_once(solve),
+        least_gain=WORTH_IT,
+        go_on_above=WORTH_IT,
+    )
+
+
+def _is_held_back(solved: SolvedProgram) -> bool:
+    """Tell whether a branch margin is so near to its bound that it holds the motion back."""
+    return solved.program.safeguard_slack(solved.report.x) <= 1e-4
 
 
 def solve_without_third_order_limits(
     program: Program, x: np.ndarray, solve: Solve, margin: float
 ) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
-    """Find a better starting point where limits ask for the third derivative: the answer without them, time-scaled.
+    """Find a better starting point for limits on the third derivative: the answer without them, time-scaled.
 
     Where the motion must slow down, such limits have local optima in which it all but stops. The fastest motion without
     them has slowed down where it must; its shape over time, slowed down as a whole, leads past them.
@@ -124,11 +115,11 @@ def solve_without_third_order_limits(
     Returns
     -------
     x : (v,) ndarray
-        The given point where there are no such limits, or where that solve failed.
+        The given point without such limits, or if that solve failed.
     reports : tuple of SolverReport
         Of the solve without them.
     """
-    easier = program.without_orders_above(_EASY)
+    easier = program.without_orders_above(2)
     if len(easier.limits) == len(program.limits):
         return x, ()
     report = solve(easier.with_margin(margin), x)
@@ -138,25 +129,10 @@ def solve_without_third_order_limits(
     return x, (report,)
 
 
-_TRANSVERSAL = 0.5
-"""Least transversality along the motion with which a chart is kept."""
-_RECENTRINGS = 3
-SELECTABLE = 0.05
-"""Least transversality along the motion of joints that may take the place of the chart's rows."""
-_SELECTED = (0, 3, 1)
-"""Choices of joints that are tried at most with no, one and several redundant joints: these solves take longest."""
-_CHOICES = 500
-"""Choices of joints that are looked at, at most."""
-_DENSE = 4
-_OUT_OF_TIME = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
-
-Solved = tuple[Program, tuple[SolverReport, ...]]
-
-
 def solve_in_chart(
     problem: Problem, program: Program, x: np.ndarray, solve: Solve
-) -> Solved:
-    """Solve in a chart, and go on in one around the motion where that is needed.
+) -> SolvedProgram:
+    """Solve in a chart, and go on in one around the motion if that is needed.
 
     Parameters
     ----------
@@ -169,93 +145,79 @@ def solve_in_chart(
 
     Returns
     -------
-    program : Program
+    SolvedProgram
         In the last chart.
-    reports : tuple of SolverReport
-        Of all solves; the last one belongs to `program`.
     """
-    first = MARGINS[:1]
-    further = MARGINS[1:]
-    program, reports = solve_by_margin_continuation(program, x, solve, first)
-    if not reports[-1].status.usable and reports[-1].status not in _OUT_OF_TIME:
-        program, more = solve_by_margin_continuation(program, x, solve, further)
-        reports += more
-    for _ in range(_RECENTRINGS):
-        if not reports[-1].status.usable or _follows(program, reports[-1].x):
-            break
-        moved = move_to_chart(problem, program, reports[-1].x)
-        if moved is None:
-            break
-        other, more = solve_by_margin_continuation(*moved, solve, first)
-        if not more[-1].status.usable:
-            reports = (*more, *reports)
-            break
-        gained = more[-1].objective < (1.0 - WORTH_IT) * reports[-1].objective
-        program = other
-        reports = reports + more
-        if not gained:
-            break
-    if (
-        reports[-1].status.usable
-        and program.safeguard_slack(reports[-1].x) <= HELD_BACK
-    ):
-        other, more = solve_by_margin_continuation(
-            program, reports[-1].x, solve, further
-        )
-        if more[-1].status.usable:
-            return other, reports + more
-        reports = (*more, *reports)
-    return program, reports
+
+    def solve_first(program: Program, x: np.ndarray) -> SolvedProgram:
+        return solve_by_margin_continuation(program, x, solve, MARGINS[:1])
+
+    def solve_further(program: Program, x: np.ndarray) -> SolvedProgram:
+        return solve_by_margin_continuation(program, x, solve, MARGINS[1:])
+
+    def follow(kept: SolvedProgram) -> tuple[Program, np.ndarray] | None:
+        if not kept.usable or _has_good_chart(kept):
+            return None
+        return move_to_chart(problem, kept)
+
+    out_of_time = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
+    solved = solve_first(program, x)
+    if not solved.usable and solved.report.status not in out_of_time:
+        solved = improve(solved, [_go_to((program, x))], solve_further)
+    solved = improve(solved, 3 * [follow], solve_first, go_on_above=WORTH_IT)
+    if solved.usable and _is_held_back(solved):
+        point = solved.program, solved.report.x
+        solved = improve(solved, [_go_to(point)], solve_further)
+    return solved
 
 
 def best_of_joints(
-    problem: Problem, program: Program, report: SolverReport, solve: Solve
-) -> Solved:
+    problem: Problem, solved: SolvedProgram, solve: Solve
+) -> SolvedProgram:
     """Solve again with joints in place of the chart's rows, and keep the fastest.
 
     Parameters
     ----------
     problem : Problem
-    program : Program
-        Of one phase in a chart.
-    report : SolverReport
-        Its answer.
+    solved : SolvedProgram
+        A program of one phase in a chart.
     solve : callable
 
     Returns
     -------
-    program : Program
-    reports : tuple of SolverReport
-        Of the further solves, then `report` if it belongs to `program`, else the one that does.
+    SolvedProgram
     """
-    best = program
-    last = report
-    others: list[SolverReport] = []
-    for rows in _selections(program, report.x):
-        moved = move_to_chart(problem, program, report.x, rows)
-        if moved is None:
-            continue
-        other, reports = solve_by_margin_continuation(*moved, solve, MARGINS)
-        others += reports
-        if reports[-1].status.usable and reports[-1].objective < last.objective:
-            best = other
-            last = reports[-1]
-    return best, (*(each for each in others if each is not last), last)
+
+    def solve_again(program: Program, x: np.ndarray) -> SolvedProgram:
+        return solve_by_margin_continuation(program, x, solve, MARGINS)
+
+    points = [move_to_chart(problem, solved, rows) for rows in _select_joints(solved)]
+    return improve(
+        solved,
+        [_go_to(point) for point in points if point is not None],
+        solve_again,
+        least_gain=0.0,
+        go_on_above=None,
+    )
+
+
+def _go_to(point: tuple[Program, np.ndarray]) -> Change:
+    """Change to a program and a point, whatever was kept so far."""
+    return lambda _kept: point
 
 
 def move_to_chart(
-    problem: Problem, program: Program, x: np.ndarray, rows: ChartRows | None = None
+    problem: Problem, solved: SolvedProgram, rows: ChartRows | None = None
 ) -> tuple[Program, np.ndarray] | None:
-    """Write a motion in a chart around itself; None where there is none.
+    """Write a motion in a chart around itself; None if it has none.
 
     Parameters
     ----------
     problem : Problem
-    program : Program
-        Of one phase.
-    x : (v,) ndarray
+    solved : SolvedProgram
+        A program of one phase.
     rows : ChartRows, optional
-        Of the chart; see `chart_around`.
+        Of the chart, as for `chart_around`.
 
     Returns
     -------
@@ -263,63 +225,53 @@ def move_to_chart(
     x : (v,) ndarray
         The same motion but for what splines of the new coordinates cannot say.
     """
-    (phase,) = program.phases
-    (motion,) = program.motions(x)
-    t_norm = np.linspace(0.0, 1.0, _DENSE * len(phase.t_norm) + 1)
+    (phase,) = solved.program.phases
+    (motion,) = solved.program.motions(solved.report.x)
+    t_norm = np.linspace(0.0, 1.0, 4 * len(phase.t_norm) + 1)
+    times = t_norm * motion.t_end
     try:
-        state = phase.joint_map.state(
-            *motion.at(t_norm * motion.t_end), t=t_norm * motion.t_end
-        )
+        state = phase.joint_map.state(*motion.at(times), t=times)
         s = state.y[:, 0]
         chart = chart_around(problem.task_map, problem.path, s, state.q, rows)
-        other = Program([phase_in(problem, chart, phase.grid)])
-        fit = fit_curves(
-            other.phases[0], motion.t_end, t_norm, chart.curves(s, state.q)
-        )
-        return other, shortest_time(other, fit)
+        program = Program([phase_in(problem, chart, phase.grid)])
+        curves = chart.curves(s, state.q)
+        fit = fit_curves(program.phases[0], motion.t_end, t_norm, curves)
+        return program, shortest_time(program, fit)
     except UnreachableError:
         return None
 
 
-def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
-    """Bases of the null spaces of the task Jacobian, (K, n, r), along a motion."""
-    (state,) = program.states(x)
-    (phase,) = program.phases
+def _self_motion(solved: SolvedProgram) -> tuple[ChartMap, np.ndarray, np.ndarray]:
+    """Return the chart, and along the motion s, (K,), and bases of the null spaces of the task Jacobian, (K, n, r)."""
+    (state,) = solved.program.states(solved.report.x)
+    (phase,) = solved.program.phases
     chart = phase.joint_map
     assert isinstance(chart, ChartMap)
-    return null_spaces(Newton(chart.task_map).task_coordinates(state.q)[1])
+    jacobian = Newton(chart.task_map).task_coordinates(state.q)[1]
+    return chart, state.y[:, 0], null_spaces(jacobian)
 
 
-def _follows(program: Program, x: np.ndarray) -> bool:
-    """Tell whether the chart still does for the motion."""
+def _has_good_chart(solved: SolvedProgram) -> bool:
+    """Tell whether the chart is transversal along the motion, and does not hold it back."""
     try:
-        (phase,) = program.phases
-        null = _self_motion(program, x)
-        chart = phase.joint_map
-        s = program.states(x)[0].y[:, 0]
-        assert isinstance(chart, ChartMap)
-        own = transversality(chart.rows.at(s)[0], null).min()
-        return program.safeguard_slack(x) > HELD_BACK and bool(own >= _TRANSVERSAL)
+        chart, s, null = _self_motion(solved)
+        least = transversality(chart.rows.at(s)[0], null).min()
+        return not _is_held_back(solved) and bool(least >= 0.5)
     except UnreachableError:
         return False
 
 
-def _selections(program: Program, x: np.ndarray) -> list[ChartRows]:
+def _select_joints(solved: SolvedProgram) -> list[ChartRows]:
     """Rows that select joints and are transversal along the motion, the most transversal ones first."""
-    null = _self_motion(program, x)
+    _, _, null = _self_motion(solved)
     n, r = null.shape[1:]
-    choices = [
-        list(joints)
-        for joints in itertools.islice(itertools.combinations(range(n), r), _CHOICES)
-    ]
-    least = [
-        float(transversality(np.eye(n)[joints][None], null).min()) for joints in choices
-    ]
-    ranked = sorted(range(len(choices)), key=lambda number: -least[number])[
-        : _SELECTED[min(r, 2)]
-    ]
-    return [
-        ChartRows.constant(np.eye(n)[choices[number]])
-        for number in ranked
-        if least[number] >= SELECTABLE
-    ]
+    # Three choices of one redundant joint and one of several are tried: these solves take longest.
+    most = (0, 3, 1)[min(r, 2)]
+    selections = []
+    for joints in itertools.islice(itertools.combinations(range(n), r), 500):
+        rows = np.eye(n)[list(joints)]
+        least = float(transversality(rows[None], null).min())
+        if least >= SELECTABLE:
+            selections.append((least, rows))
+    selections.sort(key=lambda item: -item[0])
+    return [ChartRows.constant(rows) for _, rows in selections[:most]]

@@ -1,42 +1,43 @@
-"""Starts: joint paths from which plans are begun, each with an estimate of its least time.
+"""Initial guesses: joint paths from lattices, each smoothed, with coordinates and an estimate of its least time.
 
-Joint paths around others, for arms with several redundant joints.
-
-The lattice's sample of such an arm's postures may hold a single class of joint paths, above all where both ends are
-given, and a solve from it ends at the optimum next to it. Solves from joint paths around it, displaced by waves over s,
-end at others.
-
-The start for a path of all joints: the phase plane's own timing along it.
+Of an arm with several redundant joints the lattice's sample of postures may hold a single class of joint paths, above
+all between two given ends, and a solve from it ends at the optimum next to it. Solves from joint paths around it,
+displaced by waves over s, end at others.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.errors import PathError
-from brachis.kinematics import ClosedFormMap, JointSpaceMap
+from brachis.common.progress import Listener
+from brachis.errors import PathError, UnreachableError
+from brachis.kinematics import CHART, JointSpaceMap, Newton, chart_around
 from brachis.limits import Limit
-from brachis.optimise.candidate import InitialGuess
+from brachis.optimise.candidate import InitialGuess, PathMap
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
-from brachis.robot import Robot
+from brachis.robot.task_map import JointSpace
 from brachis.search.closed_form_lattice import ClosedFormLattice, cell_sizes
 from brachis.search.differential_ik import differential_ik_paths
-from brachis.search.joint_path import DeadEnd, JointPath
-from brachis.search.levels import SearchLevel
+from brachis.search.failure import Failure
+from brachis.search.hopeless import refuse_hopeless
+from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
+from brachis.search.lattice import LARGEST_STEP
+from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time, least_times
+from brachis.search.posture_lattice import PostureLattice
+from brachis.search.processes import ignore
+from brachis.search.screening import screen
 
-PIECES = (3, 8)
-"""Pieces of the splines that smooth a joint path; more where it cannot be followed so."""
-_START_WEIGHT = 1e3
-_FINER = 3
-_DENSER = 2.0
-_FINEST = 96
+SCREENED = 4
+"""So many times the joint paths that a level plans are looked at."""
+FAMILY = "path of joints"
+"""Family, and origin, of the guess for a path of joints."""
 
 
 def lattice_starts(
@@ -57,90 +58,69 @@ def lattice_starts(
 
     Returns
     -------
-    list of Start or DeadEnd
-        Empty where the time was up.
+    list of InitialGuess or DeadEnd
+        Empty if the time was up.
     """
-    cells = level.cells_per_turn
-    nodes = level.nodes
-    most = max(1, level.joint_paths // max(1, len(decomposition.redundant))) * len(
-        decomposition.branches
-    )
-    lattice = ClosedFormLattice(
-        decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline
-    )
-    found = lattice.joint_paths(most)
-    if isinstance(found, DeadEnd):
-        finer = ClosedFormLattice(
+    most = max(1, level.joint_paths // max(1, len(decomposition.redundant)))
+    for finer, density in ((1, 1.0), (3, 2.0)):
+        lattice = ClosedFormLattice(
             decomposition,
-            cells_per_turn=_FINER * cells,
-            density=_DENSER,
-            nodes=_FINER * nodes,
+            cells_per_turn=finer * level.cells_per_turn,
+            density=density,
+            nodes=finer * level.nodes,
             seed=seed,
             deadline=deadline,
         )
-        found = finer.joint_paths(most)
-    if isinstance(found, DeadEnd):
-        return found
-    return [
-        _start_along(decomposition, joint_path, f"lattice {number}")
-        for number, joint_path in enumerate(found, 1)
-    ]
+        found = lattice.joint_paths(most * len(decomposition.branches))
+        if not isinstance(found, DeadEnd):
+            return [
+                _guess_on_branch(decomposition, joint_path, f"lattice {number}")
+                for number, joint_path in enumerate(found, 1)
+            ]
+        dead_end = found
+    return dead_end
 
 
-def _start_along(
+def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; at last linear interpolation."""
+    from scipy.interpolate import make_lsq_spline
+
+    s = joint_path.s
+    # More finely than at the lattice's stations.
+    fine = np.linspace(0.0, 1.0, max(2 * len(s) - 1, 97))
+    weights = np.ones(len(s))
+    weights[[0, -1]] = 1e3  # nearly exact at both ends
+    for pieces in (3, 8):
+        knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, pieces + 1), np.ones(3)]
+        spline = make_lsq_spline(s, joint_path.q, knots, k=3, w=weights)
+        yield fine, np.asarray(spline(fine))
+    columns = [np.interp(fine, s, column) for column in joint_path.q.T]
+    yield fine, np.column_stack(columns)
+
+
+def _guess_on_branch(
     decomposition: Decomposition, joint_path: JointPath, origin: str
 ) -> InitialGuess:
     """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
-    s = joint_path.s
-    redundant = joint_path.q[:, list(decomposition.redundant)]
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
-    places = fine_places(s)
-    for pieces in PIECES:
-        stations = np.column_stack([places, smooth(s, redundant, places, pieces)])
-        q = joint_map.postures(stations)
-        if np.isfinite(q).all() and _clear(joint_map, q):
-            break
+    redundant = list(decomposition.redundant)
+    for s, smoothed in itertools.islice(_smooth(joint_path), 2):
+        curves = np.column_stack([s, smoothed[:, redundant]])
+        q = joint_map.postures(curves)
+        if np.isfinite(q).all():
+            # It keeps clear of the branch boundary, where the start does.
+            margins = joint_map.branch_margins(q)
+            least = min(0.02, float(margins[0].min(initial=np.inf)))
+            if margins.min(initial=np.inf) > 0.5 * least:
+                break
     else:
-        places = s
-        stations = np.column_stack([s, redundant])
+        s = joint_path.s
         q = joint_path.q
-    estimate = least_time(decomposition.problem.limits, places, q)
-    return InitialGuess(
-        decomposition.problem,
-        joint_map,
-        stations,
-        estimate,
-        origin,
-        decomposition.match.family,
-    )
-
-
-def fine_places(s: np.ndarray) -> np.ndarray:
-    """Path coordinates at which a joint path is looked at more finely than at its stations, (S,)."""
-    return np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
-
-
-def smooth(
-    s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int
-) -> np.ndarray:
-    """Least-squares cubic splines through values (S, r), nearly exact at both ends, at the places `fine`."""
-    from scipy.interpolate import make_lsq_spline
-
-    if not values.shape[1]:
-        return np.zeros((len(fine), 0))
-    knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, pieces + 1), np.ones(3)])
-    weights = np.ones(len(s))
-    weights[[0, -1]] = _START_WEIGHT
-    return np.asarray(make_lsq_spline(s, values, knots, k=3, w=weights)(fine))
-
-
-def _clear(joint_map: ClosedFormMap, q: np.ndarray) -> bool:
-    """Tell whether a joint path keeps clear of the branch boundary, (K, n)."""
-    margins = joint_map.branch_margins(q)
-    return bool(
-        margins.min(initial=np.inf)
-        > 0.5 * min(0.02, float(margins[0].min(initial=np.inf)))
-    )
+        curves = np.column_stack([s, q[:, redundant]])
+    problem = decomposition.problem
+    estimate = least_time(problem.limits, s, q)
+    family = decomposition.match.family
+    return InitialGuess(problem, joint_map, curves, estimate, origin, family)
 
 
 def numeric_starts(
@@ -151,35 +131,98 @@ def numeric_starts(
     Parameters
     ----------
     decomposition : Decomposition
-        With a given start posture.
+        Without a given start posture there are no ways.
     most : int
     deadline : Deadline
 
     Returns
     -------
-    list of Start
+    list of InitialGuess
     """
-    start = decomposition.problem.start
-    if start is None:
+    problem = decomposition.problem
+    if problem.start is None:
         return []
-    joint_map = decomposition.joint_map(start, decomposition.branches[0])
+    joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
     joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
+    family = decomposition.match.family
     return [
         InitialGuess(
-            decomposition.problem,
-            joint_map,
-            joint_path,
-            np.inf,
-            f"numeric {number}",
-            decomposition.match.family,
+            problem, joint_map, joint_path, np.inf, f"numeric {number}", family
         )
         for number, joint_path in enumerate(joint_paths, 1)
     ]
 
 
-_LARGEST = 1.0 / 16.0
-_SIZES = 4
-"""Standard deviation of the largest waves, in turns, and how many sizes there are, each half the one before."""
+def chart_starts(
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    level: SearchLevel,
+    deadline: Deadline = NEVER,
+    listener: Listener = ignore,
+) -> list[InitialGuess] | DeadEnd:
+    """Take the shortest distinct joint paths from the lattice of all postures, each with a chart around it.
+
+    Parameters
+    ----------
+    problem : Problem
+    decompositions : sequence of Decomposition
+        Their closed forms give postures to begin with if neither end is given.
+    level : SearchLevel
+    deadline : Deadline, optional
+    listener : callable, optional
+
+    Returns
+    -------
+    list of InitialGuess or DeadEnd
+        Those with the least estimated times first; empty if the time was up.
+
+    Raises
+    ------
+    PlanningError
+        No motion along any joint path can hold a least speed, or a mean of a load.
+    """
+    seed = problem.task.search.seed
+    for finer in (1, 2):
+        lattice = PostureLattice(
+            problem,
+            decompositions,
+            cells_per_turn=finer * level.cells_per_turn,
+            density=float(finer),
+            nodes=finer * level.nodes // 2,
+            only_minima=level.only_minima,
+            seed=seed,
+            deadline=deadline,
+        )
+        found = lattice.joint_paths(SCREENED * level.in_charts)
+        if not isinstance(found, DeadEnd):
+            break
+    if isinstance(found, DeadEnd):
+        return found
+    if not found:
+        return []
+    named = [
+        (f"lattice {number}" + (f", from {each.seed}" if each.seed else ""), each)
+        for number, each in enumerate(found, 1)
+    ]
+    if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:
+        more = perturb(found, 2 * level.in_charts - len(found), seed)
+        named += [(f"perturbed {number}", each) for number, each in enumerate(more, 1)]
+    newton = Newton(problem.task_map)
+    guesses = []
+    for origin, joint_path in named:
+        if joint_path is not found[0] and deadline.passed:
+            break
+        guess = _guess_in_chart(newton, joint_path, origin)
+        if guess is not None:
+            guesses.append(guess)
+    if not guesses:
+        return [] if deadline.passed else DeadEnd(0.0, {NO_CHART: len(named)})
+    guesses.sort(key=lambda guess: guess.estimate)
+    refuse_hopeless(guesses)
+    # Joint paths whose estimated time is three times the least one are hopeless.
+    longest = 3.0 * guesses[0].estimate
+    hopeful = [guess for guess in guesses if guess.estimate <= longest]
+    return screen(hopeful, level.in_charts, deadline, listener)
 
 
 def perturb(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[JointPath]:
@@ -196,47 +239,73 @@ def perturb(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[Join
     Returns
     -------
     list of JointPath
-        Within the joints' ranges and from the given ends, but beside the prescribed path: the nearest postures on it
+        Within the joints' ranges and from the given ends, but not on the prescribed path: the nearest postures on it
         are meant.
     """
     rng = np.random.default_rng(seed)
-    robot = joint_paths[0].problem.robot
-    limits = joint_paths[0].problem.robot.limits
-    size = _LARGEST * cell_sizes(robot.revolute, 1)
-    found = []
-    for number in range(most):
-        given = joint_paths[number % len(joint_paths)]
-        waves = _waves(given)
-        heights = rng.normal(
-            0.0,
-            size / 2.0 ** (number // len(joint_paths) % _SIZES),
-            (len(waves), robot.n),
-        )
-        q = np.clip(
-            given.q + waves.T @ heights, limits.position_lower, limits.position_upper
-        )
-        found.append(dataclasses.replace(given, q=q))
-    return found
-
-
-def _waves(joint_path: JointPath) -> np.ndarray:
-    """Displacements over s, (W, S + 1): zero at the ends that are given."""
-    s = joint_path.s
-    problem = joint_path.problem
+    problem = joint_paths[0].problem
+    s = joint_paths[0].s
     waves = [np.sin(np.pi * s), 0.5 * np.sin(2.0 * np.pi * s)]
     if problem.start is None:
         waves.append(1.0 - s)
     if problem.end is None:
         waves.append(s)
-    return np.array(waves)
+    limits = problem.robot.limits
+    # Standard deviations of a 16th of a turn, then of half as much, and so on: four sizes.
+    size = cell_sizes(problem.robot.revolute, 16)
+    found = []
+    for number in range(most):
+        given = joint_paths[number % len(joint_paths)]
+        own = size / 2.0 ** (number // len(joint_paths) % 4)
+        heights = rng.normal(0.0, own, (len(waves), problem.robot.n))
+        q = given.q + np.array(waves).T @ heights
+        q = np.clip(q, limits.position_lower, limits.position_upper)
+        found.append(dataclasses.replace(given, q=q))
+    return found
 
 
-FAMILY = "path of joints"
-_STATIONS = 401
+def _guess_in_chart(
+    newton: Newton, joint_path: JointPath, origin: str
+) -> InitialGuess | None:
+    """Smooth a joint path, lay a chart around it, and estimate its time; None if no chart can follow it."""
+    problem = joint_path.problem
+    for s, smoothed in _smooth(joint_path):
+        try:
+            q = bring_onto_path(problem, newton, s, smoothed)
+            chart = chart_around(problem.task_map, problem.path, s, q)
+        except UnreachableError:
+            continue
+        if problem.task.boundary.periodic and not chart.rows.closes:
+            continue
+        estimate = least_time(problem.limits, s, q)
+        curves = chart.curves(s, q)
+        return InitialGuess(problem, chart, curves, estimate, origin, CHART)
+    return None
+
+
+def bring_onto_path(
+    problem: Problem, newton: Newton | None, s: np.ndarray, q: np.ndarray
+) -> np.ndarray:
+    """Find the postures (S, n) on the path nearest to given ones, with the ends that the task gives.
+
+    Raises
+    ------
+    UnreachableError
+        There are none, or they jump.
+    """
+    if newton is not None:
+        q = newton.nearest(problem.path.sample(s).target, q)
+    for place, posture in ((0, problem.start), (-1, problem.end)):
+        if posture is not None:
+            q[place] = posture
+    steps = np.abs(np.diff(q, axis=0))
+    if not (np.isfinite(q).all() and steps.max(initial=0.0) <= LARGEST_STEP):
+        raise UnreachableError("its postures cannot be brought onto the path")
+    return q
 
 
 def joint_space_start(problem: Problem) -> InitialGuess:
-    """Time the path in the phase plane, and start from there.
+    """Time a path of joints in the phase plane, and start from there.
 
     Parameters
     ----------
@@ -245,24 +314,21 @@ def joint_space_start(problem: Problem) -> InitialGuess:
 
     Returns
     -------
-    Start
+    InitialGuess
 
     Raises
     ------
     PathError
         The path leaves the joint ranges, or no motion along it was found and the arm cannot hold a posture on it.
     """
-    s = np.linspace(0.0, 1.0, _STATIONS)
+    s = np.linspace(0.0, 1.0, 401)
     q = problem.path.sample(s).target
     times = least_times(problem.limits, s, q, problem.end_rates)
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
-        if limit.at_rest != "nothing" and (
-            times is None or limit.longer_time != "relieves"
-        ):
-            _refuse_beyond(
-                problem.robot, limit, s, q, problem.task.refinement.tolerance
-            )
+        is_needed = times is None or limit.longer_time != "relieves"
+        if limit.at_rest != "nothing" and is_needed:
+            _refuse_beyond(problem, limit, s, q)
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if times is None:
         return InitialGuess(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
@@ -272,26 +338,55 @@ def joint_space_start(problem: Problem) -> InitialGuess:
 
 
 def _refuse_beyond(
-    robot: Robot, limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float
+    problem: Problem, limit: Limit, s: np.ndarray, q: np.ndarray
 ) -> None:
     """Refuse a path along which the arm at rest is beyond a limit."""
-    values, beyond = beyond_at_rest(limit, q, tolerance)
-    station, column = (
-        int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape)
-    )
-    if beyond[station, column] <= 0.0:
+    values, beyond = beyond_at_rest(limit, q, problem.task.refinement.tolerance)
+    station, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    worst = float(beyond[station, column])
+    if worst <= 0.0:
         return
     where = s[beyond[:, column] > 0.0]
     label = limit.labels[column]
-    found, allowed = in_figures(limit, column, float(values[station, column]))
-    error = PathError(
+    found, allowed = in_figures(limit, int(column), float(values[station, column]))
+    remedies = load_remedies(problem.robot, limit, int(column), 1.0 + worst)
+    failure = Failure(
         f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
+        phase="path",
         s_interval=(float(where[0]), float(where[-1])),
         where="path",
         found=f"{found} {label.unit} at s = {s[station]:.3g}",
-        allowed=f"{allowed} {label.unit}",
+        needed=f"{allowed} {label.unit}",
         hint="Lead the path elsewhere",
+        remedies=tuple(remedies),
     )
-    raise error.with_remedies(
-        *load_remedies(robot, limit, column, 1.0 + float(beyond[station, column]))
+    raise failure.error()
+
+
+def first_map(
+    problem: Problem, decompositions: Sequence[Decomposition]
+) -> tuple[PathMap, str]:
+    """Return a joint map of the problem, of a closed form if there is one, and its family.
+
+    It begins at the given start posture, or if that is free at that of the first joint path.
+
+    Raises
+    ------
+    PathError
+        The lattice has no joint path.
+    """
+    if isinstance(problem.task_map, JointSpace):
+        start = joint_space_start(problem)
+        return start.joint_map, start.family
+    first = next(iter(decompositions), None)
+    if first is not None and problem.start is not None:
+        return first.joint_map(problem.start, first.branches[0]), first.match.family
+    level = SEARCH_LEVELS["fast"][0]
+    found = (
+        chart_starts(problem, decompositions, level)
+        if first is None
+        else lattice_starts(first, level, problem.task.search.seed)
     )
+    if isinstance(found, DeadEnd):
+        raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
+    return found[0].joint_map, found[0].family

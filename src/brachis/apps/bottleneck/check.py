@@ -174,7 +174,7 @@ def check_sensitivities(
     Parameters
     ----------
     refined : SolvedProgram
-        ``result.attempt.refined``.
+        ``result.candidate.refined``.
     predictions : Sensitivities, optional
         What is checked; by default what `sensitivities` says.
     step : float, optional

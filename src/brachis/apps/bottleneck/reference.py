@@ -109,7 +109,7 @@ def find_reference(
     Parameters
     ----------
     refined : SolvedProgram
-        ``result.attempt.refined``.
+        ``result.candidate.refined``.
     tolerance : float, optional
         Largest violation of a limit, as a fraction of it.
     intervals : int, optional

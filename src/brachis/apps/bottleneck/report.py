@@ -72,7 +72,7 @@ def solved_again(trajectory: Trajectory) -> SolvedProgram:
     Returns
     -------
     SolvedProgram
-        As ``result.attempt.refined`` of the plan.
+        As ``result.candidate.refined`` of the plan.
 
     Raises
     ------
@@ -290,7 +290,7 @@ def report(
     if isinstance(motion, Trajectory):
         trajectory = motion
         refined = solved_again(motion)
-    elif motion.attempt.refined is None:
+    elif motion.candidate.refined is None:
         raise InputError(
             "the result holds no solved problem",
             where="result",
@@ -298,7 +298,7 @@ def report(
         )
     else:
         trajectory = motion.trajectory
-        refined = motion.attempt.refined
+        refined = motion.candidate.refined
     found = sensitivities(refined)
     tolerance = trajectory.task.refinement.tolerance
     limits = [

@@ -391,7 +391,7 @@ def sensitivities(refined: SolvedProgram) -> Sensitivities:
     Parameters
     ----------
     refined : SolvedProgram
-        ``result.attempt.refined``.
+        ``result.candidate.refined``.
 
     Returns
     -------

@@ -146,9 +146,9 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
     from brachis.optimise.candidate import coordinates
 
     console = result_console()
-    attempt = result.attempt
+    candidate = result.candidate
     trajectory = result.trajectory
-    iterations = sum(report.iterations for report in attempt.reports)
+    iterations = sum(report.iterations for report in candidate.reports)
     named = trajectory.branch not in {"", result.family}
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
@@ -158,8 +158,8 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         "end posture": _posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
-        "iterations": f"{iterations} in {write_count(len(attempt.reports), 'solve')} "
-        f"(refined to {attempt.collocation_points} collocation points)",
+        "iterations": f"{iterations} in {write_count(len(candidate.reports), 'solve')} "
+        f"(refined to {candidate.collocation_points} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",
         "least motion": "off"
         if result.least_motion is None
@@ -168,8 +168,8 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         "path error": f"{result.verification.path_error:.1e} m or rad",
         "verified": "yes" if result.verified else "NO",
     }
-    if attempt.time_scaled > 1.0:
-        share = 100.0 * (attempt.time_scaled - 1.0)
+    if candidate.time_scaled > 1.0:
+        share = 100.0 * (candidate.time_scaled - 1.0)
         rows["end time lengthened by"] = (
             f"{share:.2g} % to meet the limits between collocation points"
         )

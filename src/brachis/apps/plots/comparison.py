@@ -220,7 +220,7 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
 
     Parameters
     ----------
-    candidates : sequence of Attempt
+    candidates : sequence of Candidate
         The fastest verified one first, as a `Result` has them.
 
     Returns

@@ -40,7 +40,7 @@ class ReportedMotion:
         What is implausible in robot and task.
     not_completed : tuple of str
         What the search did not complete.
-    candidates : tuple of Attempt
+    candidates : tuple of Candidate
         What the search looked at; none for a saved motion.
     planned : dict of str to str
         How the motion was planned, where that is known.
@@ -79,10 +79,10 @@ def reported_motion(
         remarks = motion.warnings
         candidates = motion.candidates
         planned = _describe_plan(motion)
-        if motion.attempt.refined is not None:
+        if motion.candidate.refined is not None:
             limits = [
                 limit
-                for limit in motion.attempt.refined.program.limits
+                for limit in motion.candidate.refined.program.limits
                 if limit.role is not Role.SAFEGUARD
             ]
         if motion.interrupted:
@@ -123,7 +123,7 @@ def _describe_plan(result: PlannedMotion) -> dict[str, str]:
     least = result.least_motion
     return {
         "solver": f"{report.solver}, {report.status.value}",
-        "collocation points": str(result.attempt.collocation_points),
+        "collocation points": str(result.candidate.collocation_points),
         "planning time": f"{result.timing['total']:.2f} s",
         "least motion": "off" if least is None else least.status,
     }

@@ -112,7 +112,7 @@ def _facts(result: Result, wall_time: float) -> dict[str, Any]:
         "chosen_joints": ", ".join(result.trajectory.redundant_joints),
         "chosen_branch": result.trajectory.branch,
         "chosen_solver": result.solver_report.solver,
-        "iterations": sum(report.iterations for report in result.attempt.reports),
+        "iterations": sum(report.iterations for report in result.candidate.reports),
         "wall_time_s": wall_time,
         "remarks": "; ".join(remarks) or None,
     }

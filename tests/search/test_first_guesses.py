@@ -23,7 +23,7 @@ def breaks(times: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
     start = SimpleNamespace(problem=SimpleNamespace(task=load_task(TASK)))
     monkeypatch.setattr(
         phase_plane,
-        "_paced",
+        "_least_speed_guess",
         lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times),
     )
     return phase_plane.initial_knots(start)
@@ -49,7 +49,7 @@ def test_knots_are_closer_where_the_speed_changes(monkeypatch):
 
 
 def test_intervals_grow_by_half_with_their_distance_from_a_switch():
-    found = phase_plane._graded(np.array([0.0, 0.3, 1.0]), 24)
+    found = phase_plane.grade_knots(np.array([0.0, 0.3, 1.0]), 24)
     lengths, middle = np.diff(found), 0.5 * (found[1:] + found[:-1])
     away = np.abs(middle[:, None] - [0.0, 0.3, 1.0]).min(axis=1)
     assert len(lengths) == 24
@@ -59,6 +59,6 @@ def test_intervals_grow_by_half_with_their_distance_from_a_switch():
 
 
 def test_more_intervals_than_switches_need_are_spread_over_the_whole_time():
-    lengths = np.diff(phase_plane._graded(np.array([0.0, 0.3, 1.0]), 400))
+    lengths = np.diff(phase_plane.grade_knots(np.array([0.0, 0.3, 1.0]), 400))
     assert lengths.min() > 1e-6
     assert lengths.max() < 0.04

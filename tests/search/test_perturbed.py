@@ -9,7 +9,7 @@ import pytest
 
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
-from brachis.search import chart_starts as module
+from brachis.search import starts as module
 from brachis.search.joint_path import JointPath
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import perturb
@@ -66,7 +66,7 @@ def test_they_are_the_same_for_the_same_seed():
 
 def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
     """The lattice ends in one node there, and has few joint paths."""
-    monkeypatch.setattr(module, "screened", lambda starts, *_others: starts)
+    monkeypatch.setattr(module, "screen", lambda starts, *_others: starts)
     end = [0.62, 0.62, 0.35, -1.1, 0.3, 0.8, 0.1]
     robot = Robot.from_urdf(URDF)
     places = [
@@ -78,7 +78,7 @@ def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
     (level,) = SEARCH_LEVELS["fast"]
     starts = module.chart_starts(problem, decompositions_of(problem), level)
     assert isinstance(starts, list)
-    assert any(start.origin.startswith("varied") for start in starts)
+    assert any(start.origin.startswith("perturbed") for start in starts)
     for start in starts:
         q = start.joint_map.postures(start.joint_path)
         np.testing.assert_allclose(q[[0, -1]], [START, end], atol=1e-8)
