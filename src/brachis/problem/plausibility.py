@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError, write_apart
-from brachis.problem.plausible_limits import FASTEST, limit_figures
+from brachis.problem.plausible_limits import limit_figures
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import UNITS
 from brachis.robot.plausibility import Figure, Remark, link_lengths, reach, remarks
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
 from brachis.task import Task, ToolPose
+from brachis.task.limit_kinds import FASTEST
 from brachis.task.limit_models import SpeedTable
 
 if TYPE_CHECKING:

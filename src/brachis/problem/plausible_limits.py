@@ -4,74 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.robot import Robot
 from brachis.robot.joints import UNITS
-from brachis.robot.limits import STATED
 from brachis.robot.plausibility import Figure, link_lengths
+from brachis.task import LIMIT_KINDS
+from brachis.task.limit_kinds import FASTEST, UsualLimit
 
 _HOLDS = 50.0
 """Arms hold a tenth to five times their own weight at full reach."""
-
-
-@dataclass(frozen=True)
-class Rule:
-    """What is usual of the limits of one kind.
-
-    Attributes
-    ----------
-    looks : dict of str to str
-        What unit larger ones look like, by the unit of the joint's position.
-    most : dict of str to float
-        Largest usual limit, whatever the robot.
-    stated : str
-        Kind of limit that the URDF states and that it is compared with; empty where there is none.
-    times : float
-        So many times the URDF's are usual.
-    least : float
-        But whatever the URDF states, this is.
-    weighed : bool
-        Whether a torque is compared with the arm's weight.
-    overridden : bool
-        Whether the speed override takes its share.
-    by_curve : bool
-        Whether a torque-speed curve takes its place.
-    """
-
-    looks: dict[str, str]
-    most: dict[str, float]
-    stated: str = ""
-    times: float = math.inf
-    least: float = 0.0
-    weighed: bool = False
-    overridden: bool = False
-    by_curve: bool = False
-
-
-FASTEST = {"rad": 60.0, "m": 50.0}
-"""The quickest axes of small SCARA and delta robots turn at 50 rad/s; rails move at 10 m/s. In degrees and mm: more."""
-_ANY = {"rad": math.inf, "m": math.inf}
-_TORQUE = Rule({"rad": "mNm", "m": "mN"}, _ANY, "torque", 100.0, weighed=True)
-_VELOCITY = Rule(
-    {"rad": "degrees per second", "m": "mm per second"},
-    FASTEST,
-    "velocity",
-    10.0,
-    10.0,
-    overridden=True,
-)
-RULES = {
-    "torque": replace(_TORQUE, by_curve=True),
-    "rms_torque": _TORQUE,
-    "velocity": _VELOCITY,
-    "acceleration": Rule(
-        {"rad": "degrees per second^2", "m": "mm/s^2"}, {"rad": 500.0, "m": 300.0}
-    ),
-}
-"""By kind of limit; wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2."""
 
 
 def limit_figures(robot: Robot) -> Iterator[Figure]:
@@ -81,66 +24,62 @@ def limit_figures(robot: Robot) -> Iterator[Figure]:
 
 
 def _magnitudes(robot: Robot) -> Iterator[Figure]:
-    for kind, rule in RULES.items():
-        values = np.abs(robot.limits.both_ways(kind)).max(axis=0) / getattr(
-            robot.settings.limits.scale, kind
-        )
-        if rule.overridden:
+    for kind, row in LIMIT_KINDS.items():
+        usual = row.usual
+        if usual is None:
+            continue
+        values = np.abs(robot.limits.both_ways(kind)).max(axis=0)
+        values = values / getattr(robot.settings.limits.scale, kind)
+        if kind == "velocity":
             values = values / robot.settings.speed_override
-        usual = _usual(robot, rule)
+        largest = _largest(robot, usual)
         for i, (name, unit, value) in enumerate(
             zip(robot.joint_names, robot.position_units, values, strict=True)
         ):
-            curved = rule.by_curve and robot.limits.torque_speed[i]
-            if not curved and not _placeholder(
-                value, rule, usual(i), _stated(robot, rule, i)
+            has_curve = kind == "torque" and robot.limits.torque_speed[i]
+            if not has_curve and not _placeholder(
+                value, usual, largest(i), _stated(robot, usual, i)
             ):
-                message = (
-                    f"the {kind.replace('_', ' ')} limit looks like {rule.looks[unit]}"
-                )
                 yield Figure(
                     f"robot.limits.{kind}.{name}",
-                    message,
+                    f"the {row.name.replace('_', ' ')} limit looks like {usual.mistaken_unit[unit]}",
                     float(value),
-                    usual(i),
-                    UNITS[kind][unit],
+                    largest(i),
+                    row.units[unit],
                 )
 
 
-def _placeholder(value: float, rule: Rule, usual: float, stated: float | None) -> bool:
+def _placeholder(
+    value: float, usual: UsualLimit, largest: float, stated: float | None
+) -> bool:
     """Tell whether a limit is written for "no limit": a power of ten, of torques one that no figure in mNm can be."""
     if not 0.0 < value < math.inf:
         return True
     if not round(math.log10(value), 9).is_integer():
         return False
-    return not rule.weighed or value == stated or value > 1e3 * usual
+    return not usual.compares_weight or value == stated or value > 1e3 * largest
 
 
-def _stated(robot: Robot, rule: Rule, joint: int) -> float | None:
+def _stated(robot: Robot, usual: UsualLimit, joint: int) -> float | None:
     """Return the URDF's limit that a joint's is compared with."""
-    found: float | None = getattr(
-        robot.stated_limits[joint], STATED.get(rule.stated, ""), None
-    )
-    return found
+    kind = usual.urdf_kind
+    return robot.stated_limits[joint].of_kind(kind) if kind else None
 
 
-def _usual(robot: Robot, rule: Rule) -> Callable[[int], float]:
+def _largest(robot: Robot, usual: UsualLimit) -> Callable[[int], float]:
     """Return what gives the largest usual limit of a joint."""
-    weight = (
-        sum(inertia.mass for inertia in list(robot.model.inertias)[1:])
-        * 9.81
-        * sum(link_lengths(robot))
-    )
+    mass = sum(inertia.mass for inertia in list(robot.model.inertias)[1:])
+    weight = mass * 9.81 * sum(link_lengths(robot))
 
     def of_joint(joint: int) -> float:
         unit = robot.position_units[joint]
-        stated = _stated(robot, rule, joint)
-        most = [rule.most[unit]]
-        if rule.weighed and unit == "rad" and weight > 0.0:
+        stated = _stated(robot, usual, joint)
+        most = [usual.largest[unit]]
+        if usual.compares_weight and unit == "rad" and weight > 0.0:
             most.append(_HOLDS * weight)
         # URDFs state 1 for a limit that nobody knows.
         if stated and stated != 1.0:
-            most.append(max(rule.times * stated, rule.least))
+            most.append(max(usual.urdf_factor * stated, usual.urdf_least))
         return float(min(most))
 
     return of_joint
@@ -183,9 +122,11 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
 def _curves(robot: Robot) -> Iterator[Figure]:
     """Look at the torques and the speeds of torque-speed curves."""
     scale = robot.settings.limits.scale.torque
-    torque = _usual(robot, _TORQUE)
+    usual_torque = LIMIT_KINDS["torque"].usual
+    assert usual_torque is not None
+    torque = _largest(robot, usual_torque)
     # Without load motors turn at up to twice the rated speed; rpm are 9.5 times rad/s.
-    velocity = _usual(robot, Rule({}, FASTEST, "velocity", 5.0, 5.0))
+    velocity = _largest(robot, UsualLimit({}, FASTEST, "velocity", 5.0, 5.0))
     rows = zip(
         robot.joint_names, robot.position_units, robot.limits.torque_speed, strict=True
     )
@@ -204,5 +145,5 @@ def _curves(robot: Robot) -> Iterator[Figure]:
             UNITS["velocity"][unit],
             aside,
         )
-        said = f"the torque of the curve looks like {_TORQUE.looks[unit]}"
+        said = f"the torque of the curve looks like {usual_torque.mistaken_unit[unit]}"
         yield Figure(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.limits import Limit
+from brachis.limits import HasPhasePlaneRows, Limit
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
 from brachis.optimise.program import Program
@@ -156,22 +156,22 @@ def _lines(
         np.column_stack([np.interp(places, s, column) for column in order.T])
         for order in orders
     ]
-    lines = [limit.lines(places, *joints) for limit in limits]
     floor = np.zeros(len(places))
     ceiling = np.full(len(places), np.inf)
     sloped = []
-    for line in lines:
-        if line is None:
+    for limit in limits:
+        if not isinstance(limit, HasPhasePlaneRows):
             continue
-        if line.u is None:
+        rows = limit.phase_plane_rows(places, *joints)
+        if rows.u is None:
             with np.errstate(divide="ignore", invalid="ignore"):
-                level = (1.0 - line.constant) / line.x
+                level = (1.0 - rows.constant) / rows.x
             ceiling = np.minimum(
-                ceiling, np.where(line.x > 0.0, level, np.inf).min(axis=1)
+                ceiling, np.where(rows.x > 0.0, level, np.inf).min(axis=1)
             )
-            floor = np.maximum(floor, np.where(line.x < 0.0, level, 0.0).max(axis=1))
+            floor = np.maximum(floor, np.where(rows.x < 0.0, level, 0.0).max(axis=1))
         else:
-            sloped.append((line.u, line.x, line.constant))
+            sloped.append((rows.u, rows.x, rows.constant))
     a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
     # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
     a = np.where(np.abs(a) < _SLOWEST, _SLOWEST, a)

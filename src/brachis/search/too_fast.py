@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import PlanningError, Remedy, UnreachableError
-from brachis.limits import JointMotion, Limit, Moments
+from brachis.limits import HasPhasePlaneRows, JointStates, Limit, Moments
 from brachis.limits.tool import ToolSpeed
 from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.feasibility import in_figures
@@ -224,7 +224,7 @@ def _ends_too_fast(
 
 
 def _falling_short(
-    start: InitialGuess, motion: JointMotion, how: str, s: np.ndarray, q: np.ndarray
+    start: InitialGuess, motion: JointStates, how: str, s: np.ndarray, q: np.ndarray
 ) -> TooFast | None:
     """Tell where a motion, whose places ascend, falls short of a least speed most; None where it does not.
 
@@ -318,17 +318,17 @@ def _find_speed_cap(
     bend = -np.gradient(slope, s) / np.maximum(slope, _STILL)
     worst = _SpeedCap(math.inf)
     for limit in _others(problem):
-        lines = limit.lines(s[inside], q[inside], q_ds[inside], q_dds[inside])
-        if lines is None:
+        if not isinstance(limit, HasPhasePlaneRows):
             continue
-        slant = lines.x
+        rows = limit.phase_plane_rows(s[inside], q[inside], q_ds[inside], q_dds[inside])
+        slant = rows.x
         lower = -np.inf
-        if lines.u is not None:
-            slant = lines.x + lines.u * bend[inside, None]
+        if rows.u is not None:
+            slant = rows.x + rows.u * bend[inside, None]
             lower = -1.0
         with np.errstate(divide="ignore", invalid="ignore"):
             level = (
-                np.where(slant > 0.0, 1.0 - lines.constant, lower - lines.constant)
+                np.where(slant > 0.0, 1.0 - rows.constant, lower - rows.constant)
                 / slant
             )
         squares = (

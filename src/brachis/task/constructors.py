@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from brachis.common.arguments import check_keywords
 from brachis.task.fields import Model, plain
 from brachis.task.fitted import Wanted, segments_along
-from brachis.task.limit_models import Array
+from brachis.task.limit_kinds import Array
 from brachis.task.messages import task_error
 from brachis.task.orientation import OrientationMode
 from brachis.task.point_data import FileUnits, FitTolerance
