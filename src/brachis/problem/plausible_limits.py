@@ -30,13 +30,13 @@ def _magnitudes(robot: Robot) -> Iterator[Figure]:
             continue
         values = np.abs(robot.limits.both_ways(kind)).max(axis=0)
         values = values / getattr(robot.settings.limits.scale, kind)
-        if kind == "velocity":
+        if usual.overridden:
             values = values / robot.settings.speed_override
         largest = _largest(robot, usual)
         for i, (name, unit, value) in enumerate(
             zip(robot.joint_names, robot.position_units, values, strict=True)
         ):
-            has_curve = kind == "torque" and robot.limits.torque_speed[i]
+            has_curve = usual.by_curve and robot.limits.torque_speed[i]
             if not has_curve and not _placeholder(
                 value, usual, largest(i), _stated(robot, usual, i)
             ):

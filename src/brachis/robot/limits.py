@@ -207,7 +207,10 @@ def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
     spec: dict[str, Any] = {}
     for kind, row in LIMIT_KINDS.items():
         values = limits.both_ways(kind).T[: len(names)]
-        pairs = [[end if np.isfinite(end) else None for end in pair] for pair in values.tolist()]
+        pairs = [
+            [end if np.isfinite(end) else None for end in pair]
+            for pair in values.tolist()
+        ]
         spec[kind] = {
             name: pair[1]
             if row.form != "range" and (pair[0] is None or -pair[0] == pair[1])
@@ -244,7 +247,8 @@ def _scale_limits(
     kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[str]
 ) -> np.ndarray:
     """Multiply limits, (2, n), by their factor."""
-    scaled = np.asarray(limits * getattr(scale, kind))
+    with np.errstate(over="ignore"):
+        scaled = np.asarray(limits * getattr(scale, kind))
     for i, name in enumerate(names):
         figures = scaled[np.isfinite(limits[:, i]), i]
         _check_sizes(f"scaled {kind}", figures, name, f"robot.limits.scale.{kind}")
@@ -406,7 +410,9 @@ def _resolve_curves(
         )
     for name in stated:
         if name not in names:
-            raise UnknownNameError("joint", name, names, where="robot.limits.torque_speed")
+            raise UnknownNameError(
+                "joint", name, names, where="robot.limits.torque_speed"
+            )
     return tuple(_resolve_curve(stated.get(name), name, factor) for name in names)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Protocol, TypedDict
 
 from pydantic import Field, create_model
@@ -45,6 +45,10 @@ class UsualLimit:
         Limits below this are usual whatever the URDF states.
     compares_weight : bool
         Whether it is compared with the torque that holds the arm.
+    overridden : bool
+        Whether the speed override is a factor on it.
+    by_curve : bool
+        Whether a torque-speed curve replaces it.
     """
 
     mistaken_unit: dict[str, str]
@@ -53,6 +57,8 @@ class UsualLimit:
     urdf_factor: float = math.inf
     urdf_least: float = 0.0
     compares_weight: bool = False
+    overridden: bool = False
+    by_curve: bool = False
 
 
 @dataclass(frozen=True)
@@ -113,7 +119,7 @@ _ROWS = (
         form="pair",
         scale="torque and force limits, curves too",
         urdf="effort",
-        usual=_USUAL_TORQUE,
+        usual=replace(_USUAL_TORQUE, by_curve=True),
     ),
     LimitKind(
         "velocity",
@@ -128,6 +134,7 @@ _ROWS = (
             "velocity",
             10.0,
             10.0,
+            overridden=True,
         ),
     ),
     LimitKind(
