@@ -199,7 +199,7 @@ class Compared:
         """Return the cells of its line."""
         entry = self.at_step
         limit = " ".join(
-            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end))
+            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.side))
         )
         marks = ["not optimal"] * (not self.optimal) + ["> 5 %"] * (
             self.large and self.off > REQUIRED

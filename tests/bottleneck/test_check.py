@@ -78,7 +78,7 @@ def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
     refined = scara("j1").candidate.refined
     program, x = refined.program, refined.x
     entry = sensitivities(refined).of("j2", "torque")
-    other = program.relax(entry.limit, entry.bound, 0.25 * entry.bound.whole)
+    other = program.relax(entry.limit, entry.bound, 0.25 * entry.bound.full_scale)
     np.testing.assert_allclose(other.rows(x), program.rows(x), atol=1e-10)
     count = program.collocation_points
     torque = slice(0, 3 * count)

@@ -220,7 +220,7 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         (
             {"partials": lambda _motion: None},
             "own_limits[0].partials",
-            "is no brachis.limits.Partials",
+            "is not a brachis.limits.Partials",
         ),
         ({"labels": (Label("j1", "torque", "Nm"),)}, "own_limits[0].labels", "taken"),
         ({"labels": ("j3",)}, "own_limits[0].labels", "Label"),
@@ -240,7 +240,9 @@ def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
 
 @pytest.mark.parametrize("wrong", [Rate, 3.0, "torque"], ids=str)
 def test_what_is_no_limit_is_refused(wrong):
-    with pytest.raises(InputError, match=r"limits\[0\]: is no limit that can be bound"):
+    with pytest.raises(
+        InputError, match=r"limits\[0\]: is not a limit that can be bound"
+    ):
         brachis.plan(LINE, own_limits=[wrong])
 
 
@@ -267,22 +269,3 @@ def test_two_processes_take_it_as_well():
         command, env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == ["True", "True"]
-
-
-def test_a_limit_of_ones_own_knows_how_speeds_are_reached(plugin):
-    ways = []
-
-    class Bound(plugin.BoundRange):
-        def along(self, approach):
-            ways.append((approach.way(0.1, 0.5), approach.way(0.2, 0.5)))
-            return self
-
-    class Model(plugin.CoupledRange):
-        def bind(self, robot):
-            return Bound(self, robot)
-
-    brachis.transcribe(
-        brachis.examples.scara_line, own_limits=[Model(("j2", "j3"), -0.5, UPPER)]
-    )
-    assert ways[0][1] == pytest.approx(4.0 * ways[0][0])
-    assert ways[0][0] > 0.0

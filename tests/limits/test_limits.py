@@ -8,7 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from brachis.limits import TABLE, Label, Limit, Moments, Partials, limits_of
+from brachis.limits import (
+    TABLE,
+    HasPhasePlaneRows,
+    Label,
+    Limit,
+    Moments,
+    Partials,
+    limits_of,
+)
 from brachis.robot import dynamics
 from brachis.task import LimitSpec, SpeedTable, ToolLimits
 from support.chains import planar_robot
@@ -103,7 +111,7 @@ def test_every_value_has_a_label_and_a_figure(limit):
 
 def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
     for bound in limit.bounds:
-        other = limit.relax(bound, 0.1 * bound.whole)
+        other = limit.relax(bound, 0.1 * bound.full_scale)
         np.testing.assert_allclose(
             other.values(STATES), limit.values(STATES), rtol=1e-12, atol=1e-12
         )
@@ -116,7 +124,7 @@ def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
             assert not np.delete(moves, bound.column).any()
             assert (
                 moves[bound.column] == pytest.approx(0.0)
-                if bound.end == end
+                if bound.side == end
                 else moves[bound.column] >= 0.0
             )
         assert max(low[bound.column], high[bound.column]) > 5e-4
@@ -149,10 +157,10 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     limit = TABLE[limit.kind](free, TASK)
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
     s, u, speed = np.array([0.1, 0.2, 0.5, 0.65, 0.95]), 0.7, 1.3
-    lines = limit.lines(s, q, q_ds, q_dds)
-    if lines is None:
+    if not isinstance(limit, HasPhasePlaneRows):
         assert limit.kind in NO_LINES
         return
+    lines = limit.phase_plane_rows(s, q, q_ds, q_dds)
     values = limit.values(
         Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, np.zeros_like(q), s)
     )
@@ -248,7 +256,7 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
     test_partials_equal_differences(limit)
     test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit)
     figures = {
-        (str(limit.labels[bound.column]), bound.end): bound.figure
+        (str(limit.labels[bound.column]), bound.side): bound.figure
         for bound in limit.bounds
     }
     first = {
@@ -279,13 +287,13 @@ def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
     torque, velocity = pairs("torque"), pairs("velocity")
     s = np.linspace(0.0, 1.0, 5)
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
-    squares = velocity.lines(s, q, q_ds, q_dds).x[:, 1]
+    squares = velocity.phase_plane_rows(s, q, q_ds, q_dds).x[:, 1]
     np.testing.assert_allclose(
         np.sqrt(squares), np.maximum(q_ds[:, 1] / 4.0, -q_ds[:, 1] / 1.0)
     )
     still = planar_robot("RRP", "xz", limits=LimitSpec(**PAIRS))
     torque, u, speed = TABLE["torque"](still, TASK), 0.7, 1.3
-    lines = torque.lines(s, q, q_ds, q_dds)
+    lines = torque.phase_plane_rows(s, q, q_ds, q_dds)
     values = torque.values(
         Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, 0.0 * q, s)
     )

@@ -170,7 +170,7 @@ def test_its_tolerance_costs_what_is_said(result):
         for each in report.check.entries
         if str(each.sensitivity.label) == "tool process speed"
     ]
-    assert entry.sensitivity.bound.end == "upper"
+    assert entry.sensitivity.bound.side == "upper"
     assert entry.re_solved == pytest.approx(entry.predicted, rel=0.05)
     assert entry.re_solved < -2e-5
     assert "more tolerance above the process speed" in str(report)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brachis.limits.torque import WIDTH, RoundedCurve
+from brachis.limits.drives import WIDTH, RoundedCurve
 
 PIECES = st.lists(
     st.tuples(st.floats(1e-3, 10.0), st.floats(0.0, 1.0)), min_size=1, max_size=7

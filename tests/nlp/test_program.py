@@ -14,8 +14,7 @@ from brachis.apps.bottleneck.sensitivities import multipliers_of, sensitivities_
 from brachis.common.deadline import NEVER
 from brachis.kinematics import DirectJointMap
 from brachis.limits import Role
-from brachis.limits.joint import PositionLimit
-from brachis.limits.torque import TorqueLimit
+from brachis.limits.joint import PositionLimit, TorqueLimit
 from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
 from brachis.optimise.boundary import Boundary
 from brachis.optimise.bspline import clamped_uniform_knots, spread

@@ -245,7 +245,7 @@ def test_coulomb_friction_that_no_torque_overcomes_is_refused():
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
 def test_limits_that_no_drive_has_are_refused(kind, value):
     with pytest.raises(
-        LimitError, match=f"{kind} limit is none of a real drive; found"
+        LimitError, match=f"{kind} limit is too small or too large; found"
     ) as caught:
         limits_of(**{kind: {"j3": value}})
     assert caught.value.key == f"robot.limits.{kind}.j3"
@@ -256,7 +256,7 @@ def test_limits_that_no_drive_has_are_refused(kind, value):
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
 def test_scaled_limits_that_no_drive_has_are_refused(kind, factor):
     with pytest.raises(
-        LimitError, match=f"scaled {kind} limit is none of a real drive"
+        LimitError, match=f"scaled {kind} limit is too small or too large"
     ) as caught:
         limits_of(acceleration=9.0, scale={kind: factor})
     assert caught.value.key == f"robot.limits.scale.{kind}"
@@ -338,7 +338,7 @@ def test_pairs_of_limits(value, lower, upper):
 )
 def test_pairs_that_are_none_around_zero(pair):
     with pytest.raises(
-        LimitError, match="torque limit in the task is no pair around zero"
+        LimitError, match="torque limit in the task is not a pair around zero"
     ) as caught:
         limits_of(torque={"j2": pair})
     assert "robot.limits.torque.j2" in str(caught.value)

@@ -13,7 +13,9 @@ from support.spatial import rail_arm
 
 
 def arrays(kind) -> list[str]:
-    return [field.name for field in fields(kind) if field.type == "np.ndarray"]
+    return [
+        field.name for field in fields(kind) if field.type in (np.ndarray, "np.ndarray")
+    ]
 
 
 @pytest.mark.parametrize(

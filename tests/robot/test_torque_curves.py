@@ -82,10 +82,14 @@ def test_a_curve_that_is_none_is_refused_with_its_key(curve, where, said):
 def test_other_mistakes_are_refused_with_their_key():
     with pytest.raises(UnknownNameError, match=r"torque_speed.*elbow"):
         robot(torque_speed={"elbow": CURVE})
-    with pytest.raises(InputError, match=r"robot.limits.torque_speed: is no mapping"):
+    with pytest.raises(
+        InputError, match=r"robot.limits.torque_speed: is not a mapping"
+    ):
         robot(torque_speed=[CURVE])
     for wrong in (0.0, -3.0, "much"):
-        with pytest.raises(InputError, match=r"robot.limits.total_power: is no power"):
+        with pytest.raises(
+            InputError, match=r"robot.limits.total_power: is not a power"
+        ):
             robot(total_power=wrong)
     with pytest.raises(InputError, match="power limit"):
         robot(power=-1.0)

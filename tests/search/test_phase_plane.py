@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.limits.joint import build_acceleration, build_velocity
-from brachis.limits.torque import build_torque
+from brachis.limits.joint import AccelerationLimit, TorqueLimit, VelocityLimit
 from brachis.robot import dynamics
 from brachis.search import phase_plane
 
@@ -28,7 +27,7 @@ def gantry(**limits: object) -> brachis.Robot:
 def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
     built = (
         build(robot, None)
-        for build in (build_torque, build_velocity, build_acceleration)
+        for build in (TorqueLimit.build, VelocityLimit.build, AccelerationLimit.build)
     )
     return phase_plane.least_time([limit for limit in built if limit is not None], s, q)
 

@@ -236,7 +236,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         [
             "task: robot.limits.torqe: unknown key",
             "allowed: torque, velocity",
-            "position, scale",
+            "position, power",
             "Did you mean 'torque'?",
         ],
     ),

@@ -1,9 +1,10 @@
-"""Limits on the motion: one kind per file, listed in `TABLE`.
+"""Limits on the motion, listed in `TABLE`.
 
-A limit is a function of q, qdot, qddot and s, some of qdddot too. A new kind is its model in `task` (of joints, its
-field in `robot.limits` as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the
-table there. Nothing else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are
-chosen within them.
+A limit is a function of q, qdot, qddot and s, some of qdddot too. A new kind of joint limit is a row of
+`brachis.task.LIMIT_KINDS`, a class in `joint.py`, and a formula in `verify/limits/joint.py`. Any other kind is its
+model in `task`, its file here with a line in `TABLE`, and a formula in `verify.limits` with a line in the table there.
+Nothing else asks which kind a limit is. Only joint ranges are known elsewhere too: postures and turns are chosen within
+them.
 
 Examples
 --------
@@ -15,26 +16,27 @@ True
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
-from brachis.limits.checks import bound_limits
-from brachis.limits.joint import (
-    build_acceleration,
-    build_jerk,
-    build_position,
-    build_velocity,
+from brachis.limits.checks import build_user_limits
+from brachis.limits.drives import build_torque_speed, build_total_power
+from brachis.limits.joint import JOINT_LIMITS
+from brachis.limits.process_speed import (
+    ConstantAccelerationRamp,
+    GreatestProcessSpeed,
+    LeastProcessSpeed,
 )
-from brachis.limits.power import build_power, build_total_power
-from brachis.limits.process_speed import build_least_process_speed, build_process_speed
 from brachis.limits.protocol import (
-    Approach,
     Bound,
     Guarantee,
-    JointMotion,
+    HasLatticeWeights,
+    HasPhasePlaneRows,
+    JointStates,
     Label,
     Limit,
     Moments,
     Partials,
-    PhaseLines,
+    PhasePlaneRows,
     Role,
 )
 from brachis.limits.tool import (
@@ -42,43 +44,38 @@ from brachis.limits.tool import (
     build_tool_angular_speed,
     build_tool_speed,
 )
-from brachis.limits.torque import (
-    build_rms_torque,
-    build_torque,
-    build_torque_rate,
-    build_torque_speed,
-)
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel, custom_limits
-from brachis.task import Task
+from brachis.task import LIMIT_KINDS, Task
 
 Build = Callable[[Robot, Task], Limit | None]
 """Makes the limit of a kind for a task on a robot; None where nothing is limited."""
 
-TABLE: dict[str, Build] = {
-    "torque": build_torque,
-    "velocity": build_velocity,
-    "acceleration": build_acceleration,
-    "position": build_position,
-    "tool_speed": build_tool_speed,
-    "tool_acceleration": build_tool_acceleration,
-    "tool_angular_speed": build_tool_angular_speed,
-    "process_speed": build_process_speed,
-    "least_process_speed": build_least_process_speed,
-    "power": build_power,
-    "total_power": build_total_power,
-    "torque_speed": build_torque_speed,
-    "rms_torque": build_rms_torque,
-    "jerk": build_jerk,
-    "torque_rate": build_torque_rate,
+_BEHIND: dict[str, dict[str, Build]] = {
+    "position": {
+        "tool_speed": build_tool_speed,
+        "tool_acceleration": build_tool_acceleration,
+        "tool_angular_speed": build_tool_angular_speed,
+        "process_speed": GreatestProcessSpeed.build,
+        "least_process_speed": LeastProcessSpeed.build,
+    },
+    "power": {
+        "total_power": build_total_power,
+        "torque_speed": build_torque_speed,
+    },
 }
+TABLE: dict[str, Build] = {}
+"""By kind, in the order in which limits are built: joint limits, with the others behind some of them."""
+for _kind in LIMIT_KINDS:
+    TABLE[_kind] = JOINT_LIMITS[_kind].build
+    TABLE |= _BEHIND.get(_kind, {})
 
 
 def limits_of(
     robot: Robot,
     task: Task,
-    further: Sequence[LimitModel] = (),
-    approach: Approach | None = None,
+    user_limits: Sequence[LimitModel] = (),
+    ramp: ConstantAccelerationRamp | None = None,
 ) -> tuple[Limit, ...]:
     """List the limits of a task on a robot.
 
@@ -86,10 +83,10 @@ def limits_of(
     ----------
     robot : Robot
     task : Task
-    further : sequence of LimitModel, optional
-        A user's own, beside those of the table and of the task's ``custom_limits``.
-    approach : Approach, optional
-        How speeds are reached along the path; bounds of parts of the path set in at once where it is left out.
+    user_limits : sequence of LimitModel, optional
+        Further limits, besides those of the table and of the task's ``custom_limits``.
+    ramp : ConstantAccelerationRamp, optional
+        How speeds are reached along the path; without it the bounds of process speeds switch on abruptly.
 
     Returns
     -------
@@ -99,34 +96,32 @@ def limits_of(
     Raises
     ------
     InputError
-        A limit of the user's own does not fit the robot, or is none (see `bound_limits`).
+        A limit of the user's own does not fit the robot, or is not valid (see `build_user_limits`).
     """
-    built = tuple(
-        limit for build in TABLE.values() if (limit := build(robot, task)) is not None
-    )
-    named = bound_limits(custom_limits(task), robot, built, "custom_limits")
-    limits = (
-        *built,
-        *named,
-        *bound_limits(further, robot, (*built, *named), "own_limits"),
-    )
-    return (
-        limits if approach is None else tuple(limit.along(approach) for limit in limits)
-    )
+    with_ramp: dict[str, Build] = {
+        limit.kind: partial(limit.build, ramp=ramp)
+        for limit in (GreatestProcessSpeed, LeastProcessSpeed)
+    }
+    built = [build(robot, task) for build in (TABLE | with_ramp).values()]
+    limits = [limit for limit in built if limit is not None]
+    limits += build_user_limits(custom_limits(task), robot, limits, "custom_limits")
+    limits += build_user_limits(user_limits, robot, limits, "own_limits")
+    return tuple(limits)
 
 
 __all__ = [
     "TABLE",
-    "Approach",
     "Bound",
     "Guarantee",
-    "JointMotion",
+    "HasLatticeWeights",
+    "HasPhasePlaneRows",
+    "JointStates",
     "Label",
     "Limit",
     "LimitModel",
     "Moments",
     "Partials",
-    "PhaseLines",
+    "PhasePlaneRows",
     "Role",
     "limits_of",
 ]

@@ -1,4 +1,4 @@
-"""A limit of the user's own is looked at before it is used: what it is made of, shapes, finite numbers."""
+"""A limit of the user's own is checked before it is used: its parts, their shapes, finite numbers."""
 
 from __future__ import annotations
 
@@ -12,11 +12,8 @@ from brachis.limits.protocol import Label, Limit, Moments, Partials
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
 
-_MOMENTS = 2
-"""Moments at which a limit is tried; two tell (K, c) from (c,)."""
 
-
-def bound_limits(
+def build_user_limits(
     models: Sequence[LimitModel], robot: Robot, others: Sequence[Limit], where: str
 ) -> list[Limit]:
     """Bind a user's limits to a robot, and check them.
@@ -26,128 +23,112 @@ def bound_limits(
     models : sequence of LimitModel
     robot : Robot
     others : sequence of Limit
-        Those that there are already: labels are unique.
+        Those that exist already: labels are unique.
     where : str
         What the models are called in messages.
 
     Raises
     ------
     InputError
-        A model cannot be bound, or its limit is none; its parts do not fit together; a label is taken; its values or
-        partials have the wrong shape or are not finite.
+        A model cannot be bound, or does not give a limit; its parts do not fit together; a label is taken; its values
+        or partials have the wrong shape or are not finite.
     """
     check_list(models, where, "limits")
-    found: list[Limit] = []
+    limits: list[Limit] = []
+    taken = {str(label) for other in others for label in other.labels}
     for number, model in enumerate(models):
         here = f"{where}[{number}]"
         if isinstance(model, type) or not callable(getattr(model, "bind", None)):
             raise InputError(
-                "is no limit that can be bound to a robot",
+                "is not a limit that can be bound to a robot",
                 where=here,
                 found=model,
                 allowed="an object whose bind(robot) returns a brachis.limits.Limit (docs/own_limit.md)",
             )
+        found = type(model).__name__
         try:
             limit = model.bind(robot)
         except (TypeError, ValueError) as error:
-            raise InputError(
-                f"cannot be bound to the robot: {error}",
-                where=here,
-                found=type(model).__name__,
-            ) from error
+            problem = f"cannot be bound to the robot: {error}"
+            raise InputError(problem, where=here, found=found) from error
         if not isinstance(limit, Limit):
             raise InputError(
-                "bind returned no brachis.limits.Limit",
+                "bind does not return a brachis.limits.Limit",
                 where=here,
                 found=type(limit).__name__,
             )
-        _check(limit, robot.n, here)
-        taken = {str(label) for other in (*others, *found) for label in other.labels}
+        _check_data(limit, here)
+        _check_functions(limit, robot.n, here)
         for label in limit.labels:
             if str(label) in taken:
                 problem = "the label is taken; subject and kind together name a value"
                 raise InputError(problem, where=f"{here}.labels", found=str(label))
-        found.append(limit)
-    return found
+        taken |= {str(label) for label in limit.labels}
+        limits.append(limit)
+    return limits
 
 
-def _check(limit: Limit, n: int, where: str) -> None:
-    """Refuse a limit whose parts do not fit together."""
-    missing = [
-        name
-        for name in ("kind", "labels", "lower", "upper")
-        if not hasattr(limit, name)
-    ]
+def _check_data(limit: Limit, where: str) -> None:
+    """Refuse labels and bounds that do not fit together."""
+    parts = ("kind", "labels", "lower", "upper")
+    missing = [name for name in parts if not hasattr(limit, name)]
     if missing:
-        raise InputError(
-            "lacks what every limit has", where=where, found=f"no {', '.join(missing)}"
-        )
-    count = len(limit.labels)
-    if not all(isinstance(label, Label) for label in limit.labels):
-        raise InputError(
-            "are not all brachis.limits.Label",
-            where=f"{where}.labels",
-            found=limit.labels,
-        )
-    if not count and not len(limit.lower):
+        problem = "lacks what every limit has"
+        raise InputError(problem, where=where, found=f"no {', '.join(missing)}")
+    labels = limit.labels
+    if not all(isinstance(label, Label) for label in labels):
+        problem = "are not all brachis.limits.Label"
+        raise InputError(problem, where=f"{where}.labels", found=labels)
+    if not labels and not len(limit.lower):
         raise InputError(
             "the limit has no values",
             where=f"{where}.labels",
             allowed="at least one label",
         )
     for name in ("lower", "upper"):
-        _check_shape(
-            f"{where}.{name}", np.asarray(getattr(limit, name)), (count,), finite=False
-        )
+        _check_shape(f"{where}.{name}", getattr(limit, name), (len(labels),))
     if not np.all(np.asarray(limit.lower) < limit.upper):
-        raise InputError(
-            "lower is not below upper", where=where, found=[limit.lower, limit.upper]
-        )
-    _check_functions(limit, n, where)
+        bounds = [limit.lower, limit.upper]
+        raise InputError("lower is not below upper", where=where, found=bounds)
 
 
 def _check_functions(limit: Limit, n: int, where: str) -> None:
-    """Refuse values and partials of the wrong shape, or that are not finite."""
-    count, rng = len(limit.labels), np.random.default_rng(0)
-    q, qdot, qddot, qdddot = rng.uniform(-0.1, 0.1, (4, _MOMENTS, n))
-    moments = Moments(q, qdot, qddot, qdddot, np.linspace(0.0, 0.5, _MOMENTS))
-    _check_shape(f"{where}.values", limit.values(moments), (_MOMENTS, count))
+    """Refuse values and partials at two moments that have the wrong shape, or are not finite."""
+    shape = (2, len(limit.labels))
+    q, qdot, qddot, qdddot = np.random.default_rng(0).uniform(-0.1, 0.1, (4, 2, n))
+    moments = Moments(q, qdot, qddot, qdddot, np.array([0.0, 0.5]))
+    _check_result(f"{where}.values", limit.values(moments), shape)
+    where = f"{where}.partials"
     partials = limit.partials(moments)
     if not isinstance(partials, Partials):
-        raise InputError(
-            "is no brachis.limits.Partials", where=f"{where}.partials", found=partials
-        )
-    given = {name: getattr(partials, name) for name in ("q", "qdot", "qddot", "qdddot")}
-    if all(part is None for part in given.values()):
-        raise InputError(
-            "are all None",
-            where=f"{where}.partials",
-            allowed="at least one of q, qdot, qddot, qdddot",
-        )
+        problem = "is not a brachis.limits.Partials"
+        raise InputError(problem, where=where, found=partials)
+    given = {name: part for name, part in vars(partials).items() if part is not None}
+    if not given.keys() - {"s"}:
+        allowed = "at least one of q, qdot, qddot, qdddot"
+        raise InputError("are all None", where=where, allowed=allowed)
     for name, part in given.items():
-        if part is not None:
-            _check_shape(f"{where}.partials.{name}", part, (_MOMENTS, count, n))
-    if partials.s is not None:
-        _check_shape(f"{where}.partials.s", partials.s, (_MOMENTS, count))
+        by_joint = shape if name == "s" else (*shape, n)
+        _check_result(f"{where}.{name}", part, by_joint)
 
 
 def _check_shape(
-    where: str, array: object, shape: tuple[int, ...], *, finite: bool = True
+    where: str, array: object, shape: tuple[int, ...], aside: str = ""
 ) -> None:
-    """Refuse what is no array of a shape, or not finite."""
     found = np.asarray(array).shape
     if found != shape:
-        moments = f" for {_MOMENTS} moments" if finite else ""
         raise InputError(
-            "has the wrong shape",
-            where=where,
-            found=f"{found}{moments}",
-            allowed=f"{shape}",
+            "has the wrong shape", where=where, found=f"{found}{aside}", allowed=shape
         )
-    if finite and not np.all(np.isfinite(np.asarray(array, dtype=float))):
+
+
+def _check_result(where: str, array: object, shape: tuple[int, ...]) -> None:
+    _check_shape(where, array, shape, " for 2 moments")
+    found = np.asarray(array, dtype=float)
+    if not np.all(np.isfinite(found)):
         raise InputError(
             "is not finite",
             where=where,
-            found=np.asarray(array).ravel().tolist(),
+            found=found.ravel().tolist(),
             allowed="finite numbers",
         )

@@ -1,349 +1,395 @@
-"""Joint velocities between v_min and v_max, |qddot| <= a_max and |qdddot| <= j_max.
+"""Limits on a quantity of each joint: position, velocity, acceleration, jerk, torque, its rate and mean, power.
 
-q_min <= q <= q_max, as (q - middle) / half range in [-1, 1]; wide and open ranges are measured in rad or m.
+A value is (quantity - middle) / half the distance between the lower and the upper limit, in [-1, 1]. With the same
+limit in both directions that is the ratio to it. Positions are measured in rad or m if their range is wide or open.
 
-Limits below and above zero for each joint, as (value - middle) / half the way between them, in [-1, 1].
+The rate of the torque tau(q, qdot, qddot) is
 
-With the same limit in both directions that is the ratio to it.
+    dtau/dt = tau_q qdot + tau_v qddot + M qdddot
+
+with the derivatives of tau by q, qdot and qddot. Its own derivatives, with D for d/dt along the motion, are
+
+    by q: D(tau_q),   by qdot: D(tau_v) + tau_q,   by qddot: D(M) + tau_v,   by qdddot: M
+
+where D is taken by differences.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal, Self
 
 import numpy as np
 
+from brachis.common.arrays import rates
 from brachis.limits.protocol import (
     Bound,
-    JointMotion,
+    Guarantee,
+    HasLatticeWeights,
+    HasPhasePlaneRows,
+    JointStates,
     Label,
     Limit,
     Partials,
-    PhaseLines,
+    PhasePlaneRows,
 )
-from brachis.robot import Robot
-from brachis.task import Task
-
-_WIDE = 10.0
-"""Ranges whose half is larger count as open ones do, in rad or m: half of a far range is no measure at its near end."""
-_LEAST_HALF, _LARGEST_HALF = 1e-5, 1.0
-"""A violation of 1 is half the range, but between these, rad or m, so that each end is judged by itself."""
+from brachis.robot import Robot, dynamics
+from brachis.task import LIMIT_KINDS, Task
 
 
-def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Return what counts as a violation of 1 beyond ranges, rad or m: half of each, but no more than 1."""
-    return np.clip(0.5 * upper - 0.5 * lower, _LEAST_HALF, _LARGEST_HALF)
-
-
-class PositionLimit(Limit):
-    """Joint positions within their ranges.
-
-    Parameters
-    ----------
-    robot : Robot
-    joints : (c,) int ndarray
-        The joints with a range, or an end of one.
-    """
-
-    kind = "position"
-    at_rest = "turns"
-
-    def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        low, high = (
-            robot.limits.position_lower[joints],
-            robot.limits.position_upper[joints],
-        )
-        half = 0.5 * high - 0.5 * low
-        ranged = half <= _WIDE
-        per_row = np.where(ranged, half, 1.0)
-        with np.errstate(invalid="ignore"):  # -inf + inf
-            self._middle = np.where(ranged, 0.5 * low + 0.5 * high, 0.0)
-        self._joints = joints
-        self._scale = 1.0 / per_row
-        self._selection = np.eye(robot.n)[joints] * self._scale[:, None]
-        self.labels = tuple(
-            Label(
-                name,
-                "position",
-                robot.position_units[i],
-                f"robot.limits.position.{name}",
-                share="position in its range",
-            )
-            for i, name in ((i, robot.joint_names[i]) for i in joints)
-        )
-        self.lower, self.upper = (
-            (low - self._middle) * self._scale,
-            (high - self._middle) * self._scale,
-        )
-        self._violation_scale = per_row / position_measure(low, high)
-        whole = np.where(np.isfinite(half), 2.0 * half, 1.0)
-        self._bounds = tuple(
-            Bound(
-                column,
-                float(ends[column]),
-                float(whole[column]),
-                float(self._scale[column]),
-                end,
-            )
-            for column in range(len(joints))
-            for end, ends in (("lower", low), ("upper", high))
-            if np.isfinite(ends[column])
-        )
-
-    @property
-    def violation_scale(self) -> np.ndarray:
-        """See `Limit`."""
-        return self._violation_scale
-
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`."""
-        return self._bounds
-
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`."""
-        return (motion.q[:, self._joints] - self._middle) * self._scale
-
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
-        return Partials(
-            q=np.broadcast_to(self._selection, (len(motion.q), *self._selection.shape))
-        )
-
-
-def build_position(robot: Robot, _task: Task) -> PositionLimit | None:
-    """Build the limit for the joints with a finite end of range."""
-    limits = robot.limits
-    joints = np.flatnonzero(
-        np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper)
-    )
-    return PositionLimit(robot, joints) if len(joints) else None
-
-
-def in_words(quantity: str, position_unit: str) -> str:
-    """Name a joint's quantity: what is a torque of a revolute joint (rad) is a force of a prismatic one (m)."""
-    return quantity if position_unit == "rad" else quantity.replace("torque", "force")
-
-
-class JointRatioLimit(Limit):
-    """A quantity of every limited joint over its limit; `kind` is also the key below ``robot.limits``.
+class JointLimit(Limit):
+    """A quantity of every limited joint between its limits; `kind` is a row of `LIMIT_KINDS`.
 
     Parameters
     ----------
     robot : Robot
     joints : (c,) int ndarray
         The limited joints.
-    figures : (c,) or (2, c) ndarray
-        Their limits, the same in both directions; or lower and upper ones.
-    units : sequence of str
-        Of the limits of all joints of the robot.
     """
 
-    longer_time = "relieves"
+    longer_time: Literal["relieves", "violates", "neither"] = "relieves"
+    share = ""
+    """Title of an axis of ratios; see `Label`."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        joints: np.ndarray,
-        figures: np.ndarray,
-        units: Sequence[str],
-    ) -> None:
-        low, high = self._figures = (
-            figures if figures.ndim > 1 else np.array([-figures, figures])
-        )
-        self._joints, self._middle, self._scale = (
-            joints,
-            0.5 * (high + low),
-            2.0 / (high - low),
-        )
+    def __init__(self, robot: Robot, joints: np.ndarray) -> None:
+        row = LIMIT_KINDS[self.kind]
+        self._robot = robot
+        self._joints = joints
+        self._ends = robot.limits.both_ways(self.kind)[:, joints]
+        self._measure(*self._ends)
+        units = [robot.position_units[i] for i in joints]
+        names = [robot.joint_names[i] for i in joints]
         self.labels = tuple(
             Label(
                 name,
-                in_words(self.name, position_unit),
-                units[i],
+                row.in_words(unit),
+                row.units[unit],
                 f"robot.limits.{self.kind}.{name}",
+                share=self.share,
             )
-            for i, name, position_unit in (
-                (i, robot.joint_names[i], robot.position_units[i]) for i in joints
-            )
-        )
-        self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
-        self._violation_scale = 0.5 * (high - low) / np.minimum(high, -low)
-        self._bounds = tuple(
-            Bound(column, figure, abs(figure), float(self._scale[column]), end)
-            for column, (below, above) in enumerate(
-                zip(low.tolist(), high.tolist(), strict=True)
-            )
-            for end, figure in (
-                ((None, above),)
-                if -below == above
-                else (("lower", below), ("upper", above))
-            )
+            for name, unit in zip(names, units, strict=True)
         )
 
-    def _normalised(self, quantity: np.ndarray) -> np.ndarray:
-        """Values, (K, c), from a quantity of all joints, (K, n)."""
-        return np.asarray((quantity[:, self._joints] - self._middle) * self._scale)
+    def _measure(self, low: np.ndarray, high: np.ndarray) -> None:
+        """Set how quantities become values, and the bounds of these, from lower and upper limits, (c,) each."""
+        self._middle = 0.5 * (high + low)
+        self._scale = 2.0 / (high - low)
+        self.lower = -np.ones(len(low))
+        self.upper = np.ones(len(low))
+        self.violation_scale = 0.5 * (high - low) / np.minimum(high, -low)
+        self._set_bounds(np.abs(self._ends), -low == high)
 
-    @property
-    def violation_scale(self) -> np.ndarray:
-        """See `Limit`: a violation is a part of the smaller one of both limits."""
-        return self._violation_scale
+    def _set_bounds(self, full_scale: np.ndarray, is_symmetric: np.ndarray) -> None:
+        """List the finite limits, with full scales, (2, c); a symmetric limit, (c,) bool, is one figure."""
+        self.bounds = tuple(
+            Bound(
+                column,
+                float(self._ends[end, column]),
+                float(full_scale[end, column]),
+                per_unit,
+                None if is_symmetric[column] else side,
+            )
+            for column, per_unit in enumerate(self._scale.tolist())
+            for end, side in enumerate(("lower", "upper"))
+            if np.isfinite(self._ends[end, column])
+            and not (is_symmetric[column] and side == "lower")
+        )
 
     @property
     def centre(self) -> np.ndarray:
-        """See `Limit`: where the quantity is zero."""
+        """Value at which the quantity is zero."""
         return np.asarray(-self._middle * self._scale)
 
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`."""
-        return self._bounds
-
-
-class _JointRateLimit(JointRatioLimit):
-    """Joint velocities, accelerations or jerks within their limits.
-
-    Parameters
-    ----------
-    robot : Robot
-    joints : (c,) int ndarray
-        The limited joints.
-    figures : (c,) or (2, c) ndarray
-        Their limits; see `JointRatioLimit`.
-    """
-
-    _per_time: str
-
-    def __init__(self, robot: Robot, joints: np.ndarray, figures: np.ndarray) -> None:
-        super().__init__(
-            robot,
-            joints,
-            figures,
-            [unit + self._per_time for unit in robot.position_units],
+    @classmethod
+    def build(cls, robot: Robot, _task: Task) -> Self | None:
+        """Build the limit for the joints with a finite limit; None without such joints."""
+        joints = np.flatnonzero(
+            np.isfinite(robot.limits.both_ways(cls.kind)).any(axis=0)
         )
-        self._selection = np.eye(robot.n)[joints] * self._scale[:, None]
+        return cls(robot, joints) if len(joints) else None
 
-    def _rows(self, count: int) -> np.ndarray:
-        """Constant partials at `count` moments, (K, c, n)."""
-        return np.broadcast_to(self._selection, (count, *self._selection.shape))
+    @abstractmethod
+    def quantity(self, motion: JointStates) -> np.ndarray:
+        """Quantity of all joints, (K, n), in SI units."""
+
+    @abstractmethod
+    def quantity_partials(self, motion: JointStates) -> Partials:
+        """Differentiate `quantity`, (K, n, n) each."""
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        return self._normalise(self.quantity(motion))
+
+    def partials(self, motion: JointStates) -> Partials:
+        exact = self.quantity_partials(motion)
+        parts = (exact.q, exact.qdot, exact.qddot, exact.qdddot)
+        return Partials(
+            *(None if part is None else self._scale_rows(part) for part in parts)
+        )
+
+    def _normalise(self, quantity: np.ndarray) -> np.ndarray:
+        """Values, (K, c), from a quantity of all joints, (K, n)."""
+        return np.asarray((quantity[:, self._joints] - self._middle) * self._scale)
+
+    def _scale_rows(self, slopes: np.ndarray) -> np.ndarray:
+        """Turn into derivatives of the values, (K, c, n), those of the quantity, (K, n, n)."""
+        return np.asarray(slopes[:, self._joints] * self._scale[:, None])
 
 
-class VelocityLimit(_JointRateLimit):
-    """Joint velocities within their limits; see `_JointRateLimit`."""
+class _DerivativeLimit(JointLimit):
+    """Joint positions, velocities, accelerations or jerks within their limits."""
+
+    derivative: str
+    """Name of the quantity in `JointStates` and in `Partials`."""
+
+    def quantity(self, motion: JointStates) -> np.ndarray:
+        return np.asarray(getattr(motion, self.derivative))
+
+    def quantity_partials(self, motion: JointStates) -> Partials:
+        return Partials(**{self.derivative: self._identity(len(motion.q))})
+
+    def _identity(self, count: int) -> np.ndarray:
+        """Differentiate the quantity by itself, (K, n, n), at `count` moments."""
+        n = self._robot.n
+        return np.broadcast_to(np.eye(n), (count, n, n))
+
+
+def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return what counts as a violation of 1 beyond ranges, rad or m: half of each, but from 1e-5 to 1."""
+    return np.clip(0.5 * upper - 0.5 * lower, 1e-5, 1.0)
+
+
+class PositionLimit(_DerivativeLimit):
+    """Joint positions within their ranges."""
+
+    kind = "position"
+    derivative = "q"
+    longer_time = "neither"
+    at_rest = "turns"
+    share = "position in its range"
+
+    def _measure(self, low: np.ndarray, high: np.ndarray) -> None:
+        half = 0.5 * high - 0.5 * low
+        # Half of a range beyond 20 rad or m is too coarse a measure near its ends.
+        is_narrow = half <= 10.0
+        measure = np.where(is_narrow, half, 1.0)
+        with np.errstate(invalid="ignore"):  # -inf + inf
+            self._middle = np.where(is_narrow, 0.5 * low + 0.5 * high, 0.0)
+        self._scale = 1.0 / measure
+        self.lower = (low - self._middle) * self._scale
+        self.upper = (high - self._middle) * self._scale
+        self.violation_scale = measure / position_measure(low, high)
+        width = np.where(np.isfinite(half), 2.0 * half, 1.0)
+        self._set_bounds(np.array([width, width]), np.zeros(len(low), dtype=bool))
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle of the range."""
+        return super(JointLimit, self).centre
+
+
+class VelocityLimit(_DerivativeLimit, HasPhasePlaneRows, HasLatticeWeights):
+    """Joint velocities within their limits."""
 
     kind = "velocity"
-    _per_time = "/s"
+    derivative = "qdot"
 
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`."""
-        return self._normalised(motion.qdot)
-
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
-        return Partials(qdot=self._rows(len(motion.q)))
-
-    def lines(
+    def phase_plane_rows(
         self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhaseLines:
-        """See `Limit.lines`: the square of the ratio, q_ds^2 x / v^2, to the limit of the direction."""
-        low, high = self._figures
+    ) -> PhasePlaneRows:
+        """Write the square of the ratio, q_ds^2 x / v^2, to the limit of the direction."""
+        low, high = self._ends
         tangent = q_ds[:, self._joints]
         squares = (tangent / np.where(tangent > 0.0, high, low)) ** 2
-        return PhaseLines(None, squares, np.zeros((len(q), len(self.lower))))
+        return PhasePlaneRows(None, squares, np.zeros_like(squares))
 
-    def step_rows(self, q: np.ndarray) -> tuple[None, np.ndarray]:
-        """See `Limit.step_rows`."""
-        return None, self._rows(len(q))
+    def lattice_weights(self, q: np.ndarray) -> tuple[None, np.ndarray]:
+        return None, self._scale_rows(self._identity(len(q)))
 
 
-class AccelerationLimit(_JointRateLimit):
-    """Joint accelerations over their limits; see `_JointRateLimit`."""
+class AccelerationLimit(_DerivativeLimit, HasPhasePlaneRows, HasLatticeWeights):
+    """Joint accelerations within their limits."""
 
     kind = "acceleration"
-    _per_time = "/s^2"
+    derivative = "qddot"
 
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`."""
-        return self._normalised(motion.qddot)
-
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
-        return Partials(qddot=self._rows(len(motion.q)))
-
-    def lines(
+    def phase_plane_rows(
         self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhaseLines:
-        """See `Limit.lines`."""
-        by_u, by_x = (part[:, self._joints] * self._scale for part in (q_ds, q_dds))
-        return PhaseLines(by_u, by_x, np.zeros((len(q), len(self.lower))))
+    ) -> PhasePlaneRows:
+        by_u = q_ds[:, self._joints] * self._scale
+        by_x = q_dds[:, self._joints] * self._scale
+        return PhasePlaneRows(by_u, by_x, np.zeros_like(by_u))
 
-    def step_rows(self, q: np.ndarray) -> tuple[np.ndarray, None]:
-        """See `Limit.step_rows`."""
-        return self._rows(len(q)), None
+    def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
+        return self._scale_rows(self._identity(len(q))), None
 
 
-class JerkLimit(_JointRateLimit):
-    """Joint jerks over their limits; see `_JointRateLimit`."""
+class JerkLimit(_DerivativeLimit):
+    """Joint jerks within their limits."""
 
     kind = "jerk"
+    derivative = "qdddot"
     order = 3
-    _per_time = "/s^3"
-
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`."""
-        return self._normalised(motion.qdddot)
-
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
-        return Partials(qdddot=self._rows(len(motion.q)))
 
 
-def build_velocity(robot: Robot, _task: Task) -> VelocityLimit | None:
-    """Build the limit for the joints with a finite velocity limit."""
-    figures = robot.limits.both_ways("velocity")
-    joints = np.flatnonzero(np.isfinite(figures[1]))
-    return VelocityLimit(robot, joints, figures[:, joints]) if len(joints) else None
+class _TorqueLimit(JointLimit):
+    """A function of the joint torques within its limits."""
+
+    def quantity(self, motion: JointStates) -> np.ndarray:
+        return motion.torque(self._robot)
+
+    def quantity_partials(self, motion: JointStates) -> Partials:
+        exact = motion.torque_derivatives(self._robot)
+        return Partials(exact.q, exact.qdot, exact.qddot)
 
 
-def build_acceleration(robot: Robot, _task: Task) -> AccelerationLimit | None:
-    """Build the limit for the joints with a finite acceleration limit."""
-    joints = np.flatnonzero(np.isfinite(robot.limits.acceleration))
-    return (
-        AccelerationLimit(robot, joints, robot.limits.acceleration[joints])
-        if len(joints)
-        else None
+class TorqueLimit(_TorqueLimit, HasPhasePlaneRows, HasLatticeWeights):
+    """Joint torques within their limits."""
+
+    kind = "torque"
+    at_rest = "posture"
+    refusal = "cannot hold the arm against gravity"
+
+    def phase_plane_rows(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhasePlaneRows:
+        """Write a = M q_ds, b = M q_dds + C(q, q_ds) q_ds, and c, the torque at rest; without velocity friction."""
+        robot = self._robot
+        still = np.zeros_like(q)
+        at_rest = dynamics.rigid_torque(robot, q, still, still)
+        rows = [
+            dynamics.rigid_torque(robot, q, velocity, acceleration)
+            - at_rest
+            + robot.friction.armature * acceleration
+            for velocity, acceleration in ((still, q_ds), (q_ds, q_dds))
+        ]
+        by_u, by_x = (row[:, self._joints] * self._scale for row in rows)
+        return PhasePlaneRows(by_u, by_x, self._normalise(at_rest))
+
+    def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
+        return self._scale_rows(dynamics.mass_matrices(self._robot, q)), None
+
+
+class TorqueRateLimit(JointLimit):
+    """Rates of joint torques within their limits."""
+
+    kind = "torque_rate"
+    order = 3
+
+    def quantity(self, motion: JointStates) -> np.ndarray:
+        exact = motion.torque_derivatives(self._robot)
+        pairs = (
+            (exact.q, motion.qdot),
+            (exact.qdot, motion.qddot),
+            (exact.qddot, motion.qdddot),
+        )
+        return np.asarray(
+            sum(np.einsum("kij,kj->ki", slope, rate) for slope, rate in pairs)
+        )
+
+    def quantity_partials(self, motion: JointStates) -> Partials:
+        exact = motion.torque_derivatives(self._robot)
+
+        def slopes(*states: np.ndarray) -> tuple[np.ndarray, ...]:
+            near = dynamics.torque_derivatives(self._robot, *states[:3])
+            return near.q, near.qdot, near.qddot
+
+        states = (motion.q, motion.qdot, motion.qddot, motion.qdddot)
+        q, qdot, qddot = rates(slopes, states)
+        return Partials(q, qdot + exact.q, qddot + exact.qdot, exact.qddot)
+
+
+def powers(robot: Robot, motion: JointStates) -> np.ndarray:
+    """Mechanical powers of all joints, (K, n), W; negative where a joint brakes."""
+    return motion.torque(robot) * motion.qdot
+
+
+def power_partials(robot: Robot, motion: JointStates) -> Partials:
+    """Differentiate `powers` by q, qdot and qddot, (K, n, n) each."""
+    exact = motion.torque_derivatives(robot)
+    rate = motion.qdot[:, :, None]
+    by_qdot = exact.qdot * rate
+    every = np.arange(robot.n)
+    by_qdot[:, every, every] += motion.torque(robot)
+    return Partials(exact.q * rate, by_qdot, exact.qddot * rate)
+
+
+class PowerLimit(JointLimit):
+    """Mechanical power of every joint within its limit."""
+
+    kind = "power"
+
+    def quantity(self, motion: JointStates) -> np.ndarray:
+        return powers(self._robot, motion)
+
+    def quantity_partials(self, motion: JointStates) -> Partials:
+        return power_partials(self._robot, motion)
+
+
+class RmsTorqueLimit(_TorqueLimit):
+    """Squares of joint torques over their limits; their means over time are held."""
+
+    kind = "rms_torque"
+    guarantee = Guarantee.AS_MEAN
+
+    def __init__(self, robot: Robot, joints: np.ndarray) -> None:
+        super().__init__(robot, joints)
+        self.lower = np.full(len(joints), -np.inf)
+        # To first order the square of a figure changes by twice as much as the figure.
+        self.bounds = tuple(
+            replace(bound, per_unit=2.0 * bound.per_unit) for bound in self.bounds
+        )
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        return super().values(motion) ** 2
+
+    def partials(self, motion: JointStates) -> Partials:
+        factors = 2.0 * super().values(motion)[:, :, None]
+        exact = super().partials(motion)
+        parts = (exact.q, exact.qdot, exact.qddot)
+        return Partials(*(factors * part for part in parts if part is not None))
+
+    def violation(self, values: np.ndarray) -> np.ndarray:
+        """Measure the root mean square itself."""
+        return np.asarray(np.sqrt(np.maximum(values, 0.0)) - np.sqrt(self.upper))
+
+    def ratio(self, values: np.ndarray) -> np.ndarray:
+        """Measure the root mean square itself."""
+        return np.asarray(np.sqrt(np.maximum(values, 0.0) / self.upper))
+
+
+JOINT_LIMITS = {
+    limit.kind: limit
+    for limit in (
+        TorqueLimit,
+        VelocityLimit,
+        AccelerationLimit,
+        PositionLimit,
+        PowerLimit,
+        RmsTorqueLimit,
+        JerkLimit,
+        TorqueRateLimit,
     )
-
-
-def build_jerk(robot: Robot, _task: Task) -> JerkLimit | None:
-    """Build the limit for the joints with a finite jerk limit."""
-    joints = np.flatnonzero(np.isfinite(robot.limits.jerk))
-    return JerkLimit(robot, joints, robot.limits.jerk[joints]) if len(joints) else None
+}
+"""The limit of every row of `LIMIT_KINDS`."""
 
 
 def reciprocals_near(
     robot: Robot, limits: Sequence[Limit], q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Reciprocals of the largest acceleration and of the largest velocity, (n,) each, of each joint alone near `q`.
+    """Reciprocals of the largest acceleration and of the largest velocity of each joint alone near `q`, (n,) each.
 
-    They are what the joints' own limits allow, 0 where these allow any.
+    They follow from the joints' own limits; 0 for a joint without a limit.
     """
-    by_acceleration, by_velocity = np.zeros(robot.n), np.zeros(robot.n)
+    found = np.zeros((2, robot.n))
     for limit in limits:
-        own = np.array(
-            [
-                [label.subject == name for name in robot.joint_names]
-                for label in limit.labels
-            ]
-        )
-        for weights, rows in zip(
-            (by_acceleration, by_velocity), limit.step_rows(q[None]), strict=True
-        ):
+        if not isinstance(limit, HasLatticeWeights):
+            continue
+        subjects = [label.subject for label in limit.labels]
+        own = np.equal.outer(subjects, robot.joint_names)
+        for weights, rows in zip(found, limit.lattice_weights(q[None]), strict=True):
             if rows is not None:
-                np.maximum(
-                    weights,
-                    np.abs(np.where(own, rows[0], 0.0)).max(axis=0),
-                    out=weights,
-                )
-    return by_acceleration, by_velocity
+                largest = np.abs(np.where(own, rows[0], 0.0)).max(axis=0)
+                np.maximum(weights, largest, out=weights)
+    return found[0], found[1]

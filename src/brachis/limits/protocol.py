@@ -16,6 +16,7 @@ import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Literal, Protocol, Self
 
 import numpy as np
@@ -41,15 +42,7 @@ class Guarantee(Enum):
         return self is Guarantee.AS_MEAN
 
 
-class Approach(Protocol):
-    """How speeds are reached along a path."""
-
-    def way(self, speed: float, s: float) -> float:
-        """Return the way, in s, on which the tool reaches a speed, m/s, from rest at a place of the path."""
-        ...
-
-
-class JointMotion(Protocol):
+class JointStates(Protocol):
     """Joint motion at K moments; states of the optimiser and samples of a trajectory are such.
 
     Attributes
@@ -61,15 +54,15 @@ class JointMotion(Protocol):
     """
 
     @property
-    def q(self) -> np.ndarray: ...  # noqa: D102
+    def q(self) -> np.ndarray: ...
     @property
-    def qdot(self) -> np.ndarray: ...  # noqa: D102
+    def qdot(self) -> np.ndarray: ...
     @property
-    def qddot(self) -> np.ndarray: ...  # noqa: D102
+    def qddot(self) -> np.ndarray: ...
     @property
-    def qdddot(self) -> np.ndarray: ...  # noqa: D102
+    def qdddot(self) -> np.ndarray: ...
     @property
-    def s(self) -> np.ndarray: ...  # noqa: D102
+    def s(self) -> np.ndarray: ...
     def torque(self, robot: Robot) -> np.ndarray:
         """Joint torques, (K, n), computed once."""
         ...
@@ -81,7 +74,7 @@ class JointMotion(Protocol):
 
 @dataclass(frozen=True)
 class Moments(SharedTorques):
-    """Joint motion at K moments, made from arrays; see `JointMotion`."""
+    """Joint motion at K moments, made from arrays; see `JointStates`."""
 
     q: np.ndarray
     qdot: np.ndarray
@@ -123,19 +116,19 @@ class Label:
         Of the limit that the user gives.
     key : str
         Key of the task that sets it; empty where there is none.
-    reached, room : str
-        A clause that says that it is at its bound, and what there is more of where the bound gives way; both are made
-        of subject and kind where they are empty.
+    active_text, slack_text : str
+        Text for "the limit is active", and for the slack that a wider bound provides. If empty, both are made of
+        subject and kind.
     share : str
-        What the ratio to the bound is, as the title of an axis; ``torque / limit`` for example where it is empty.
+        What the ratio to the bound is, as the title of an axis. If empty, for example ``torque / limit``.
     """
 
     subject: str
     kind: str
     unit: str
     key: str = ""
-    reached: str = ""
-    room: str = ""
+    active_text: str = ""
+    slack_text: str = ""
     share: str = ""
 
     @property
@@ -158,19 +151,19 @@ class Bound:
         Of the value, among the limit's c.
     figure : float
         In the unit of the value's label.
-    whole : float
+    full_scale : float
         What a change by 100 % means: of most limits the figure itself, of a position the width of its range.
     per_unit : float
-        By how much the bounds of the value move outwards when the figure gives way by one unit.
-    end : {"lower", "upper"} or None
+        How far the bounds of the value move outwards when the figure is relaxed by one unit.
+    side : {"lower", "upper"} or None
         Which of the bounds moves; None: both.
     """
 
     column: int
     figure: float
-    whole: float
+    full_scale: float
     per_unit: float
-    end: str | None = None
+    side: str | None = None
 
 
 @dataclass(frozen=True)
@@ -188,14 +181,14 @@ class Partials:
 
 
 @dataclass(frozen=True)
-class PhaseLines:
+class PhasePlaneRows:
     """A limit along a fixed joint path q(s): a u + b x + c in [-1, 1], with u = d2s/dt2 and x = (ds/dt)^2.
 
     Attributes
     ----------
     u : (S, c) ndarray or None
-        a; None where the limit does not ask for the acceleration. Then b x + c <= 1 alone holds: a ceiling for x where
-        b is positive, a floor where it is negative.
+        a; None for a limit without acceleration. Then only b x + c <= 1 holds: an upper bound of x where b is
+        positive, a lower bound where it is negative.
     x, constant : (S, c) ndarray
         b and c.
     """
@@ -205,59 +198,71 @@ class PhaseLines:
     constant: np.ndarray
 
 
-class Limit(ABC):
-    """c values of the joint motion at every moment, or their means over time, held between bounds.
+class HasPhasePlaneRows(ABC):
+    """A limit that can be written in the phase plane of a joint path."""
+
+    @abstractmethod
+    def phase_plane_rows(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhasePlaneRows:
+        """Write the limit along a joint path: postures q, (S, n), at s, (S,), and their derivatives by s."""
+
+
+class HasLatticeWeights(ABC):
+    """A limit by which the lattice measures joint steps between postures."""
+
+    @abstractmethod
+    def lattice_weights(
+        self, q: np.ndarray
+    ) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Rows A and B, (K, c, n), in postures q, (K, n); None where they vanish.
+
+        A qddot is the part of the limit that joint accelerations take, B qdot the part that joint velocities take.
+        """
+
+
+class Description:
+    """What is known of a limit besides its values.
 
     Attributes
     ----------
     kind : str
         Name of the kind, unique.
-    guarantee : Guarantee
-        Where it holds.
-    role : Role
     labels : tuple of Label
         Of each of the c values.
     lower, upper : (c,) ndarray
         Bounds of the values; -inf and inf where open. Values should be of the size of 1.
+    guarantee : Guarantee
+        Where it holds.
+    role : Role
+        Whose limit it is.
     longer_time : {"relieves", "violates", "neither"}
         What a longer end time does: it relieves a velocity, acceleration or torque, and violates a least speed.
     at_rest : {"nothing", "posture", "turns"}
-        What it restricts of an arm at rest: the posture up to turns by 2 pi (torque against gravity), or which turn
-        an angle is in as well (position).
+        What it restricts of an arm at rest: the posture up to turns by 2 pi (torque against gravity), or also the
+        turn of an angle (position).
     breaks : (b,) ndarray
-        Path coordinates at which it changes so abruptly that the motion is to be looked at just there.
+        Path coordinates at which it changes abruptly, so that the motion must be checked exactly there.
     order : int
-        Highest time derivative of q that the values ask for: 2, or 3 where they ask for the jerk. The splines' degree
-        must be at least as high.
-    violation_scale : (c,) ndarray
-        Violation of a value that is beyond its bound by 1; 1 unless values are measured otherwise (see the module).
-    centre : (c,) ndarray
-        Value that uses nothing of the limit, where it has bounds on both sides; the ratio is 0 there.
-    bounds : tuple of Bound
-        The figures that the user could change.
+        Highest time derivative of q in the values: 2, or 3 for the jerk. The splines' degree must be at least as high.
+    violation_scale : (c,) ndarray or float
+        Violation of a value that is beyond its bound by 1 (see the module).
     refusal : str
-        What is said where an arm at rest is beyond it, after "the ... limit".
+        What a message says of an arm at rest beyond the limit, after "the ... limit".
     """
 
     kind: str
-    guarantee: Guarantee = Guarantee.AT_ALL_INSTANTS
-    role: Role = Role.ROBOT
     labels: tuple[Label, ...]
     lower: np.ndarray
     upper: np.ndarray
+    guarantee: Guarantee = Guarantee.AT_ALL_INSTANTS
+    role: Role = Role.ROBOT
     longer_time: Literal["relieves", "violates", "neither"] = "neither"
     at_rest: Literal["nothing", "posture", "turns"] = "nothing"
     breaks: np.ndarray = np.empty(0)
     order: int = 2
+    violation_scale: np.ndarray | float = 1.0
     refusal: str = "is exceeded at rest"
-
-    @abstractmethod
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """Values (K, c)."""
-
-    @abstractmethod
-    def partials(self, motion: JointMotion) -> Partials:
-        """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
 
     @property
     def name(self) -> str:
@@ -265,94 +270,71 @@ class Limit(ABC):
         return self.kind.replace("_", " ")
 
     @property
-    def violation_scale(self) -> np.ndarray:
-        """See the attributes."""
-        return np.ones(len(self.lower))
-
-    @property
     def centre(self) -> np.ndarray:
-        """See the attributes; by default the middle between two finite bounds."""
+        """Value, (c,), that uses nothing of the limit; by default the middle between two finite bounds."""
         with np.errstate(invalid="ignore"):  # -inf + inf
             return np.asarray(0.5 * self.lower + 0.5 * self.upper)
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[Bound, ...]:
-        """See the attributes; by default every finite bound by itself."""
-        ends = (("lower", self.lower), ("upper", self.upper))
+        """The figures that the user could change; by default every finite bound by itself."""
         return tuple(
-            Bound(column, float(level), max(abs(float(level)), 1.0), 1.0, end)
-            for end, levels in ends
-            for column, level in enumerate(levels)
+            Bound(column, level, max(abs(level), 1.0), 1.0, side)
+            for side in ("lower", "upper")
+            for column, level in enumerate(getattr(self, side).tolist())
             if np.isfinite(level)
         )
 
-    def lines(
-        self,
-        s: np.ndarray,
-        q: np.ndarray,
-        q_ds: np.ndarray,
-        q_dds: np.ndarray,
-    ) -> PhaseLines | None:
-        """Write the limit in the phase plane, along a joint path: postures, (S, n), at s, (S,), and derivatives by s.
 
-        None where it says nothing there.
-        """
-        return None
+class Limit(Description, ABC):
+    """c values of the joint motion at every moment, or their means over time, held between bounds."""
 
-    def step_rows(self, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """How much of the limit a step of the joints takes: rows A and B, (K, c, n), in postures (K, n).
+    @abstractmethod
+    def values(self, motion: JointStates) -> np.ndarray:
+        """Values (K, c)."""
 
-        A qddot is the part of the limit that joint accelerations qddot take, B qdot that of joint velocities; None
-        where the limit does not ask for them. The lattice measures steps between postures by them.
-        """
-        return None, None
-
-    def along(self, approach: Approach) -> Self:
-        """Return the limit for a path: where its bounds set in depends on how speeds are reached there."""
-        return self
+    @abstractmethod
+    def partials(self, motion: JointStates) -> Partials:
+        """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
 
     def relax(self, bound: Bound, amount: float) -> Self:
-        """Return the limit with one figure giving way by `amount`, in its unit."""
+        """Return the limit with one figure relaxed by `amount`, in its unit."""
         other = copy.copy(self)
         step = np.zeros(len(self.lower))
         step[bound.column] = bound.per_unit * amount
-        if bound.end != "upper":
+        if bound.side != "upper":
             other.lower = self.lower - step
-        if bound.end != "lower":
+        if bound.side != "lower":
             other.upper = self.upper + step
         return other
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """How far values, (K, c), are beyond their bounds; negative inside. See the module."""
-        return (
-            np.maximum(values - self.upper, self.lower - values) * self.violation_scale
-        )
+        beyond = np.maximum(values - self.upper, self.lower - values)
+        return np.asarray(beyond * self.violation_scale)
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """How near values, (K, c), are to their bounds; see the module."""
         above = (values - self.upper) * self.violation_scale
         below = (self.lower - values) * self.violation_scale
-        near = np.where(
+        outside = np.where(
             above >= below, np.maximum(1.0 + above, 0.0), -np.maximum(1.0 + below, 0.0)
         )
         with np.errstate(invalid="ignore"):  # inf - inf
             away = values - self.centre
-            room = np.where(
+            reach = np.where(
                 away > 0.0, self.upper - self.centre, self.centre - self.lower
             )
-        inside = np.isfinite(room) & (above <= 0.0) & (below <= 0.0)
-        return np.where(
-            inside, np.divide(away, room, out=np.zeros_like(away), where=inside), near
-        )
+        inside = np.isfinite(reach) & (above <= 0.0) & (below <= 0.0)
+        return np.divide(away, reach, out=outside, where=inside)
 
-    def ratios(self, motion: JointMotion, t: np.ndarray) -> np.ndarray:
+    def ratios(self, motion: JointStates, t: np.ndarray) -> np.ndarray:
         """How near a whole motion is to the bounds at times t, (K,), dense and ascending, s: (K, c).
 
-        What is held over the whole motion is equally near at all times.
+        A mean over the whole motion is equally near at all times.
         """
         values = self.values(motion)
         if self.guarantee.is_mean:
-            values = np.broadcast_to(
-                np.trapezoid(values, t, axis=0) / (t[-1] - t[0]), values.shape
-            )
+            mean = np.trapezoid(values, t, axis=0) / (t[-1] - t[0])
+            values = np.broadcast_to(mean, values.shape)
         return self.ratio(values)

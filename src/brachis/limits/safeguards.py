@@ -8,7 +8,7 @@ from brachis.kinematics import JointMap
 from brachis.limits.protocol import (
     Bound,
     Guarantee,
-    JointMotion,
+    JointStates,
     Label,
     Limit,
     Partials,
@@ -16,8 +16,8 @@ from brachis.limits.protocol import (
 )
 
 MARGIN = 5e-3
-"""Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid.
-Where the start posture is nearer, half of its own margin is the least one."""
+"""Least branch margin, dimensionless. Nearer to the boundary, non-redundant joints are too fast for any collocation
+grid."""
 
 
 class BranchMargin(Limit):
@@ -27,9 +27,9 @@ class BranchMargin(Limit):
     ----------
     joint_map : JointMap
     at_start : (c,) ndarray
-        Margins of the start posture.
+        Margins of the start posture; half of one is the least margin if it is smaller than `margin`.
     margin : float
-        The least one.
+        The least one, dimensionless.
     """
 
     kind = "branch_margin"
@@ -41,28 +41,22 @@ class BranchMargin(Limit):
         self, joint_map: JointMap, at_start: np.ndarray, margin: float
     ) -> None:
         self._joint_map = joint_map
-        label, count = joint_map.branch_label, len(at_start)
+        label = joint_map.branch_label
+        count = len(at_start)
         names = [f"{label} {i}" for i in range(count)] if count > 1 else [label]
         self.labels = tuple(Label(name, "branch margin", "-") for name in names)
-        self.lower, self.upper = (
-            np.minimum(margin, 0.5 * at_start),
-            np.full(count, np.inf),
+        self.lower = np.minimum(margin, 0.5 * at_start)
+        self.upper = np.full(count, np.inf)
+        self.bounds = tuple(
+            Bound(column, least, least, 1.0, "lower")
+            for column, least in enumerate(self.lower.tolist())
         )
 
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`."""
-        return tuple(
-            Bound(c, least, least, 1.0, "lower")
-            for c, least in enumerate(self.lower.tolist())
-        )
-
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`; the motion is a state of the joint map."""
+    def values(self, motion: JointStates) -> np.ndarray:
+        """Margins (K, c); the motion is a state of the joint map."""
         return self._joint_map.margins(motion)
 
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
+    def partials(self, motion: JointStates) -> Partials:
         by_q, by_s = self._joint_map.margin_gradient(motion)
         return Partials(q=by_q, s=by_s)
 
@@ -70,6 +64,6 @@ class BranchMargin(Limit):
 def build_branch_margins(
     joint_map: JointMap, margin: float = MARGIN
 ) -> tuple[BranchMargin, ...]:
-    """Build the limit, where the joint map has margins: what keeps the motion where it can be computed."""
+    """Build the limit of a joint map with margins."""
     at_start = joint_map.start_margins()
     return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

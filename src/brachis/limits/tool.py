@@ -1,21 +1,13 @@
-"""How fast the tool moves, turns and accelerates, as functions of the joint motion, with their derivatives.
+"""Limits on how fast the tool moves, turns and accelerates, as ratios to the limit: |v| / v_max <= 1.
 
 With J the Jacobian of a velocity of the tool, v = J(q) qdot and its direction e = v / |v|,
 
     d|v|/dqdot = e . J,        d|v|/dq = e . dv/dq,
 
-and likewise for the size of the acceleration a = J qddot + Jdot qdot. What is zero has no direction; far from its limit
-there, it is given none.
+and likewise for the size of the acceleration a = J qddot + Jdot qdot. A vector of zero size gets the direction zero: it
+is far from its limit.
 
-|v| <= v_max(s) of the tool frame's origin, as |v| / v_max(s) <= 1; v_max a number, or tables over the path.
-
-|a| <= a_max of the tool frame's origin, as |a| / a_max <= 1; see `tool` for the derivatives.
-
-|w| <= w_max of the tool, as |w| / w_max <= 1; see `tool` for the derivatives.
-
-A tool that rolls freely about its own axis does so by a virtual joint, which turns nothing.
-
-A largest speed over the path coordinate: piecewise linear, with steps made into ramps on their faster side.
+The largest speed of the tool frame's origin may depend on the path coordinate: piecewise linear (`SpeedTable`).
 """
 
 from __future__ import annotations
@@ -26,11 +18,12 @@ import numpy as np
 
 from brachis.limits.protocol import (
     Bound,
-    JointMotion,
+    HasPhasePlaneRows,
+    JointStates,
     Label,
     Limit,
     Partials,
-    PhaseLines,
+    PhasePlaneRows,
     Role,
 )
 from brachis.robot import ROLL_JOINT, Robot, task_map_of
@@ -38,50 +31,88 @@ from brachis.task import SpeedTable as SpeedTableModel
 from brachis.task import Task
 
 
-def direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes, (K,), of vectors (K, 3), and their directions, (K, 3); zero where there is none."""
+def _along(direction: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Differentiate sizes, (K, n): from directions, (K, 3), and the derivatives of the vectors, (K, 3, n)."""
+    return np.asarray(np.einsum("ki,kij->kj", direction, slopes))
+
+
+def _direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes, (K,), of vectors (K, 3), and their directions, (K, 3); zero for a zero vector."""
     size = np.linalg.norm(vectors, axis=1)
-    return size, np.divide(
-        vectors, size[:, None], out=np.zeros_like(vectors), where=size[:, None] > 0.0
-    )
+    zero = np.zeros_like(vectors)
+    column = size[:, None]
+    return size, np.divide(vectors, column, out=zero, where=column > 0.0)
 
 
 class ToolSpeed:
-    """Speed of the tool frame's origin, m/s.
+    """Speed of the tool frame's origin, m/s, or angular speed of the tool, rad/s.
+
+    A virtual joint about which a tool rolls freely does not turn it.
 
     Parameters
     ----------
     robot : Robot
+    angular : bool, optional
     """
 
-    def __init__(self, robot: Robot) -> None:
-        self._tool = task_map_of(robot, "position")
+    def __init__(self, robot: Robot, *, angular: bool = False) -> None:
+        self._tool = task_map_of(robot, "pose" if angular else "position")
+        self._rows = slice(3, None) if angular else slice(None)
+        is_virtual = [
+            angular and robot.rolls_freely and name == ROLL_JOINT
+            for name in robot.joint_names
+        ]
+        self._moves = np.where(is_virtual, 0.0, 1.0)
 
-    def speed(self, motion: JointMotion) -> np.ndarray:
+    def speed(self, motion: JointStates) -> np.ndarray:
         """Speeds at K moments, (K,)."""
         return self.slope(motion.q, motion.qdot)
 
     def slope(self, q: np.ndarray, q_ds: np.ndarray) -> np.ndarray:
-        """Size of the origin's displacement per unit of the path, (S,), from postures and their derivatives."""
-        jacobian = self._tool.jacobian(self._tool.twists(q))
-        return np.asarray(
-            np.linalg.norm(np.einsum("kij,kj->ki", jacobian, q_ds), axis=1)
-        )
+        """Distance or angle per unit of the path, (S,), from postures and their derivatives."""
+        jacobian = self._jacobian(self._tool.twists(q))
+        velocity = np.einsum("kij,kj->ki", jacobian, q_ds)
+        return np.asarray(np.linalg.norm(velocity, axis=1))
+
+    def _jacobian(self, twists: np.ndarray) -> np.ndarray:
+        return self._tool.jacobian(twists)[:, self._rows] * self._moves
 
     def derivatives(
-        self, motion: JointMotion
+        self, motion: JointStates
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Speeds, (K,), and their derivatives by q and by qdot, (K, n)."""
         twists = self._tool.twists(motion.q)
-        jacobian = self._tool.jacobian(twists)
-        speed, along = direction(np.einsum("kij,kj->ki", jacobian, motion.qdot))
-        by_q = self._tool.velocity_slopes(twists, motion.qdot)
-        return speed, *(
-            np.einsum("ki,kij->kj", along, part) for part in (by_q, jacobian)
+        jacobian = self._jacobian(twists)
+        speed, direction = _direction(np.einsum("kij,kj->ki", jacobian, motion.qdot))
+        qdot = motion.qdot * self._moves
+        by_q = self._tool.velocity_slopes(twists, qdot)[:, self._rows]
+        return speed, _along(direction, by_q), _along(direction, jacobian)
+
+
+class _ToolLimit(Limit, HasPhasePlaneRows):
+    """Ratios of what the tool does to its limits.
+
+    Parameters
+    ----------
+    labels : (c,) sequence of Label
+    figures : (c,) sequence of float
+        The limits, in the units of the labels.
+    """
+
+    role = Role.PROCESS
+    longer_time = "relieves"
+
+    def __init__(self, labels: Sequence[Label], figures: Sequence[float]) -> None:
+        self.labels = tuple(labels)
+        self.lower = np.full(len(labels), -np.inf)
+        self.upper = np.ones(len(labels))
+        self.bounds = tuple(
+            Bound(column, figure, figure, 1.0 / figure)
+            for column, figure in enumerate(figures)
         )
 
 
-class ToolAccelerationLimit(Limit):
+class ToolAccelerationLimit(_ToolLimit):
     """Size of the acceleration of the tool frame's origin over its limit.
 
     Parameters
@@ -92,167 +123,60 @@ class ToolAccelerationLimit(Limit):
     """
 
     kind = "tool_acceleration"
-    role = Role.PROCESS
-    longer_time = "relieves"
 
     def __init__(self, robot: Robot, figure: float) -> None:
-        self._tool, self._figure = task_map_of(robot, "position"), figure
-        self.labels = (
-            Label(
-                "tool",
-                "acceleration",
-                "m/s^2",
-                "tool_limits.acceleration",
-                share="tool acceleration / limit",
-            ),
+        label = Label(
+            "tool",
+            "acceleration",
+            "m/s^2",
+            "tool_limits.acceleration",
+            share="tool acceleration / limit",
         )
-        self.lower, self.upper = np.full(1, -np.inf), np.ones(1)
-
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`."""
-        return (Bound(0, self._figure, self._figure, 1.0 / self._figure),)
+        super().__init__([label], [figure])
+        self._tool = task_map_of(robot, "position")
+        self._figure = figure
 
     def _acceleration(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> np.ndarray:
         """Accelerations over the limit, (K, 3), world frame."""
-        jacobian = self._tool.jacobian(twists)
-        return (
-            np.einsum("kij,kj->ki", jacobian, qddot) + self._tool.bias(twists, qdot)
-        ) / self._figure
+        tangential = np.einsum("kij,kj->ki", self._tool.jacobian(twists), qddot)
+        return (tangential + self._tool.bias(twists, qdot)) / self._figure
 
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`."""
-        found = self._acceleration(
-            self._tool.twists(motion.q), motion.qdot, motion.qddot
-        )
-        return np.linalg.norm(found, axis=1)[:, None]
-
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
+    def values(self, motion: JointStates) -> np.ndarray:
         twists = self._tool.twists(motion.q)
-        _, along = direction(self._acceleration(twists, motion.qdot, motion.qddot))
+        vectors = self._acceleration(twists, motion.qdot, motion.qddot)
+        return np.linalg.norm(vectors, axis=1)[:, None]
+
+    def partials(self, motion: JointStates) -> Partials:
+        twists = self._tool.twists(motion.q)
+        vectors = self._acceleration(twists, motion.qdot, motion.qddot)
+        _, direction = _direction(vectors)
         exact = self._tool.derivatives(twists, motion.qdot, motion.qddot)
-        by = (
-            exact.acceleration_q,
-            exact.acceleration_qdot,
-            self._tool.jacobian(twists),
-        )
+        jacobian = self._tool.jacobian(twists)
+        parts = (exact.acceleration_q, exact.acceleration_qdot, jacobian)
         return Partials(
-            *(
-                np.einsum("ki,kij->kj", along, part)[:, None] / self._figure
-                for part in by
-            )
+            *(_along(direction, part)[:, None] / self._figure for part in parts)
         )
 
-    def lines(
+    def phase_plane_rows(
         self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhaseLines:
-        """See `Limit.lines`: the components along the world's axes, each within the whole."""
-        twists, still = self._tool.twists(q), np.zeros_like(q)
-        by_u = self._acceleration(twists, still, q_ds)
-        return PhaseLines(
-            by_u, self._acceleration(twists, q_ds, q_dds), np.zeros_like(by_u)
-        )
+    ) -> PhasePlaneRows:
+        """Write the components along the world's axes, each of which is not larger than the size."""
+        twists = self._tool.twists(q)
+        by_u = self._acceleration(twists, np.zeros_like(q), q_ds)
+        by_x = self._acceleration(twists, q_ds, q_dds)
+        return PhasePlaneRows(by_u, by_x, np.zeros_like(by_u))
 
 
 def build_tool_acceleration(robot: Robot, task: Task) -> ToolAccelerationLimit | None:
-    """Build the limit where the task has one."""
+    """Build the limit of a task that has one."""
     figure = task.tool_limits.acceleration
     return None if figure is None else ToolAccelerationLimit(robot, figure)
 
 
-_ANGULAR = slice(3, None)
-"""Rows of a pose's velocity that are its angular part, in the tool's own axes."""
-
-
-class ToolAngularSpeedLimit(Limit):
-    """Angular speed of the tool over its limit.
-
-    Parameters
-    ----------
-    robot : Robot
-    figure : float
-        rad/s.
-    """
-
-    kind = "tool_angular_speed"
-    role = Role.PROCESS
-    longer_time = "relieves"
-
-    def __init__(self, robot: Robot, figure: float) -> None:
-        self._tool, self._figure = task_map_of(robot, "pose"), figure
-        self._turning = np.array(
-            [
-                not (robot.rolls_freely and name == ROLL_JOINT)
-                for name in robot.joint_names
-            ]
-        )
-        self.labels = (
-            Label(
-                "tool",
-                "angular speed",
-                "rad/s",
-                "tool_limits.angular_speed",
-                share="tool angular speed / limit",
-            ),
-        )
-        self.lower, self.upper = np.full(1, -np.inf), np.ones(1)
-
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`."""
-        return (Bound(0, self._figure, self._figure, 1.0 / self._figure),)
-
-    def _jacobian(self, twists: np.ndarray) -> np.ndarray:
-        """Jacobian of the angular velocity over the limit, (K, 3, n)."""
-        return self._tool.jacobian(twists)[:, _ANGULAR] * (self._turning / self._figure)
-
-    def _speed(self, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        velocity = np.einsum("kij,kj->ki", self._jacobian(self._tool.twists(q)), qdot)
-        return np.linalg.norm(velocity, axis=1)[:, None]
-
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`."""
-        return self._speed(motion.q, motion.qdot)
-
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
-        twists, qdot = self._tool.twists(motion.q), motion.qdot * self._turning
-        jacobian = self._jacobian(twists)
-        _, along = direction(np.einsum("kij,kj->ki", jacobian, qdot))
-        by_q = self._tool.velocity_slopes(twists, qdot)[:, _ANGULAR] / self._figure
-        return Partials(
-            *(
-                np.einsum("ki,kij->kj", along, part)[:, None]
-                for part in (by_q, jacobian)
-            )
-        )
-
-    def lines(
-        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhaseLines:
-        """See `Limit.lines`: the square of the ratio."""
-        return PhaseLines(None, self._speed(q, q_ds) ** 2, np.zeros((len(q), 1)))
-
-
-def build_tool_angular_speed(robot: Robot, task: Task) -> ToolAngularSpeedLimit | None:
-    """Build the limit where the task has one."""
-    figure = task.tool_limits.angular_speed
-    return None if figure is None else ToolAngularSpeedLimit(robot, figure)
-
-
-_RAMP = 5e-3
-"""Length of a ramp in s: Newton's steps need a slope."""
-_SHARE = 0.4
-"""Part of the way to the next place that a ramp takes at most."""
-_BEYOND = 20.0
-"""Times the speed at its end, up to which a table that ends there goes on rising within a ramp."""
-
-
 class SpeedTable:
-    """Largest speeds at path coordinates.
+    """Largest speeds at path coordinates: piecewise linear, with steps made into ramps on their faster side.
 
     Parameters
     ----------
@@ -276,135 +200,140 @@ class SpeedTable:
     def __init__(
         self, s: Sequence[float], speed: Sequence[float], *, whole: bool = True
     ) -> None:
-        places, speeds = np.array(s, dtype=float), np.array(speed, dtype=float)
-        given, steps = places.copy(), np.flatnonzero(np.diff(places) == 0.0)
-        for first in steps.tolist():
-            rising = speeds[first + 1] > speeds[first]
-            moved, onwards = (first + 1, 1) if rising else (first, -1)
+        given = np.array(s, dtype=float)
+        places = given.copy()
+        speeds = np.array(speed, dtype=float)
+        ramp = 5e-3  # length in s: Newton's steps need a slope
+        for first in np.flatnonzero(np.diff(given) == 0.0).tolist():
+            # The side with the higher speed moves away from the step.
+            rises = speeds[first + 1] > speeds[first]
+            moved = first + 1 if rises else first
+            onwards = 1 if rises else -1
             beyond = moved + onwards
             if not 0 <= beyond < len(given):
-                places[moved] += onwards * _RAMP
+                places[moved] += onwards * ramp
                 continue
-            length = min(_RAMP, _SHARE * abs(given[beyond] - given[moved]))
-            share = length / abs(given[beyond] - given[moved])
+            gap = abs(given[beyond] - given[moved])
+            length = min(ramp, 0.4 * gap)
             places[moved] += onwards * length
-            speeds[moved] += share * (speed[beyond] - speed[moved])
-        kept = _bends(places, speeds)
-        self.places, self.speeds, self._whole = places[kept], speeds[kept], whole
+            speeds[moved] += length / gap * (speed[beyond] - speed[moved])
+        slopes = np.concatenate([[np.nan], np.diff(speeds) / np.diff(places), [np.nan]])
+        bends = ~np.isclose(slopes[1:], slopes[:-1], rtol=1e-12, atol=1e-12)
+        self.places = places[bends]
+        self.speeds = speeds[bends]
         self.largest = float(self.speeds.max())
-        if not whole:
-            first, last = self.places[[0, -1]]
-            self.places = np.concatenate([[first - _RAMP], self.places, [last + _RAMP]])
+        self._whole = whole
+        if not whole:  # beyond its ends the speed goes on rising within a ramp
+            first_place, last_place = self.places[[0, -1]]
+            self.places = np.concatenate(
+                [[first_place - ramp], self.places, [last_place + ramp]]
+            )
             self.speeds = np.concatenate(
-                [self.speeds[:1] * _BEYOND, self.speeds, self.speeds[-1:] * _BEYOND]
+                [20.0 * self.speeds[:1], self.speeds, 20.0 * self.speeds[-1:]]
             )
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Largest speeds, (K,), m/s, at path coordinates s, (K,), and their derivatives by s; none off the path."""
+        """Largest speeds, (K,), m/s, at path coordinates s, (K,), and their derivatives by s; infinite off the path."""
         if len(self.places) == 1:
             return np.full(len(s), self.speeds[0]), np.zeros(len(s))
-        slopes = np.concatenate(
-            [[0.0], np.diff(self.speeds) / np.diff(self.places), [0.0]]
-        )
+        slopes = np.diff(self.speeds) / np.diff(self.places)
+        slopes = np.concatenate([[0.0], slopes, [0.0]])
         piece = np.searchsorted(self.places, s, side="right")
         beyond = (s < self.places[0]) | (s > self.places[-1])
-        nowhere = np.isnan(s) | (beyond & (not self._whole))
-        return np.where(
-            nowhere, np.inf, np.interp(s, self.places, self.speeds)
-        ), slopes[piece]
+        is_free = np.isnan(s) | (beyond & (not self._whole))
+        speeds = np.interp(s, self.places, self.speeds)
+        return np.where(is_free, np.inf, speeds), slopes[piece]
 
 
-def _bends(places: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Tell which rows of a table are needed, (P,) bool: not those on the straight line between their neighbours."""
-    slopes = np.concatenate([[np.nan], np.diff(speeds) / np.diff(places), [np.nan]])
-    return ~np.isclose(slopes[1:], slopes[:-1], rtol=1e-12, atol=1e-12)
-
-
-class ToolSpeedLimit(Limit):
+class ToolSpeedLimit(_ToolLimit):
     """Speed of the tool frame's origin over its limits.
 
     Parameters
     ----------
-    robot : Robot
+    tool : ToolSpeed
     tables : (c,) sequence of SpeedTable
-        Largest speeds, m/s.
+        Largest speeds.
     labels : (c,) sequence of Label
     """
 
     kind = "tool_speed"
-    role = Role.PROCESS
-    longer_time = "relieves"
 
     def __init__(
-        self, robot: Robot, tables: Sequence[SpeedTable], labels: Sequence[Label]
+        self, tool: ToolSpeed, tables: Sequence[SpeedTable], labels: Sequence[Label]
     ) -> None:
-        self._tool, self._tables, self.labels = ToolSpeed(robot), tables, tuple(labels)
-        self.lower, self.upper = np.full(len(tables), -np.inf), np.ones(len(tables))
-        self.breaks = np.unique(
-            np.concatenate(
-                [table.places for table in tables if len(table.places) > 1] or [[]]
-            )
-        )
-
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`: the largest figure of a table stands for all of them."""
-        figures = [table.largest for table in self._tables]
-        return tuple(
-            Bound(column, figure, figure, 1.0 / figure)
-            for column, figure in enumerate(figures)
-        )
+        # The largest figure of a table stands for all of them.
+        super().__init__(labels, [table.largest for table in tables])
+        self._tool = tool
+        self._tables = tables
+        steps = [table.places for table in tables if len(table.places) > 1]
+        self.breaks = np.unique(np.concatenate(steps or [[]]))
 
     def largest_at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Largest speeds, (K, c), m/s, at path coordinates s, (K,), and their derivatives by s."""
+        """Largest speeds, (K, c), at path coordinates s, (K,), and their derivatives by s."""
         largest, slopes = zip(*(table.at(s) for table in self._tables), strict=True)
         return np.column_stack(largest), np.column_stack(slopes)
 
-    def values(self, motion: JointMotion) -> np.ndarray:
-        """See `Limit.values`."""
-        return np.asarray(
-            self._tool.speed(motion)[:, None] / self.largest_at(motion.s)[0]
-        )
+    def values(self, motion: JointStates) -> np.ndarray:
+        return self._ratios(self._tool.speed(motion), motion.s)
 
-    def partials(self, motion: JointMotion) -> Partials:
-        """See `Limit.partials`."""
+    def _ratios(self, speed: np.ndarray, s: np.ndarray) -> np.ndarray:
+        return np.asarray(speed[:, None] / self.largest_at(s)[0])
+
+    def partials(self, motion: JointStates) -> Partials:
         largest, slope = self.largest_at(motion.s)
         speed, by_q, by_qdot = self._tool.derivatives(motion)
         q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))
         return Partials(q=q, qdot=qdot, s=-speed[:, None] * slope / largest**2)
 
-    def lines(
+    def phase_plane_rows(
         self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhaseLines:
-        """See `Limit.lines`: the square of the ratio."""
-        squares = (self._tool.slope(q, q_ds)[:, None] / self.largest_at(s)[0]) ** 2
-        return PhaseLines(None, squares, np.zeros_like(squares))
+    ) -> PhasePlaneRows:
+        """Write the square of the ratio."""
+        squares = self._ratios(self._tool.slope(q, q_ds), s) ** 2
+        return PhasePlaneRows(None, squares, np.zeros_like(squares))
+
+
+class ToolAngularSpeedLimit(ToolSpeedLimit):
+    """Angular speed of the tool over its limit."""
+
+    kind = "tool_angular_speed"
 
 
 def build_tool_speed(robot: Robot, task: Task) -> ToolSpeedLimit | None:
-    """Build the limit where the task has one, or its path has feed rates."""
-    speed, feed = task.tool_limits.speed, task.tool_limits.feed
-    tables, labels = [], []
+    """Build the limit of a task that has one, or whose path has feed rates."""
+    speed = task.tool_limits.speed
+    tables = []
+    labels = []
     if speed is not None:
-        given = (
-            (speed.s, speed.speed)
+        tables.append(
+            SpeedTable(speed.s, speed.speed)
             if isinstance(speed, SpeedTableModel)
-            else ((0.0,), (speed,))
+            else SpeedTable([0.0], [speed])
         )
-        tables.append(SpeedTable(*given))
         labels.append(
             Label(
                 "tool", "speed", "m/s", "tool_limits.speed", share="tool speed / limit"
             )
         )
-    for part in feed:
+    for part in task.tool_limits.feed:
         tables.append(SpeedTable(part.s, part.speed, whole=False))
-        labels.append(
-            Label(
-                f"tool, s = {part.s[0]:g} to {part.s[-1]:g},",
-                "feed rate",
-                "m/s",
-                "tool_limits.feed",
-            )
-        )
-    return ToolSpeedLimit(robot, tables, labels) if tables else None
+        where = f"tool, s = {part.s[0]:g} to {part.s[-1]:g},"
+        labels.append(Label(where, "feed rate", "m/s", "tool_limits.feed"))
+    return ToolSpeedLimit(ToolSpeed(robot), tables, labels) if tables else None
+
+
+def build_tool_angular_speed(robot: Robot, task: Task) -> ToolAngularSpeedLimit | None:
+    """Build the limit of a task that has one."""
+    figure = task.tool_limits.angular_speed
+    if figure is None:
+        return None
+    label = Label(
+        "tool",
+        "angular speed",
+        "rad/s",
+        "tool_limits.angular_speed",
+        share="tool angular speed / limit",
+    )
+    return ToolAngularSpeedLimit(
+        ToolSpeed(robot, angular=True), [SpeedTable([0.0], [figure])], [label]
+    )

@@ -212,7 +212,7 @@ def load_remedies(
     figures = [
         bound.figure
         for bound in limit.bounds
-        if bound.column == column and bound.end is None
+        if bound.column == column and bound.side is None
     ]
     scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
     found = [
@@ -257,15 +257,15 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
         found, low, high = write_apart(value, limit.lower[column], limit.upper[column])
         return found, f"{low} to {high}"
     first = bounds[0]
-    if first.end is None:  # the value is a ratio to one figure
+    if first.side is None:  # the value is a ratio to one figure
         found, allowed = write_apart(abs(value) * first.figure, first.figure)
         return found, allowed
-    level = limit.lower[column] if first.end == "lower" else limit.upper[column]
+    level = limit.lower[column] if first.side == "lower" else limit.upper[column]
     found, *figures = write_apart(
         first.figure + (value - level) / first.per_unit,
         *(bound.figure for bound in bounds),
     )
-    ends = dict(zip((bound.end for bound in bounds), figures, strict=True))
+    ends = dict(zip((bound.side for bound in bounds), figures, strict=True))
     words = {"lower": "at least ", "upper": "at most "} if len(ends) == 1 else {}
     allowed = " to ".join(
         f"{words.get(end, '')}{ends[end]}" for end in ("lower", "upper") if end in ends

@@ -1,26 +1,26 @@
 """Implausible figures of a task or a robot: unusually large ones look like another unit.
 
-`USUAL` is the table of the largest usual figures, `USUAL_LIMITS` that of joint limits.
+`USUAL` is the table of the largest usual figures; `brachis.task.LIMIT_KINDS` has those of joint limits.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import PathError, write_apart
+from brachis.problem.plausible_limits import limit_figures
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import TURN, UNITS
-from brachis.robot.limits import STATED
 from brachis.robot.plausibility import Figure, Remark, link_lengths, reach, remarks
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
 from brachis.task import Task, ToolPose
+from brachis.task.limit_kinds import FASTEST
 from brachis.task.limit_models import SpeedTable
 
 if TYPE_CHECKING:
@@ -226,9 +226,7 @@ def of_robot(robot: Robot) -> tuple[Remark, ...]:
     """Look at limits, friction, lengths, masses, payload and mounting of a robot."""
     bare = robot.with_payload(None) if robot.settings.payload else robot
     figures = (
-        *_magnitudes(bare),
-        *_ranges(bare),
-        *_curves(bare),
+        *limit_figures(bare),
         *_lengths(robot),
         *_masses(bare),
         *_payload(robot, bare),
@@ -252,7 +250,7 @@ def _friction(robot: Robot) -> Iterator[Remark]:
         torque = robot.limits.torque[i]
         position_unit = robot.position_units[i]
         is_kept = damping == robot.friction.viscous[i]
-        is_slow = np.isfinite(torque) and fastest <= _FASTEST[position_unit]
+        is_slow = np.isfinite(torque) and fastest <= FASTEST[position_unit]
         if is_kept and is_slow and damping * fastest > torque:
             unit = UNITS["viscous"][position_unit]
             usual = f"below {torque / fastest:.3g} {unit}; viscous: null leaves it out"
@@ -297,152 +295,6 @@ def _masses(robot: Robot) -> Iterator[Figure]:
         moment = float(np.linalg.eigvalsh(body.inertia)[-1])
         yield _figure("body mass", body.mass, size**2, where)
         yield _figure("body inertia", moment, body.mass, where)
-
-
-_FASTEST = {"rad": 60.0, "m": 50.0}
-"""The quickest axes of small SCARA and delta robots turn at 50 rad/s; rails move at 10 m/s. In degrees and mm: more."""
-
-
-def _usual_torque(robot: Robot, joint: int) -> float:
-    """Return a hundred times what the URDF states; arms hold a tenth to five times their own weight at full reach."""
-    stated = _from_urdf(robot, "torque", joint)
-    largest = 100.0 * stated if stated and stated != 1.0 else math.inf
-    mass = sum(body.mass for body in list(robot.model.inertias)[1:])
-    weight = mass * 9.81 * sum(link_lengths(robot))
-    if robot.revolute[joint] and weight > 0.0:
-        largest = min(largest, 50.0 * weight)
-    return largest
-
-
-def _usual_velocity(robot: Robot, joint: int, times: float = 10.0) -> float:
-    """Return so many times what the URDF states, or as many rad/s or m/s."""
-    stated = _from_urdf(robot, "velocity", joint)
-    largest = _FASTEST[robot.position_units[joint]]
-    # URDFs state 1 for a limit that nobody knows.
-    if stated and stated != 1.0:
-        largest = min(largest, max(times * stated, times))
-    return largest
-
-
-def _usual_acceleration(robot: Robot, joint: int) -> float:
-    """Return more than the 200 rad/s^2 of small wrists, and the 150 m/s^2 of delta robots."""
-    return 500.0 if robot.revolute[joint] else 300.0
-
-
-@dataclass(frozen=True)
-class UsualLimit:
-    """What is usual of the limits of one kind.
-
-    Attributes
-    ----------
-    looks : dict of str to str
-        What unit larger ones look like, by the unit of the joint's position.
-    largest : callable
-        Largest usual limit of a joint of a robot.
-    is_torque : bool
-    """
-
-    looks: dict[str, str]
-    largest: Callable[[Robot, int], float]
-    is_torque: bool = False
-
-
-_TORQUE = UsualLimit({"rad": "mNm", "m": "mN"}, _usual_torque, is_torque=True)
-USUAL_LIMITS = {
-    "torque": _TORQUE,
-    "rms_torque": _TORQUE,
-    "velocity": UsualLimit(
-        {"rad": "degrees per second", "m": "mm per second"}, _usual_velocity
-    ),
-    "acceleration": UsualLimit(
-        {"rad": "degrees per second^2", "m": "mm/s^2"}, _usual_acceleration
-    ),
-}
-"""By kind of limit."""
-
-
-def _from_urdf(robot: Robot, kind: str, joint: int) -> float | None:
-    """Return the URDF's limit of a joint; None where it states nothing."""
-    found: float | None = getattr(robot.stated_limits[joint], STATED[kind])
-    return found
-
-
-def _magnitudes(robot: Robot) -> Iterator[Figure]:
-    """Look at limits of a robot without payload, as they were before scale and speed override."""
-    for kind, usual in USUAL_LIMITS.items():
-        scale = getattr(robot.settings.limits.scale, kind)
-        values = np.abs(robot.limits.both_ways(kind)).max(axis=0) / scale
-        if kind == "velocity":
-            values = values / robot.settings.speed_override
-        for i, (name, unit) in enumerate(
-            zip(robot.joint_names, robot.position_units, strict=True)
-        ):
-            value = float(values[i])
-            largest = usual.largest(robot, i)
-            is_replaced = kind == "torque" and robot.limits.torque_speed[i]
-            is_known = usual.is_torque and value == _from_urdf(robot, "torque", i)
-            # A power of ten is written for "no limit"; of torques one that no figure in mNm can be.
-            stands_for_none = _is_power_of_ten(value) and not (
-                usual.is_torque and not is_known and value <= 1e3 * largest
-            )
-            if 0.0 < value < math.inf and not is_replaced and not stands_for_none:
-                words = kind.replace("_", " ")
-                message = f"the {words} limit looks like {usual.looks[unit]}"
-                where = f"robot.limits.{kind}.{name}"
-                yield Figure(where, message, value, largest, UNITS[kind][unit])
-
-
-def _is_power_of_ten(value: float) -> bool:
-    return 0.0 < value < math.inf and round(math.log10(value), 9).is_integer()
-
-
-def _ranges(robot: Robot) -> Iterator[Figure]:
-    """Look at position ranges: joints with cables make a dozen turns at most."""
-    lowest = robot.limits.position_lower
-    highest = robot.limits.position_upper
-    for i, unit in enumerate(robot.position_units):
-        # In degrees, few ranges are narrower than 120; few rails are longer than 30 m.
-        usual = 120.0 if unit == "rad" else 50.0
-        known = robot.stated_limits[i]
-        if known.lower is not None and known.upper is not None:
-            width = known.upper - known.lower
-            least = 2.0 * TURN if unit == "rad" else 5.0
-            usual = min(usual, max(5.0 * width, least)) if width > 0.0 else usual
-        lower = float(lowest[i])
-        upper = float(highest[i])
-        # An end beyond this is written for "no limit": in degrees, ranges end at 720.
-        if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
-            yield Figure(
-                f"robot.limits.position.{robot.joint_names[i]}",
-                f"the position range looks like {'degrees' if unit == 'rad' else 'mm'}",
-                upper - lower,
-                usual,
-                unit,
-                " wide, or open (null)",
-                f"[{lower:.6g}, {upper:.6g}]",
-            )
-
-
-def _curves(robot: Robot) -> Iterator[Figure]:
-    """Look at the torques and the speeds of torque-speed curves."""
-    scale = robot.settings.limits.scale.torque
-    for i, curve in enumerate(robot.limits.torque_speed):
-        if not curve:
-            continue
-        unit = robot.position_units[i]
-        key = f"robot.limits.torque_speed.{robot.joint_names[i]}"
-        meant = {"rad": "rpm", "m": "mm per second"}[unit]
-        message = f"the last speed of the curve looks like {meant}"
-        # Without load motors turn at up to twice the rated speed; rpm are 9.5 times rad/s.
-        usual = _usual_velocity(robot, i, times=5.0)
-        shown_unit = UNITS["velocity"][unit]
-        aside = "; at the joint, behind its gear"
-        yield Figure(key, message, curve[-1][0], usual, shown_unit, aside)
-        message = f"the torque of the curve looks like {_TORQUE.looks[unit]}"
-        torque = curve[0][1] / scale
-        yield Figure(
-            key, message, torque, _usual_torque(robot, i), UNITS["torque"][unit]
-        )
 
 
 def check_within_reach(task_map: TaskMap, path: Path) -> None:

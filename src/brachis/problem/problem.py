@@ -12,7 +12,7 @@ from brachis.common.summary import Summary
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.kinematics import ClosedFormMap, Newton
 from brachis.limits import Limit, limits_of
-from brachis.limits.process_speed import approach_of
+from brachis.limits.process_speed import build_ramp
 from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
 from brachis.problem.feasibility import (
     branch_of,
@@ -92,15 +92,8 @@ class Problem(Summary):
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
-        approach = approach_of(
-            task,
-            robot,
-            task_map,
-            path,
-            end if start is None else start,
-            own=bool(further),
-        )
-        limits = limits_of(robot, task, further, approach)
+        ramp = build_ramp(task, robot, task_map, path, end if start is None else start)
+        limits = limits_of(robot, task, further, ramp)
         check_smoothness(limits, task.spline)
         limits = check_postures(
             task_map, limits, start, end, path, task.refinement.tolerance

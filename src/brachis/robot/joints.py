@@ -11,6 +11,8 @@ from typing import Final
 
 import numpy as np
 
+from brachis.task import LIMIT_KINDS
+
 TURN = 2.0 * np.pi
 
 
@@ -39,14 +41,7 @@ def in_turn_of(q: np.ndarray, near: np.ndarray, revolute: np.ndarray) -> np.ndar
 
 
 UNITS: Final[dict[str, dict[str, str]]] = {
-    "position": {"rad": "rad", "m": "m"},
-    "velocity": {"rad": "rad/s", "m": "m/s"},
-    "acceleration": {"rad": "rad/s^2", "m": "m/s^2"},
-    "jerk": {"rad": "rad/s^3", "m": "m/s^3"},
-    "torque": {"rad": "Nm", "m": "N"},
-    "rms_torque": {"rad": "Nm", "m": "N"},
-    "torque_rate": {"rad": "Nm/s", "m": "N/s"},
-    "power": {"rad": "W", "m": "W"},
+    **{kind: row.units for kind, row in LIMIT_KINDS.items()},
     "viscous": {"rad": "Nm s/rad", "m": "N s/m"},
     "coulomb": {"rad": "Nm", "m": "N"},
     "armature": {"rad": "kg m^2", "m": "kg"},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, make_dataclass, replace
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -11,19 +11,28 @@ import numpy as np
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError, LimitError, UnknownNameError
-from brachis.robot.torque_curves import Curve, resolve_curves
-from brachis.task import FROM_URDF, LimitScale, LimitSpec
+from brachis.task import FROM_URDF, LIMIT_KINDS, LimitScale, LimitSpec
 
-LEAST, LARGEST = 1e-6, 1e12
-"""No drive has a smaller or larger limit of torque, velocity, acceleration or their rates, in SI units; products and
-squares of such figures are still numbers."""
+Curve = tuple[tuple[float, float], ...]
+"""Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty where there is no curve."""
+
+LEAST = 1e-6
+LARGEST = 1e12
+"""Least and largest limit of torque, velocity, acceleration or their rates, in SI units; products and squares of such
+figures are still numbers."""
 FARTHEST = 1e6
-"""No position is farther from zero, rad or m: there the rounding of numbers is a tenth of a nanometre."""
-_NARROWEST = 1e-9
+"""Largest end of a position range, rad or m: there the rounding of numbers is a tenth of a nanometre."""
+MAGNITUDES = tuple(kind for kind, row in LIMIT_KINDS.items() if row.form != "range")
+"""Kinds of limits that are figures around zero for each joint."""
+_ARRAYS = tuple(name for row in LIMIT_KINDS.values() for name in row.ends)
+
+_JointArrays: Any = make_dataclass(
+    "_JointArrays", [(name, np.ndarray) for name in _ARRAYS], frozen=True, repr=False
+)
 
 
 @dataclass(frozen=True, repr=False)
-class Limits(Summary):
+class Limits(_JointArrays, Summary):  # type: ignore[misc]
     """Limits of every joint of the chain; infinite where a joint is not limited. The arrays are read-only.
 
     Attributes
@@ -47,20 +56,10 @@ class Limits(Summary):
     total_power : float
         Of the sum over all joints, W.
     torque_speed : (n,) tuple of tuple of pairs
-        Points (speed, torque), rad/s or m/s and Nm or N, of the torque that falls with speed; none where it does not.
+        Points (speed, torque), rad/s or m/s and Nm or N, of the torque that falls with speed; empty for a joint
+        without a curve.
     """
 
-    position_lower: np.ndarray
-    position_upper: np.ndarray
-    velocity_lower: np.ndarray
-    velocity_upper: np.ndarray
-    acceleration: np.ndarray
-    torque_lower: np.ndarray
-    torque_upper: np.ndarray
-    power: np.ndarray
-    rms_torque: np.ndarray
-    jerk: np.ndarray
-    torque_rate: np.ndarray
     total_power: float
     torque_speed: tuple[Curve, ...]
 
@@ -79,24 +78,15 @@ class Limits(Summary):
         return np.minimum(self.torque_upper, -self.torque_lower)
 
     def both_ways(self, kind: str) -> np.ndarray:
-        """Lower and upper limits, (2, n), of one of `MAGNITUDES`."""
-        if kind in PAIRS:
-            return np.array(
-                [getattr(self, f"{kind}_lower"), getattr(self, f"{kind}_upper")]
-            )
-        return np.array([-getattr(self, kind), getattr(self, kind)])
+        """Lower and upper limits, (2, n), of one of `LIMIT_KINDS`."""
+        ends = [getattr(self, name) for name in LIMIT_KINDS[kind].ends]
+        return np.array(ends if len(ends) == 2 else [-ends[0], ends[0]])
 
     def with_magnitudes(self, **magnitudes: np.ndarray) -> Limits:
         """Return the limits with other ones of some of `MAGNITUDES`, (n,), the same in both directions."""
-        ends: dict[str, Any] = {
-            name: sign * values
-            for kind, values in magnitudes.items()
-            for name, sign in (
-                ((f"{kind}_lower", -1.0), (f"{kind}_upper", 1.0))
-                if kind in PAIRS
-                else ((kind, 1.0),)
-            )
-        }
+        ends: dict[str, Any] = {}
+        for kind, values in magnitudes.items():
+            ends |= _arrays_of(kind, np.array([-values, values]))
         return replace(self, **ends)
 
     def with_free_joint(self) -> Limits:
@@ -110,27 +100,10 @@ class Limits(Summary):
         return replace(self, **free, torque_speed=(*self.torque_speed, ()))
 
 
-PAIRS = ("velocity", "torque")
-"""Kinds of limits that may differ in both directions: a number > 0 for each joint, or [lower, upper] around zero."""
-MAGNITUDES = (
-    "velocity",
-    "acceleration",
-    "torque",
-    "power",
-    "rms_torque",
-    "jerk",
-    "torque_rate",
-)
-"""These, and the kinds that are one number > 0 for each joint."""
-_ARRAYS = tuple(
-    name
-    for kind in ("position", *MAGNITUDES)
-    for name in (
-        (f"{kind}_lower", f"{kind}_upper") if kind in ("position", *PAIRS) else (kind,)
-    )
-)
-STATED = {"torque": "effort", "velocity": "velocity"}
-"""Those of them that a URDF states, and its words for them."""
+def _arrays_of(kind: str, pairs: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the arrays of a kind by name, from lower and upper limits, (2, n)."""
+    names = LIMIT_KINDS[kind].ends
+    return dict(zip(names, pairs[-len(names) :], strict=True))
 
 
 @dataclass(frozen=True)
@@ -143,6 +116,11 @@ class UrdfLimit:
     effort: float | None
     needs_range: bool = False
     """True where a revolute or prismatic joint states no range, so that the task has to."""
+
+    def of_kind(self, kind: str) -> float | None:
+        """Return the limit of one of `MAGNITUDES`; None without one."""
+        value: float | None = getattr(self, LIMIT_KINDS[kind].urdf, None)
+        return value
 
 
 def resolve_limits(
@@ -172,61 +150,45 @@ def resolve_limits(
     ------
     LimitError
         A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
-        nor an acceleration limit; a range is empty or ends beyond `FARTHEST`.
+        nor an acceleration limit; a range is empty or ends more than 1e6 rad or m away from zero.
     InputError
-        There is a speed override and no velocity limit; the total power is none, or a torque curve is none or
-        rises.
+        A speed override has no velocity limit to act on; the total power is outside [`LEAST`, `LARGEST`]; a torque
+        curve is not valid or rises.
     UnknownNameError
         A limit names a joint that is not of the chain.
     """
     names = list(joint_names)
     _check_scale(spec.scale)
-    found = {
-        kind: _per_joint(
-            kind,
-            getattr(spec, kind),
-            names,
-            [getattr(u, STATED.get(kind, ""), None) for u in urdf],
-        )
-        for kind in MAGNITUDES
+    pairs = {
+        kind: _magnitudes(kind, getattr(spec, kind), names, urdf) for kind in MAGNITUDES
     }
-    curves, factor = (
-        resolve_curves(spec.torque_speed, names, spec.scale.torque),
-        spec.scale.torque,
-    )
+    factor = spec.scale.torque
+    curves = _resolve_curves(spec.torque_speed, names, factor)
     # A torque that falls with speed is at its largest at rest, which is a plain limit.
     at_rest = np.array([curve[0][1] / factor if curve else np.inf for curve in curves])
-    found["torque"] = np.clip(found["torque"], -at_rest, at_rest)
-    for name, tau, acc in zip(
-        names, found["torque"][1], found["acceleration"][1], strict=True
-    ):
-        if np.isinf(tau) and np.isinf(acc):
-            raise LimitError(
-                "has neither a torque nor an acceleration limit, so its time would go to zero",
-                joint=name,
-                key=f"robot.limits.torque.{name} or robot.limits.acceleration.{name}",
-            )
-    lower, upper = _ranges(spec.position, names, urdf)
-    scaled = {
-        kind: _scaled(kind, limits, spec.scale, names) for kind, limits in found.items()
-    }
-    if speed_override != 1.0 and np.isinf(scaled["velocity"]).all():
+    pairs["torque"] = np.clip(pairs["torque"], -at_rest, at_rest)
+    is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
+    for i in np.flatnonzero(is_free):
+        raise LimitError(
+            "has neither a torque nor an acceleration limit, so its time would go to zero",
+            joint=names[i],
+            key=f"robot.limits.torque.{names[i]} or robot.limits.acceleration.{names[i]}",
+        )
+    pairs["position"] = _ranges(spec.position, names, urdf)
+    for kind in MAGNITUDES:
+        pairs[kind] = _scale_limits(kind, pairs[kind], spec.scale, names)
+    if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
         raise InputError(
             "has no velocity limit to act on",
             where="robot.speed_override",
             found=f"{speed_override:g}",
             hint="Give robot.limits.velocity, or leave the override away",
         )
-    scaled["velocity"] = scaled["velocity"] * speed_override
-    values: dict[str, Any] = {
-        kind: limits[1] for kind, limits in scaled.items() if kind not in PAIRS
-    }
-    for kind in PAIRS:
-        values |= dict(
-            zip((f"{kind}_lower", f"{kind}_upper"), scaled[kind], strict=True)
-        )
-    values |= {"total_power": _total_power(spec), "torque_speed": curves}
-    return Limits(position_lower=lower, position_upper=upper, **values)
+    pairs["velocity"] = pairs["velocity"] * speed_override
+    arrays: dict[str, Any] = {}
+    for kind, limits in pairs.items():
+        arrays |= _arrays_of(kind, limits)
+    return Limits(**arrays, total_power=_total_power(spec), torque_speed=curves)
 
 
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
@@ -242,33 +204,24 @@ def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
 
 def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
     """State limits joint by joint; joints beyond `names` are left out."""
-
-    def finite(values: np.ndarray) -> list[float | None]:
-        return [
-            float(value) if np.isfinite(value) else None
-            for value in values[: len(names)]
+    spec: dict[str, Any] = {}
+    for kind, row in LIMIT_KINDS.items():
+        values = limits.both_ways(kind).T[: len(names)]
+        pairs = [
+            [end if np.isfinite(end) else None for end in pair]
+            for pair in values.tolist()
         ]
-
-    ranges = zip(
-        finite(limits.position_lower), finite(limits.position_upper), strict=True
-    )
-    spelled: dict[str, Any] = {"position": ranges}
-    for kind in MAGNITUDES:
-        pairs = zip(*(finite(ends) for ends in limits.both_ways(kind)), strict=True)
-        spelled[kind] = [
-            upper if lower is None or -lower == upper else (lower, upper)
-            for lower, upper in pairs
-        ]
-    by_name = {
-        kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()
-    }
-    curves = {
-        name: curve
-        for name, curve in zip(names, limits.torque_speed, strict=False)
-        if curve
-    }
-    total = limits.total_power if np.isfinite(limits.total_power) else None
-    return LimitSpec(**by_name, total_power=total, torque_speed=curves or None)
+        spec[kind] = {
+            name: pair[1]
+            if row.form != "range" and (pair[0] is None or -pair[0] == pair[1])
+            else tuple(pair)
+            for name, pair in zip(names, pairs, strict=True)
+        }
+    curves = zip(names, limits.torque_speed, strict=False)
+    spec["torque_speed"] = {name: curve for name, curve in curves if curve} or None
+    if np.isfinite(limits.total_power):
+        spec["total_power"] = limits.total_power
+    return LimitSpec(**spec)
 
 
 def _check_scale(scale: LimitScale) -> None:
@@ -290,46 +243,45 @@ def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float)
 
 
-def _scaled(
+def _scale_limits(
     kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[str]
 ) -> np.ndarray:
     """Multiply limits, (2, n), by their factor."""
-    factor = getattr(scale, kind)
-    for name, pair in zip(names, limits.T, strict=True):
-        for limit in pair[np.isfinite(pair)]:
-            _check_size(
-                kind,
-                abs(float(limit)) * factor,
-                name,
-                f"robot.limits.scale.{kind}",
-                "scaled ",
-            )
-    return np.asarray(limits * factor)
+    with np.errstate(over="ignore"):
+        scaled = np.asarray(limits * getattr(scale, kind))
+    for i, name in enumerate(names):
+        figures = scaled[np.isfinite(limits[:, i]), i]
+        _check_sizes(f"scaled {kind}", figures, name, f"robot.limits.scale.{kind}")
+    return scaled
 
 
 def _total_power(spec: LimitSpec) -> float:
-    """Return the limit of the sum of the joints' powers, W; infinite where there is none."""
-    stated, key = spec.total_power, "robot.limits.total_power"
-    if stated is None:
+    """Return the limit of the sum of the joints' powers, W; infinite without one."""
+    given = spec.total_power
+    if given is None:
         return np.inf
-    if not (_is_number(stated) and LEAST <= stated * spec.scale.power <= LARGEST):
-        allowed = (
-            f"a number from {LEAST:g} to {LARGEST:g}, scaled too, or null for no limit"
+    factor = spec.scale.power
+    if not (_is_number(given) and LEAST <= given * factor <= LARGEST):
+        raise InputError(
+            "is not a power in W",
+            where="robot.limits.total_power",
+            found=given,
+            allowed=f"a number from {LEAST:g} to {LARGEST:g}, scaled too, or null for no limit",
         )
-        raise InputError("is no power in W", where=key, found=stated, allowed=allowed)
-    return float(stated) * spec.scale.power
+    return float(given) * factor
 
 
-def _check_size(kind: str, limit: float, joint: str, key: str, what: str) -> None:
-    """Refuse a limit that no drive has."""
-    if not LEAST <= limit <= LARGEST:
-        raise LimitError(
-            f"{what}{kind} limit is none of a real drive",
-            joint=joint,
-            key=key,
-            found=f"{limit:g}",
-            allowed=f"{LEAST:g} to {LARGEST:g} in SI units, or null for no limit",
-        )
+def _check_sizes(what: str, figures: np.ndarray, joint: str, key: str) -> None:
+    """Refuse figures of limits whose products and squares would not be accurate."""
+    for limit in np.abs(figures):
+        if not LEAST <= limit <= LARGEST:
+            raise LimitError(
+                f"{what} limit is too small or too large",
+                joint=joint,
+                key=key,
+                found=f"{limit:g}",
+                allowed=f"{LEAST:g} to {LARGEST:g} in SI units, or null for no limit",
+            )
 
 
 def per_joint_values(
@@ -361,101 +313,152 @@ def per_joint_values(
     return [value] * len(names)
 
 
-def _per_joint(
-    kind: str, value: object, names: list[str], urdf: Sequence[float | None]
+def _magnitudes(
+    kind: str, value: object, names: list[str], urdf: Sequence[UrdfLimit]
 ) -> np.ndarray:
     """Spread one kind of limit over the joints: lower and upper ones, (2, n); infinite where not limited."""
     key = f"robot.limits.{kind}"
-    listed = per_joint_values(key, value, names, FROM_URDF)
+    is_pair = LIMIT_KINDS[kind].form == "pair"
     limits = np.tile([[-np.inf], [np.inf]], len(names))
-    for i, (name, entry, stated) in enumerate(zip(names, listed, urdf, strict=True)):
-        chosen = stated if isinstance(entry, str) and entry == FROM_URDF else entry
-        if chosen is None:
+    listed = per_joint_values(key, value, names, FROM_URDF)
+    for i, (name, entry) in enumerate(zip(names, listed, strict=True)):
+        from_urdf = isinstance(entry, str) and entry == FROM_URDF
+        given = urdf[i].of_kind(kind) if from_urdf else entry
+        if given is None:
             continue
-        pair = (
-            list(chosen)
-            if kind in PAIRS
-            and isinstance(chosen, Sequence)
-            and not isinstance(chosen, str)
-            else None
-        )
-        ends = pair or [-chosen if _is_number(chosen) else chosen, chosen]
+        ends: list[Any] = [-given if _is_number(given) else given, given]
+        problem = "is not positive"
+        if is_pair and isinstance(given, Sequence) and not isinstance(given, str):
+            ends = list(given)
+            problem = "is not a pair around zero"
+        elif not _is_number(given):
+            problem = "is not a number"
         numbers = len(ends) == 2 and all(_is_number(end) for end in ends)
         if not (numbers and ends[0] < 0.0 < ends[1]):
-            where = "the URDF" if chosen is not entry else "the task"
-            problem = (
-                "is no pair around zero"
-                if pair
-                else f"is not {'positive' if numbers else 'a number'}"
-            )
+            pair = "[lower, upper] with lower < 0 < upper, " if is_pair else ""
             raise LimitError(
-                f"{kind} limit in {where} {problem}",
+                f"{kind} limit in {'the URDF' if from_urdf else 'the task'} {problem}",
                 joint=name,
                 key=f"{key}.{name}",
-                found=f"{chosen:g}" if _is_number(chosen) else repr(chosen),
-                allowed="a number > 0, "
-                + ("[lower, upper] with lower < 0 < upper, " if kind in PAIRS else "")
-                + "or null for no limit",
+                found=f"{given:g}" if _is_number(given) else repr(given),
+                allowed=f"a number > 0, {pair}or null for no limit",
             )
-        for end in ends:
-            if np.isfinite(end):
-                _check_size(kind, abs(end), name, f"{key}.{name}", "")
         limits[:, i] = ends
+        figures = limits[np.isfinite(limits[:, i]), i]
+        _check_sizes(kind, figures, name, f"{key}.{name}")
     return limits
 
 
-def _ranges(
-    value: object, names: list[str], urdf: Sequence[UrdfLimit]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Spread the position ranges over the joints; infinite where not limited."""
+def _ranges(value: object, names: list[str], urdf: Sequence[UrdfLimit]) -> np.ndarray:
+    """Spread the position ranges over the joints, (2, n); infinite where not limited."""
+    ranges = np.tile([[-np.inf], [np.inf]], len(names))
     listed = per_joint_values("robot.limits.position", value, names, FROM_URDF)
-    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    for i, (name, entry, stated) in enumerate(zip(names, listed, urdf, strict=True)):
-        chosen = (stated.lower, stated.upper) if entry == FROM_URDF else entry
-        if entry == FROM_URDF and stated.needs_range:
+    for i, (name, entry, known) in enumerate(zip(names, listed, urdf, strict=True)):
+        key = f"robot.limits.position.{name}"
+        given = (known.lower, known.upper) if entry == FROM_URDF else entry
+        if entry == FROM_URDF and known.needs_range:
             raise LimitError(
                 "has no position range in the URDF",
                 joint=name,
-                key=f"robot.limits.position.{name}",
+                key=key,
                 allowed='<limit lower="..." upper="..." .../>, type="continuous", or a range in the task',
             )
-        if chosen is None:
+        if given is None:
             continue
-        ends = list(chosen) if isinstance(chosen, Sequence) else []
+        ends = list(given) if isinstance(given, Sequence) else []
         if len(ends) != 2 or not all(end is None or _is_number(end) for end in ends):
             raise LimitError(
                 "position range is not a pair",
                 joint=name,
-                key=f"robot.limits.position.{name}",
-                found=ends or chosen,
+                key=key,
+                found=ends or given,
                 allowed="[lower, upper]",
             )
-        lower[i] = -np.inf if ends[0] is None else float(ends[0])
-        upper[i] = np.inf if ends[1] is None else float(ends[1])
-        _check_range(lower[i], upper[i], name)
-    return lower, upper
+        lower = -np.inf if ends[0] is None else float(ends[0])
+        upper = np.inf if ends[1] is None else float(ends[1])
+        problem = allowed = ""
+        if not upper - lower >= 1e-9:
+            problem = "is empty"
+            allowed = "[lower, upper] with lower < upper, 1e-09 rad or m apart at least"
+        elif any(FARTHEST < abs(end) < np.inf for end in (lower, upper)):
+            problem = "ends too far away"
+            allowed = f"ends within {FARTHEST:g} rad or m of zero, null for an open end"
+        if problem:
+            raise LimitError(
+                f"position range {problem}",
+                joint=name,
+                key=key,
+                found=f"[{lower:g}, {upper:g}]",
+                allowed=allowed,
+            )
+        ranges[:, i] = lower, upper
+    return ranges
 
 
-def _check_range(lower: float, upper: float, joint: str) -> None:
-    """Refuse a range that is empty, or ends where positions are no longer exact."""
-    key, found = f"robot.limits.position.{joint}", f"[{lower:g}, {upper:g}]"
-    if not upper - lower >= _NARROWEST:
-        allowed = (
-            f"[lower, upper] with lower < upper, {_NARROWEST:g} rad or m apart at least"
+def _resolve_curves(
+    stated: object, names: Sequence[str], factor: float
+) -> tuple[Curve, ...]:
+    """Check the curves of a chain's joints, and multiply their torques by a factor."""
+    if stated is None:
+        return ((),) * len(names)
+    if not isinstance(stated, Mapping):
+        raise InputError(
+            "is not a mapping of joint names",
+            where="robot.limits.torque_speed",
+            found=stated,
+            allowed="{joint: [[speed, torque], ...]}",
         )
-        raise LimitError(
-            "position range is empty",
-            joint=joint,
-            key=key,
+    for name in stated:
+        if name not in names:
+            raise UnknownNameError(
+                "joint", name, names, where="robot.limits.torque_speed"
+            )
+    return tuple(_resolve_curve(stated.get(name), name, factor) for name in names)
+
+
+def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
+    """Check a joint's curve, and scale its torques."""
+    if points is None:
+        return ()
+    key = f"robot.limits.torque_speed.{joint}"
+    try:
+        table = np.array(points, dtype=float)
+    except (TypeError, ValueError):
+        table = np.empty(0)
+    is_table = table.ndim == 2 and len(table) >= 2 and table.shape[1] == 2
+    if not (is_table and np.isfinite(table).all()):
+        raise InputError(
+            "is not a torque curve",
+            where=key,
+            found=points,
+            allowed="two or more points [speed, torque]",
+        )
+    speed, torque = table.T
+    found = ", ".join(f"[{v:g}, {tau:g}]" for v, tau in table)
+    ascends = speed[0] == 0.0 and np.all(np.diff(speed) > 0.0)
+    if not (ascends and speed[-1] <= LARGEST):
+        raise InputError(
+            "speeds are out of order",
+            where=key,
             found=found,
-            allowed=allowed,
+            allowed=f"speeds that begin at 0 and ascend, at most {LARGEST:g}",
         )
-    if any(np.isfinite(end) and abs(end) > FARTHEST for end in (lower, upper)):
-        allowed = f"ends within {FARTHEST:g} rad or m of zero, null for an open end"
-        raise LimitError(
-            "position range ends too far away",
-            joint=joint,
-            key=key,
+    if not (LEAST <= torque[0] * factor <= LARGEST and np.all(torque >= 0.0)):
+        raise InputError(
+            "torques are negative, too small or too large",
+            where=key,
             found=found,
-            allowed=allowed,
+            allowed=f"torques >= 0, at rest from {LEAST:g} to {LARGEST:g}, scaled too",
         )
+    # The same torque may have been rounded to different figures.
+    rising = np.flatnonzero(np.diff(torque) > 1e-12 * torque[0])
+    if len(rising):
+        raise InputError(
+            "the torque rises with the speed",
+            where=f"{key}[{rising[0] + 1}]",
+            found=found,
+            allowed="torques that stay or fall from point to point",
+            hint="Leave out the points to which it rises; the curve then lies below them",
+        )
+    torques = np.minimum.accumulate(torque) * factor
+    return tuple(zip(speed.tolist(), torques.tolist(), strict=True))

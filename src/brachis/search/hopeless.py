@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brachis.errors import Remedy, UnreachableError
-from brachis.limits import JointMotion, Limit, Moments
+from brachis.limits import HasPhasePlaneRows, JointStates, Limit, Moments
 from brachis.limits.tool import ToolSpeed
 from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.feasibility import in_figures, load_remedies
@@ -276,7 +276,7 @@ def _explain_end_speed(
 
 
 def _explain_shortfall(
-    start: InitialGuess, motion: JointMotion, how: str, q: np.ndarray
+    start: InitialGuess, motion: JointStates, how: str, q: np.ndarray
 ) -> Failure | None:
     """Tell where a motion, whose places ascend, falls short of a least speed most; None if it does not.
 
@@ -345,15 +345,17 @@ def _find_speed_cap(
     inside = (part[0] <= _S) & (part[1] >= _S) & (slope > _STILL)
     cap = (math.inf, 0.0, "")
     for limit in _others(problem) if inside.any() else ():
-        lines = limit.lines(_S[inside], q[inside], q_ds[inside], q_dds[inside])
-        if lines is None:
+        if not isinstance(limit, HasPhasePlaneRows):
             continue
-        slant = lines.x
+        rows = limit.phase_plane_rows(
+            _S[inside], q[inside], q_ds[inside], q_dds[inside]
+        )
+        slant = rows.x
         lower = -np.inf
-        if lines.u is not None:
-            slant = lines.x + lines.u * bend[inside, None]
+        if rows.u is not None:
+            slant = rows.x + rows.u * bend[inside, None]
             lower = -1.0
-        end = np.where(slant > 0.0, 1.0, lower) - lines.constant
+        end = np.where(slant > 0.0, 1.0, lower) - rows.constant
         with np.errstate(divide="ignore", invalid="ignore"):
             level = np.where(slant == 0.0, np.inf, np.maximum(end / slant, 0.0))
         squares = level * slope[inside, None] ** 2

@@ -15,7 +15,7 @@ some multiple of 2 pi brings the whole joint path there. The length of an edge,
 
     max |A(q) dq|  +  T max |B(q) dq|
 
-with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not
+with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `HasLatticeWeights`, does not
 depend on how fast the joint path is followed: with the first term alone the time of a
 straight one is 2 sqrt(length).
 """
@@ -29,7 +29,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.limits import Limit, Moments
+from brachis.limits import HasLatticeWeights, Limit, Moments
 from brachis.path import Path
 from brachis.problem.problem import Problem
 from brachis.robot import Robot, TaskMap
@@ -393,8 +393,10 @@ class Lattice(ABC):
         by_acceleration = np.zeros(len(step))
         by_velocity = np.zeros(len(step))
         for limit in self.problem.limits:
+            if not isinstance(limit, HasLatticeWeights):
+                continue
             for length, rows in zip(
-                (by_acceleration, by_velocity), limit.step_rows(q), strict=True
+                (by_acceleration, by_velocity), limit.lattice_weights(q), strict=True
             ):
                 if rows is not None:
                     parts = np.abs(np.einsum("eij,ej->ei", rows[origin], step))

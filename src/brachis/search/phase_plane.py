@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.limits import Limit
+from brachis.limits import HasPhasePlaneRows, Limit
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
 from brachis.optimise.program import Program
@@ -153,17 +153,17 @@ def _collect_lines(
     ceiling = np.full(len(stations), np.inf)
     sloped = []
     for limit in limits:
-        line = limit.lines(stations, *joints)
-        if line is None:
+        if not isinstance(limit, HasPhasePlaneRows):
             continue
-        if line.u is not None:
-            sloped.append((line.u, line.x, line.constant))
+        rows = limit.phase_plane_rows(stations, *joints)
+        if rows.u is not None:
+            sloped.append((rows.u, rows.x, rows.constant))
             continue
         with np.errstate(divide="ignore", invalid="ignore"):
-            level = (1.0 - line.constant) / line.x
-        highest = np.where(line.x > 0.0, level, np.inf).min(axis=1)
+            level = (1.0 - rows.constant) / rows.x
+        highest = np.where(rows.x > 0.0, level, np.inf).min(axis=1)
         ceiling = np.minimum(ceiling, highest)
-        floor = np.maximum(floor, np.where(line.x < 0.0, level, 0.0).max(axis=1))
+        floor = np.maximum(floor, np.where(rows.x < 0.0, level, 0.0).max(axis=1))
     a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
     # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
     a = np.where(np.abs(a) < _TINY, _TINY, a)

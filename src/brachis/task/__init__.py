@@ -2,10 +2,9 @@
 
 from brachis.task.fitted import fit_path
 from brachis.task.keywords import TaskKeywords, check_keywords, task_with
+from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
 from brachis.task.limit_models import (
     FROM_URDF,
-    LimitKeywords,
-    LimitScale,
     LimitSpec,
     ProcessSpeed,
     SpeedTable,
@@ -68,6 +67,7 @@ from brachis.task.settings import (
 
 __all__ = [
     "FROM_URDF",
+    "LIMIT_KINDS",
     "AlongTangent",
     "ArcCenter",
     "ArcSegment",

@@ -7,7 +7,8 @@ from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
 from brachis.task.fields import Model, plain
-from brachis.task.limit_models import Array, LimitKeywords, LimitSpec, ToolLimits
+from brachis.task.limit_kinds import Array, LimitKeywords
+from brachis.task.limit_models import LimitSpec, ToolLimits
 from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task

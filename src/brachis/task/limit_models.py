@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Final, Literal, Protocol, TypedDict, Unpack
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, make_dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Unpack
 
 import numpy as np
 from pydantic import (
@@ -26,7 +26,7 @@ from pydantic import (
     model_validator,
 )
 
-from brachis.errors import UnknownNameError, write_count
+from brachis.errors import write_count
 from brachis.task.fields import (
     ByForm,
     Model,
@@ -39,16 +39,10 @@ from brachis.task.fields import (
     plain,
     refuse,
 )
+from brachis.task.limit_kinds import LIMIT_KINDS, LimitKeywords, LimitScale
 
 FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the URDF supplies it."""
-
-
-class Array(Protocol):
-    """What a NumPy array or scalar is to this stage, which does not import NumPy."""
-
-    def tolist(self) -> Any:
-        """Return plain numbers."""
 
 
 def _increasing(
@@ -111,63 +105,44 @@ TorqueCurve = Annotated[
 ]
 """Points [speed, torque]."""
 
-# What a program may give: NumPy arrays stand for lists and numbers too.
-_StatedPair = Array | Sequence[float | None] | None
-StatedLimit = (
-    float
-    | Array
-    | Sequence[float | _StatedPair]
-    | Mapping[str, float | _StatedPair]
-    | str
-    | None
+_FORMS = {"number": OwnLimit, "pair": UrdfLimit, "range": PositionLimit}
+_JointLimits: Any = make_dataclass(
+    "_JointLimits",
+    [
+        (
+            row.name,
+            Annotated[_FORMS[row.form], Field(description=row.description)],
+            None if row.form == "number" else FROM_URDF,
+        )
+        for row in LIMIT_KINDS.values()
+    ],
+    frozen=True,
 )
-StatedCurves = Mapping[str, Array | Sequence[_StatedPair] | None] | None
-StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
 
 
-class LimitKeywords(TypedDict, total=False):
-    """Arguments of `LimitSpec`."""
-
-    torque: StatedLimit
-    velocity: StatedLimit
-    acceleration: StatedLimit
-    position: StatedRange
-    scale: Mapping[str, float] | LimitScale | None
-    power: StatedLimit
-    total_power: float | None
-    rms_torque: StatedLimit
-    torque_speed: StatedCurves
-    jerk: StatedLimit
-    torque_rate: StatedLimit
-
-
-class LimitScale(Model):
-    """Factors on the limits, to keep a distance from them."""
-
-    torque: Positive = Field(
-        default=1.0, description="Factor on all torque and force limits, curves too."
-    )
-    velocity: Positive = Field(
-        default=1.0, description="Factor on all velocity limits."
-    )
-    acceleration: Positive = Field(
-        default=1.0, description="Factor on all acceleration limits."
-    )
-    power: Positive = Field(
-        default=1.0, description="Factor on all power limits, the total one too."
-    )
-    rms_torque: Positive = Field(
-        default=1.0, description="Factor on all limits of root-mean-square torques."
-    )
-    jerk: Positive = Field(default=1.0, description="Factor on all jerk limits.")
-    torque_rate: Positive = Field(
-        default=1.0, description="Factor on all limits of torque rates."
-    )
-
-
-@dataclass(frozen=True, init=False)
-class LimitSpec:
+@dataclass(frozen=True)
+class LimitSpec(_JointLimits):  # type: ignore[misc]
     """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation).
+
+    They are checked when a robot is made with them, whose joints are known.
+
+    Parameters
+    ----------
+    torque, velocity : float, sequence, array, mapping or None, optional
+        Nm or N; rad/s or m/s. One number for all joints, one for each in chain order, or numbers by joint name; a pair
+        [lower, upper] around zero in the place of a joint's number; None, also for a single joint: not limited;
+        `FROM_URDF`: as in the URDF.
+    position : sequence, array, mapping or None, optional
+        Pairs [lower, upper], rad or m, likewise; an end that is None is open.
+    acceleration, power, rms_torque, jerk, torque_rate : float, sequence, array, mapping or None, optional
+        rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; Nm/s or N/s. One number, numbers or None as for the torque. The
+        last two need ``spline.degree`` >= 3 and acceleration at rest.
+    scale : mapping or LimitScale, optional
+        Factors on limits, applied after all else.
+    total_power : float or None, optional
+        W.
+    torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
+        Points [speed, torque] by joint name.
 
     Examples
     --------
@@ -176,50 +151,13 @@ class LimitSpec:
     2.0
     """
 
-    torque: Annotated[
-        UrdfLimit,
-        Field(
-            description="Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none."
-        ),
-    ] = FROM_URDF
-    velocity: Annotated[
-        UrdfLimit,
-        Field(
-            description="Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none."
-        ),
-    ] = FROM_URDF
-    acceleration: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none."
-        ),
-    ] = None
-    position: Annotated[
-        PositionLimit,
-        Field(
-            description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none."
-        ),
-    ] = FROM_URDF
     scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(
         default_factory=LimitScale
     )
-    power: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest mechanical power, torque x speed either way, W. Absent or null: none."
-        ),
-    ] = None
     total_power: Annotated[
         Positive | None,
         Field(
             description="Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."
-        ),
-    ] = None
-    rms_torque: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest root mean square of the torque over the whole motion, N m (force, N): what heats a "
-            "motor. Absent or null: none."
         ),
     ] = None
     torque_speed: Annotated[
@@ -230,52 +168,23 @@ class LimitSpec:
             "torque. The same both ways, driving and braking. Absent or null: none."
         ),
     ] = None
-    jerk: Annotated[
-        OwnLimit,
-        Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none."),
-    ] = None
-    torque_rate: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none."
-        ),
-    ] = None
 
     __pydantic_config__ = Model.model_config
 
-    def __init__(self, **stated: Unpack[LimitKeywords]) -> None:
-        """Take limits from a program; they are checked when a robot is made with them, where its joints are known.
+    if TYPE_CHECKING:
 
-        Parameters
-        ----------
-        torque, velocity, acceleration : float, sequence, array, mapping or None, optional
-            Nm or N; rad/s or m/s; rad/s^2 or m/s^2. One number for all joints, one for each in chain order, or numbers
-            by joint name; for torque and velocity a pair [lower, upper] around zero in the place of a joint's number;
-            None, also for a single joint: not limited; `FROM_URDF`: as in the URDF.
-        position : sequence, array, mapping or None, optional
-            Pairs [lower, upper], rad or m, likewise; an end that is None is open.
-        scale : mapping or LimitScale, optional
-            Factors on limits, applied after all else.
-        power, rms_torque : float, sequence, array, mapping or None, optional
-            W; Nm or N. As `acceleration`.
-        total_power : float or None, optional
-            W.
-        torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
-            Points [speed, torque] by joint name.
-        jerk, torque_rate : float, sequence, array, mapping or None, optional
-            rad/s^3 or m/s^3; Nm/s or N/s. As `acceleration`. They need ``spline.degree`` >= 3 and acceleration at rest.
-        """
-        given: dict[str, Any] = {"scale": None, **stated}
-        if not isinstance(given["scale"], LimitScale):
-            factors = plain(given["scale"] or {})
-            given["scale"] = LimitScale().model_copy(update=factors)  # type: ignore[arg-type]
+        def __init__(self, **limits: Unpack[LimitKeywords]) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Take arrays for plain numbers, and a mapping for the scale."""
+        if not isinstance(self.scale, LimitScale):
+            given = self.scale or {}
+            factors = {kind: plain(factor) for kind, factor in given.items()}
+            scale = LimitScale().model_copy(update=factors)
+            object.__setattr__(self, "scale", scale)
         for each in fields(self):
-            value = plain(given.pop(each.name, each.default), tuple)
+            value = plain(getattr(self, each.name), tuple)
             object.__setattr__(self, each.name, value)
-        if given:
-            raise UnknownNameError(
-                "limit", next(iter(given)), LimitKeywords.__annotations__
-            )
 
 
 _SPEED = {"ge": 1e-6, "le": 1e12}

@@ -10,7 +10,7 @@ import numpy as np
 
 from brachis import Robot
 from brachis.errors import UnknownNameError
-from brachis.limits import JointMotion, Label, Limit, Partials
+from brachis.limits import JointStates, Label, Limit, Partials
 
 
 class CoupledRange:
@@ -50,10 +50,10 @@ class BoundRange(Limit):
             [[float(name in given.joints) for name in robot.joint_names]]
         )
 
-    def values(self, motion: JointMotion) -> np.ndarray:
+    def values(self, motion: JointStates) -> np.ndarray:
         """Sum of the two positions, (K, 1)."""
         return motion.q @ self._sum.T
 
-    def partials(self, motion: JointMotion) -> Partials:
+    def partials(self, motion: JointStates) -> Partials:
         """Differentiate the sum."""
         return Partials(q=np.broadcast_to(self._sum, (len(motion.q), *self._sum.shape)))

@@ -98,7 +98,7 @@ class CheckedSensitivity:
         return {
             "subject": entry.label.subject,
             "kind": entry.label.kind,
-            "end": entry.bound.end,
+            "end": entry.bound.side,
             "predicted_s": self.predicted,
             "linearised_s": self.linearised,
             "re_solved_s": self.re_solved,
@@ -210,7 +210,9 @@ def _check_limits(
         if abs(entry.change(step)) <= _NO_CHANGE * t_end(base):
             checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
         else:
-            raised = program.relax(entry.limit, entry.bound, step * entry.bound.whole)
+            raised = program.relax(
+                entry.limit, entry.bound, step * entry.bound.full_scale
+            )
             checked.append(_compare(entry, entry.change(step), program, raised, base))
     return SensitivityCheck(
         step, t_end(base), tuple(checked), time.perf_counter() - began

@@ -286,18 +286,18 @@ class Sensitivity:
     @property
     def outwards(self) -> float:
         """Sign of a change of the figure that leaves more room."""
-        return -1.0 if self.bound.end == "lower" else 1.0
+        return -1.0 if self.bound.side == "lower" else 1.0
 
     def change(self, fraction: float) -> float:
         """Predict the change of t_E, s, for a limit that leaves more room by a fraction; 0.01 is +1 %."""
-        return self.outwards * self.derivative * self.bound.whole * fraction
+        return self.outwards * self.derivative * self.bound.full_scale * fraction
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
         return {
             "subject": self.label.subject,
             "kind": self.label.kind,
-            "end": self.bound.end,
+            "end": self.bound.side,
             "limit": self.bound.figure,
             "unit": self.label.unit,
             "derivative_s_per_unit": self.derivative,
@@ -365,7 +365,7 @@ class Sensitivities(Summary):
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
         """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
         for entry in self.limits:
-            if (entry.label.subject, entry.label.kind, entry.bound.end) == (
+            if (entry.label.subject, entry.label.kind, entry.bound.side) == (
                 subject,
                 kind,
                 end,
@@ -432,7 +432,7 @@ def _sensitivity(
     limit: Limit, bound: Bound, rates: np.ndarray, multipliers: Multipliers
 ) -> Sensitivity:
     """Sensitivity to a figure that moves the bounds of the rows outwards at `rates`, (c,)."""
-    if bound.end is None:
+    if bound.side is None:
         return Sensitivity(limit, bound, multipliers.change(rates))
-    sign = 1.0 if bound.end == "lower" else -1.0
+    sign = 1.0 if bound.side == "lower" else -1.0
     return Sensitivity(limit, bound, -sign * multipliers.change(rates, sign))

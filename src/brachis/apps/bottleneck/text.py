@@ -84,11 +84,11 @@ def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
     """Say what more room at one limit saves."""
     saved = -entry.change(_FRACTION)
     label = entry.label
-    end = entry.bound.end
+    end = entry.bound.side
     unit, factor = shown_unit(label.unit, degrees=degrees)
-    amount = f"{factor * _FRACTION * entry.bound.whole:.3g} {unit}"
-    if label.room:
-        more = f"{amount} more {label.room}"
+    amount = f"{factor * _FRACTION * entry.bound.full_scale:.3g} {unit}"
+    if label.slack_text:
+        more = f"{amount} more {label.slack_text}"
     elif end is None:
         more = (
             f"{100.0 * _FRACTION:.0f} % more {label.kind} at {label.subject} ({amount})"
@@ -134,7 +134,7 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
         if not entry.predicted:
             continue
         what = " ".join(
-            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end))
+            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.side))
         )
         line = (
             f"checked, {what} +{percent}: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
@@ -184,7 +184,7 @@ def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
             )
             share = f"{100.0 * entry.share:.1f} % of the time"
             reached = (
-                entry.label.reached
+                entry.label.active_text
                 or f"{entry.label.subject} is at its {entry.label.kind} limit"
             )
             lines.append(f"{reached} for {share}, {times}")

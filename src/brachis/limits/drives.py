@@ -1,0 +1,236 @@
+"""Limits of drives that are not one number for each joint: the total power, and torque that falls with speed.
+
+|sum over the joints of tau qdot| <= P_total, as a ratio in [-1, 1].
+
+|tau| <= T(|qdot|) with T piecewise linear and falling, the same for driving and braking, is two values for each joint
+with such a curve, over its torque at rest, with T rounded from below (`RoundedCurve`):
+
+    (tau - T(qdot)) / T_0 <= 0,        (-tau - T(qdot)) / T_0 <= 0.
+
+The level beginning of a curve is the plain torque limit.
+
+The rounded curve is twice continuously differentiable and nowhere above the given one. With slopes m_k between the
+points of the curve, w_k half the width of the rounding of a corner at speed v_k, and the curve taken as an even
+function of the velocity v,
+
+    T(v) = T(0) + sum_k (m_k - m_{k-1}) (r((v - v_k) / w_k) + r((-v - v_k) / w_k)) w_k,        m_{-1} = 0,
+
+where r(y) w is the ramp max(x, 0), x = w y, with its corner rounded between y = -1 and 1, nowhere below the ramp:
+
+    r(y) = (3 + 8 y + 6 y^2 - y^4) / 16.
+
+Where a curve falls ever more steeply this lies below it. A corner behind which it falls less steeply is first moved to
+the left by w_k, on the line that follows it: the rounded part then ends at the corner itself. It is convex and neither
+of its ends is above the curve, which is straight there; so nowhere is it above.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.limits.joint import power_partials, powers
+from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials
+from brachis.robot import Robot
+from brachis.robot.limits import Curve
+from brachis.task import LIMIT_KINDS, Task
+
+
+class TotalPowerLimit(Limit):
+    """Power that all joints together draw from a common supply, or return to it, over its limit.
+
+    Parameters
+    ----------
+    robot : Robot
+    """
+
+    kind = "total_power"
+    longer_time = "relieves"
+
+    def __init__(self, robot: Robot) -> None:
+        figure = robot.limits.total_power
+        self._robot = robot
+        self._figure = figure
+        self.labels = (
+            Label("all joints", "total power", "W", "robot.limits.total_power"),
+        )
+        self.lower = -np.ones(1)
+        self.upper = np.ones(1)
+        self.bounds = (Bound(0, figure, figure, 1.0 / figure),)
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        return powers(self._robot, motion).sum(axis=1, keepdims=True) / self._figure
+
+    def partials(self, motion: JointStates) -> Partials:
+        exact = power_partials(self._robot, motion)
+        parts = (exact.q, exact.qdot, exact.qddot)
+        return Partials(
+            *(
+                part.sum(axis=1, keepdims=True) / self._figure
+                for part in parts
+                if part is not None
+            )
+        )
+
+
+def build_total_power(robot: Robot, _task: Task) -> TotalPowerLimit | None:
+    """Build the limit of a robot that has one."""
+    return TotalPowerLimit(robot) if np.isfinite(robot.limits.total_power) else None
+
+
+WIDTH = 0.002
+"""Half the width of a rounded corner, as a part of the shorter one of the pieces beside it."""
+
+
+@dataclass(frozen=True)
+class RoundedCurve:
+    """An even function of the velocity that lies below a curve.
+
+    Attributes
+    ----------
+    at_rest : float
+        Value at velocity 0, were the corner there not rounded.
+    corners : (k,) ndarray
+        Speeds of the corners, rad/s or m/s.
+    widths : (k,) ndarray
+        Half the widths of their rounding.
+    bends : (k,) ndarray
+        Changes of slope.
+    """
+
+    at_rest: float
+    corners: np.ndarray
+    widths: np.ndarray
+    bends: np.ndarray
+
+    @classmethod
+    def below(cls, curve: Curve) -> RoundedCurve | None:
+        """Round a curve; None for a curve that does not fall.
+
+        Its last slope goes on until no torque is left. A level beginning is left out, and the piece that follows it
+        goes on to speed 0: the level itself is a plain torque limit.
+        """
+        speed, torque = np.array(curve).T
+        slope = np.diff(torque) / np.diff(speed)
+        is_left = torque[-1] > 1e-9 * torque[0]
+        if slope[-1] < 0.0 and is_left:
+            speed = np.append(speed, speed[-1] - torque[-1] / slope[-1])
+            torque = np.append(torque, 0.0)
+            slope = np.append(slope, slope[-1])
+        if not np.any(slope < 0.0):
+            return None
+        first = int(np.argmax(slope < 0.0))
+        lengths = np.diff(speed)
+        slope = np.append(slope, 0.0)
+        before = np.append(lengths[0], lengths)
+        widths = WIDTH * np.minimum(before, np.append(lengths, lengths[-1]))
+        moved = np.where(np.diff(slope, prepend=0.0) > 0.0, widths, 0.0)
+        speed = speed - moved
+        torque = torque - slope * moved
+        slope = np.append(np.diff(torque) / np.diff(speed), 0.0)[first:]
+        corners = np.append(0.0, speed[first + 1 :])
+        at_rest = torque[first] - slope[0] * speed[first]
+        return cls(at_rest, corners, widths[first:], np.diff(slope, prepend=0.0))
+
+    def _distances(self, velocity: np.ndarray) -> np.ndarray:
+        """How far velocities (K,), and their negatives, are behind the corners, (2, K, k)."""
+        return np.array([velocity, -velocity])[..., None] - self.corners
+
+    def values(self, velocity: np.ndarray) -> np.ndarray:
+        """Values (K,) at velocities (K,)."""
+        x = self._distances(velocity)
+        y = np.clip(x / self.widths, -1.0, 1.0)
+        rounded = self.widths * (3.0 + y * (8.0 + y * (6.0 - y * y))) / 16.0
+        ramp = rounded + np.maximum(x - self.widths, 0.0)
+        return np.asarray(self.at_rest + (ramp @ self.bends).sum(axis=0))
+
+    def slopes(self, velocity: np.ndarray) -> np.ndarray:
+        """Differentiate `values` by the velocities, (K,)."""
+        y = np.clip(self._distances(velocity) / self.widths, -1.0, 1.0)
+        forward, backward = (2.0 + y * (3.0 - y * y)) @ self.bends / 4.0
+        return np.asarray(forward - backward)
+
+
+class TorqueSpeedLimit(Limit):
+    """Torques in both directions over the joints' curves.
+
+    Parameters
+    ----------
+    robot : Robot
+    curves : dict of int to RoundedCurve
+        Those of the joints that have one, by index.
+    """
+
+    kind = "torque_speed"
+    longer_time = "relieves"
+
+    def __init__(self, robot: Robot, curves: dict[int, RoundedCurve]) -> None:
+        self._robot = robot
+        self._curves = tuple(curves.values())
+        self._joints = np.repeat(list(curves), 2)
+        self._signs = np.tile([1.0, -1.0], len(curves))
+        at_rest = [robot.limits.torque_speed[joint][0][1] for joint in self._joints]
+        self._at_rest = np.array(at_rest)
+        self.labels = tuple(
+            self._label(joint, sign)
+            for joint in curves
+            for sign in ("positive", "negative")
+        )
+        self.lower = np.full(len(at_rest), -np.inf)
+        self.upper = np.zeros(len(at_rest))
+        # The whole curve rises with the torque at rest.
+        self.bounds = tuple(
+            Bound(column, level, level, 1.0 / level, "upper")
+            for column, level in enumerate(at_rest)
+        )
+
+    def _label(self, joint: int, sign: str) -> Label:
+        name = self._robot.joint_names[joint]
+        unit = self._robot.position_units[joint]
+        row = LIMIT_KINDS["torque"]
+        torque = row.in_words(unit)
+        return Label(
+            f"{name} {sign}",
+            f"{torque} at speed",
+            row.units[unit],
+            f"robot.limits.torque_speed.{name}",
+            active_text=f"{name} is on its {torque}-speed curve with {sign} {torque}",
+            slack_text=f"{sign} {torque} all along the curve of {name}",
+        )
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        tau = motion.torque(self._robot)[:, self._joints]
+        qdot = motion.qdot[:, self._joints[::2]]
+        allowed = [
+            curve.values(part) for curve, part in zip(self._curves, qdot.T, strict=True)
+        ]
+        excess = self._signs * tau - np.repeat(allowed, 2, axis=0).T
+        return np.asarray(excess / self._at_rest)
+
+    def partials(self, motion: JointStates) -> Partials:
+        exact = motion.torque_derivatives(self._robot)
+        scale = (self._signs / self._at_rest)[:, None]
+        by_q, by_qdot, by_qddot = (
+            part[:, self._joints] * scale for part in (exact.q, exact.qdot, exact.qddot)
+        )
+        qdot = motion.qdot[:, self._joints[::2]]
+        slopes = [
+            curve.slopes(part) for curve, part in zip(self._curves, qdot.T, strict=True)
+        ]
+        every = np.arange(len(self._joints))
+        by_qdot[:, every, self._joints] -= (
+            np.repeat(slopes, 2, axis=0).T / self._at_rest
+        )
+        return Partials(by_q, by_qdot, by_qddot)
+
+
+def build_torque_speed(robot: Robot, _task: Task) -> TorqueSpeedLimit | None:
+    """Build the limit of a robot with a joint whose torque falls with its speed."""
+    rounded = {
+        joint: RoundedCurve.below(curve)
+        for joint, curve in enumerate(robot.limits.torque_speed)
+        if curve
+    }
+    falling = {joint: curve for joint, curve in rounded.items() if curve is not None}
+    return TorqueSpeedLimit(robot, falling) if falling else None

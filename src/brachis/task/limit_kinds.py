@@ -1,0 +1,227 @@
+"""The table of joint-limit kinds. Task models, robot, limits, verification, messages and plots all read it.
+
+A new kind is a row of this table, its keyword in `LimitKeywords`, a class in `brachis.limits.joint` and a formula in
+`brachis.verify.limits.joint`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, Protocol, TypedDict
+
+from pydantic import Field, create_model
+
+from brachis.task.fields import Model, Positive
+
+
+class Array(Protocol):
+    """What a NumPy array or scalar is to this stage, which does not import NumPy."""
+
+    def tolist(self) -> Any:
+        """Return plain numbers."""
+
+
+PerUnit = dict[str, float]
+"""A number for revolute joints, ``rad``, and one for prismatic joints, ``m``."""
+
+
+@dataclass(frozen=True)
+class UsualLimit:
+    """How large limits of a kind usually are; a larger one was probably written in another unit.
+
+    Attributes
+    ----------
+    mistaken_unit : dict of str to str
+        What larger limits look like, by the unit of the joint's position.
+    largest : dict of str to float
+        Largest usual limit of any robot.
+    urdf_kind : str
+        Kind of limit of the URDF that it is compared with; empty for none.
+    urdf_factor : float
+        Largest usual ratio to the limit of the URDF.
+    urdf_least : float
+        Limits below this are usual whatever the URDF states.
+    compares_weight : bool
+        Whether it is compared with the torque that holds the arm.
+    overridden : bool
+        Whether the speed override is a factor on it.
+    by_curve : bool
+        Whether a torque-speed curve replaces it.
+    """
+
+    mistaken_unit: dict[str, str]
+    largest: PerUnit
+    urdf_kind: str = ""
+    urdf_factor: float = math.inf
+    urdf_least: float = 0.0
+    compares_weight: bool = False
+    overridden: bool = False
+    by_curve: bool = False
+
+
+@dataclass(frozen=True)
+class LimitKind:
+    """A kind of joint limit.
+
+    Attributes
+    ----------
+    name : str
+        Key below ``robot.limits``.
+    units : dict of str to str
+        By the unit of the joint's position.
+    description : str
+        Of the key below ``robot.limits``.
+    form : {"number", "pair", "range"}
+        A number > 0 for each joint, the same in both directions; also a pair [lower, upper] around zero; or a range.
+    scale : str
+        What the factor below ``robot.limits.scale`` acts on; empty for no factor.
+    urdf : str
+        Attribute of a URDF's ``<limit>`` that states it; empty for none.
+    usual : UsualLimit or None
+    """
+
+    name: str
+    units: dict[str, str]
+    description: str
+    form: Literal["number", "pair", "range"] = "number"
+    scale: str = ""
+    urdf: str = ""
+    usual: UsualLimit | None = None
+
+    def in_words(self, position_unit: str) -> str:
+        """Name the quantity of a joint; the torque of a prismatic joint is a force."""
+        words = self.name.replace("_", " ")
+        return words if position_unit == "rad" else words.replace("torque", "force")
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Names of its arrays in `Limits`: of lower and upper limits, or one name for both."""
+        if self.form == "number":
+            return (self.name,)
+        return (f"{self.name}_lower", f"{self.name}_upper")
+
+
+FASTEST: Final[PerUnit] = {"rad": 60.0, "m": 50.0}
+"""Usual speeds, rad/s or m/s: axes of small SCARA and delta robots turn at up to 50 rad/s, rails move at 10 m/s."""
+_ANY = {"rad": math.inf, "m": math.inf}
+_TORQUE = {"rad": "Nm", "m": "N"}
+_USUAL_TORQUE = UsualLimit(
+    {"rad": "mNm", "m": "mN"}, _ANY, "torque", 100.0, compares_weight=True
+)
+
+_ROWS = (
+    LimitKind(
+        "torque",
+        _TORQUE,
+        "Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none.",
+        form="pair",
+        scale="torque and force limits, curves too",
+        urdf="effort",
+        usual=replace(_USUAL_TORQUE, by_curve=True),
+    ),
+    LimitKind(
+        "velocity",
+        {"rad": "rad/s", "m": "m/s"},
+        "Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none.",
+        form="pair",
+        scale="velocity limits",
+        urdf="velocity",
+        usual=UsualLimit(
+            {"rad": "degrees per second", "m": "mm per second"},
+            FASTEST,
+            "velocity",
+            10.0,
+            10.0,
+            overridden=True,
+        ),
+    ),
+    LimitKind(
+        "acceleration",
+        {"rad": "rad/s^2", "m": "m/s^2"},
+        "Largest acceleration, rad/s^2 (m/s^2). Absent or null: none.",
+        scale="acceleration limits",
+        # Wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2.
+        usual=UsualLimit(
+            {"rad": "degrees per second^2", "m": "mm/s^2"}, {"rad": 500.0, "m": 300.0}
+        ),
+    ),
+    LimitKind(
+        "position",
+        {"rad": "rad", "m": "m"},
+        "[low, high], rad (m); null for an open end. Absent: URDF. Null: none.",
+        form="range",
+    ),
+    LimitKind(
+        "power",
+        {"rad": "W", "m": "W"},
+        "Largest mechanical power, torque x speed either way, W. Absent or null: none.",
+        scale="power limits, the total one too",
+    ),
+    LimitKind(
+        "rms_torque",
+        _TORQUE,
+        "Largest root mean square of the torque over the whole motion, N m (force, N): what heats a motor. "
+        "Absent or null: none.",
+        scale="limits of root-mean-square torques",
+        usual=_USUAL_TORQUE,
+    ),
+    LimitKind(
+        "jerk",
+        {"rad": "rad/s^3", "m": "m/s^3"},
+        "Largest jerk, rad/s^3 (m/s^3). Absent or null: none.",
+        scale="jerk limits",
+    ),
+    LimitKind(
+        "torque_rate",
+        {"rad": "Nm/s", "m": "N/s"},
+        "Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none.",
+        scale="limits of torque rates",
+    ),
+)
+LIMIT_KINDS: Final = {row.name: row for row in _ROWS}
+"""By key below ``robot.limits``, in the order in which limits are built and checked."""
+
+# What a program may give: NumPy arrays stand for lists and numbers too.
+_StatedPair = Array | Sequence[float | None] | None
+StatedLimit = (
+    float
+    | Array
+    | Sequence[float | _StatedPair]
+    | Mapping[str, float | _StatedPair]
+    | str
+    | None
+)
+StatedCurves = Mapping[str, Array | Sequence[_StatedPair] | None] | None
+StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
+
+_FACTORS: dict[str, Any] = {
+    row.name: (
+        Positive,
+        Field(default=1.0, description=f"Factor on all {row.scale}."),
+    )
+    for row in _ROWS
+    if row.scale
+}
+_Factors: Any = create_model("_Factors", __base__=Model, **_FACTORS)
+
+
+class LimitScale(_Factors):  # type: ignore[misc]
+    """Factors on the limits, to keep a distance from them: one for each row of `LIMIT_KINDS` but the position."""
+
+
+class LimitKeywords(TypedDict, total=False):
+    """Arguments of `LimitSpec`: every row of `LIMIT_KINDS`, and limits that are not one number for each joint."""
+
+    torque: StatedLimit
+    velocity: StatedLimit
+    acceleration: StatedLimit
+    position: StatedRange
+    power: StatedLimit
+    rms_torque: StatedLimit
+    jerk: StatedLimit
+    torque_rate: StatedLimit
+    scale: Mapping[str, float] | LimitScale | None
+    total_power: float | None
+    torque_speed: StatedCurves
