@@ -43,7 +43,7 @@ from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.from_task import robot_for, robot_from_settings
-from brachis.robot.plausibility import tell
+from brachis.robot.plausibility import report_issues
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
 from brachis.search import (
@@ -229,7 +229,7 @@ def _plan(
     """Run the pipeline stage by stage; `times` are those when it began and when the task was read, s."""
     began, loaded = times
     remarks = of_robot(robot) + of_task(task)
-    remarks = tell(remarks, strict=task.strict, stacklevel=4)
+    remarks = report_issues(remarks, strict=task.strict, stacklevel=4)
     joints = write_count(robot.n, "joint")
     segments = write_count(len(task.path), "segment")
     listener(
@@ -239,7 +239,7 @@ def _plan(
     places = of_places(
         problem.task_map, problem.path, problem.start, problem.end, task.path_start
     )
-    remarks += tell(places, strict=task.strict, stacklevel=4)
+    remarks += report_issues(places, strict=task.strict, stacklevel=4)
     decompositions = decompositions_of(problem, families)
     check_within_reach(problem.task_map, problem.path)
     first = None if known is None else _first(problem, decompositions, known)
@@ -263,7 +263,7 @@ def _plan(
     )
     calmed = time.perf_counter()
     end_time = of_end_time(best.t_end, SHORTEST_TIME)
-    remarks += tell(end_time, strict=task.strict, stacklevel=4)
+    remarks += report_issues(end_time, strict=task.strict, stacklevel=4)
     total = time.perf_counter() - began
     listener(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
     return Result(

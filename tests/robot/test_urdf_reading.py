@@ -11,7 +11,7 @@ import pytest
 from brachis import LimitSpec
 from brachis.errors import InputError, LimitError, UnknownNameError, UrdfError
 from brachis.robot import Robot
-from brachis.robot.urdf import Limb, first_limb
+from brachis.robot.urdf import DefaultChain, default_chain
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
@@ -115,9 +115,9 @@ def test_a_joint_without_an_axis_is_refused():
 
 def test_the_last_link_before_the_chains_part():
     text = chain_urdf([TURN, TURN])
-    assert first_limb(text, "file.urdf") == Limb(None, "tool", ("tool",))
+    assert default_chain(text, "file.urdf") == DefaultChain(None, "tool", ("tool",))
     branching = text.replace("</robot>", GRIPPER + "</robot>")
-    assert first_limb(branching, "file.urdf") == Limb(
+    assert default_chain(branching, "file.urdf") == DefaultChain(
         None, "palm", ("finger1", "finger2")
     )
 
@@ -346,7 +346,7 @@ def test_gravity_vector():
     "gravity", [[0.0, 0.0], [0.0, 0.0, float("nan")], [[0.0, 0.0, 1.0]]]
 )
 def test_gravity_that_is_no_vector(gravity):
-    with pytest.raises(InputError, match=r"robot\.gravity: is not a vector"):
+    with pytest.raises(InputError, match=r"robot: gravity\[\d\]: "):
         load([TURN], gravity=gravity)
 
 

@@ -10,7 +10,7 @@ LENGTH = 1e-9
 """Lengths and positions, m. No drive moves by a nanometre; rounding of figures of 10 m is a million times smaller."""
 
 ANGLE = 1e-9
-"""Angles, rad; also sines of angles, components of unit vectors and entries of rotation matrices: as `LENGTH` at 1 m."""
+"""Angles, rad; also their sines, and entries of unit vectors and rotation matrices: as `LENGTH` at a radius of 1 m."""
 
 COORDINATE = 1e-9
 """Rows that are a length or an angle, m or rad: joint positions, task coordinates, and their change per unit of s."""
@@ -19,7 +19,7 @@ WRITTEN = 1e-6
 """Figures that people or programs write into files, m, rad or relative: they have six digits or more."""
 
 POSTURE = 1e-5
-"""Joint positions of two answers of inverse kinematics, rad or m: near a singularity these keep half of their digits."""
+"""Joint positions of two answers of inverse kinematics, rad or m: near singularities half of the digits are lost."""
 
 PATH = 1e-9
 """Path coordinates s, dimensionless: on a path of 1 m the same as `LENGTH`."""

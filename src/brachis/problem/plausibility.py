@@ -18,7 +18,7 @@ from brachis.errors import PathError, write_apart
 from brachis.problem.plausible_limits import FASTEST, limit_figures
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import UNITS
-from brachis.robot.plausibility import Figure, Remark, link_lengths, reach, remarks
+from brachis.robot.plausibility import Check, Issue, find_issues, link_lengths, reach
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
 from brachis.task import Task, ToolPose
@@ -55,10 +55,10 @@ class UsualFigure:
     unit: str
     aside: str = ""
 
-    def at(self, where: str, value: float, scale: float = 1.0) -> Figure:
+    def at(self, where: str, value: float, scale: float = 1.0) -> Check:
         """Compare a value with `scale` times the largest one."""
         usual = self.largest * scale
-        return Figure(where, self.message, value, usual, self.unit, self.aside)
+        return Check(where, self.message, value, usual, self.unit, self.aside)
 
 
 USUAL = {
@@ -100,9 +100,9 @@ USUAL = {
 """The largest usual figures, by the key of the task or the part of the robot."""
 
 
-def of_task(task: Task) -> tuple[Remark, ...]:
+def of_task(task: Task) -> tuple[Issue, ...]:
     """Look at speeds and accelerations of the tool, and at the points that the path was fitted to."""
-    return (*remarks(_tool(task)), *_angles(task), *_points(task))
+    return (*find_issues(_tool(task)), *_angles(task), *_points(task))
 
 
 def of_places(
@@ -111,7 +111,7 @@ def of_places(
     start: np.ndarray | None,
     end: np.ndarray | None,
     path_start: Sequence[float] | ToolPose | None,
-) -> tuple[Remark, ...]:
+) -> tuple[Issue, ...]:
     """Look at what a task says about where the robot is, in postures or along a path of joints.
 
     Parameters
@@ -123,7 +123,7 @@ def of_places(
     path_start : sequence of float, ToolPose or None
         As in the task.
     """
-    return tuple(remarks(_places(task_map, path, start, end, path_start)))
+    return tuple(find_issues(_places(task_map, path, start, end, path_start)))
 
 
 def _places(
@@ -132,7 +132,7 @@ def _places(
     start: np.ndarray | None,
     end: np.ndarray | None,
     path_start: Sequence[float] | ToolPose | None,
-) -> Iterator[Figure]:
+) -> Iterator[Check]:
     robot = task_map.robot
     along = (
         path.sample(np.linspace(0.0, 1.0, _STATIONS)).target
@@ -162,7 +162,7 @@ def _places(
                 turns_allowed = 2.0 if within else (1.0 if along is None else 5.0)
                 value = float(values[np.argmax(np.abs(values))])
                 shown = f"{value:.6g}"
-                yield Figure(
+                yield Check(
                     f"{key}.{name}",
                     "the position looks like degrees",
                     abs(value),
@@ -178,13 +178,13 @@ def _places(
         yield USUAL["path"].at("path", float(np.ptp(yaw)), _TURN)
 
 
-def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
+def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
     """Look at a motion's end time, s, beside the `least` that the planner allows, s."""
     if t_end > 1.01 * least:
         return ()
     message = "the end time is the least that the planner knows, so that no limit holds the motion back"
     return (
-        Remark(
+        Issue(
             "t_end",
             message,
             f"{t_end:.6g} s",
@@ -193,7 +193,7 @@ def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
     )
 
 
-def _tool(task: Task) -> Iterator[Figure]:
+def _tool(task: Task) -> Iterator[Check]:
     """Look at the largest of every kind of limit; feed rates have units of their own."""
     limits = task.tool_limits
     speed = limits.speed
@@ -216,7 +216,7 @@ def _largest(values: Iterable[float | None]) -> float:
     return max((one for one in values if one is not None and one < 1e5), default=0.0)
 
 
-def _angles(task: Task) -> Iterator[Remark]:
+def _angles(task: Task) -> Iterator[Issue]:
     """Look for eighths of up to two turns in rad where degrees belong.
 
     They are written with two decimals: 3.14 is half a turn, 5.5 is not seven eighths.
@@ -230,7 +230,7 @@ def _angles(task: Task) -> Iterator[Remark]:
         eighths = round(degrees / (0.125 * _TURN))
         if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * _TURN * eighths) < 2e-3:
             usual = f"{math.degrees(degrees):.4g} deg for that angle"
-            yield Remark(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
+            yield Issue(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
 
 
 def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
@@ -245,10 +245,10 @@ def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
         yield key, content
 
 
-def _points(task: Task) -> Iterator[Remark]:
+def _points(task: Task) -> Iterator[Issue]:
     for fit in task.fits:
         if fit.doubt:
-            yield Remark(
+            yield Issue(
                 f"path: {fit.source}",
                 fit.doubt,
                 f"{fit.length:.4g} m",
@@ -256,7 +256,7 @@ def _points(task: Task) -> Iterator[Remark]:
             )
 
 
-def of_robot(robot: Robot) -> tuple[Remark, ...]:
+def of_robot(robot: Robot) -> tuple[Issue, ...]:
     """Look at limits, friction, lengths, masses, payload and mounting of a robot."""
     bare = robot.with_payload(None) if robot.settings.payload else robot
     figures = (
@@ -267,15 +267,15 @@ def of_robot(robot: Robot) -> tuple[Remark, ...]:
     return (
         *_scales(robot),
         *_friction(robot),
-        *remarks(itertools.chain(*figures, of_payload)),
+        *find_issues(itertools.chain(*figures, of_payload)),
     )
 
 
-def _scales(robot: Robot) -> Iterator[Remark]:
+def _scales(robot: Robot) -> Iterator[Issue]:
     for kind, factor in robot.settings.limits.scale.model_dump().items():
         if factor > 10.0:
             message = "the factor raises limits far beyond what was stated"
-            yield Remark(
+            yield Issue(
                 f"robot.limits.scale.{kind}",
                 message,
                 f"{factor:g}",
@@ -283,9 +283,9 @@ def _scales(robot: Robot) -> Iterator[Remark]:
             )
 
 
-def _friction(robot: Robot) -> Iterator[Remark]:
+def _friction(robot: Robot) -> Iterator[Issue]:
     """Look at damping of the URDF, which is often there to calm a simulation."""
-    for i, damping in enumerate(robot.stated.friction["viscous"]):
+    for i, damping in enumerate(robot.urdf_dynamics.friction["viscous"]):
         fastest = robot.limits.velocity[i]
         torque = robot.limits.torque[i]
         slow = (
@@ -296,7 +296,7 @@ def _friction(robot: Robot) -> Iterator[Remark]:
             unit = UNITS["viscous"][robot.position_units[i]]
             message = "the damping of the URDF takes more than the largest torque at the largest speed"
             usual = f"below {torque / fastest:.3g} {unit}; viscous: null leaves it out"
-            yield Remark(
+            yield Issue(
                 f"robot.friction.viscous.{robot.joint_names[i]}",
                 message,
                 f"{damping:.6g} {unit}",
@@ -304,7 +304,7 @@ def _friction(robot: Robot) -> Iterator[Remark]:
             )
 
 
-def _lengths(robot: Robot) -> Iterator[Figure]:
+def _lengths(robot: Robot) -> Iterator[Check]:
     """Look at the way from joint to joint, tool offset, mounting and gravity."""
     *links, last = link_lengths(robot)
     settings = robot.settings
@@ -320,7 +320,7 @@ def _lengths(robot: Robot) -> Iterator[Figure]:
         yield USUAL[key].at(key, value, scale)
 
 
-def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
+def _payload(robot: Robot, bare: Robot) -> Iterator[Check]:
     """Look at what the tool carries."""
     payload = robot.settings.payload
     if payload is None:
@@ -340,7 +340,7 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
         yield USUAL[key].at(key, value, scale)
 
 
-def _masses(robot: Robot) -> Iterator[Figure]:
+def _masses(robot: Robot) -> Iterator[Check]:
     bodies = list(robot.model.inertias)[1:]
     size = max(1.0, reach(robot))
     for name, body in zip(robot.joint_names, bodies, strict=True):

@@ -11,7 +11,7 @@ import numpy as np
 from brachis.robot import Robot
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import STATED
-from brachis.robot.plausibility import Figure, link_lengths
+from brachis.robot.plausibility import Check, link_lengths
 
 _HOLDS = 50.0
 """Arms hold a tenth to five times their own weight at full reach."""
@@ -74,13 +74,13 @@ RULES = {
 """By kind of limit; wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2."""
 
 
-def limit_figures(robot: Robot) -> Iterator[Figure]:
+def limit_figures(robot: Robot) -> Iterator[Check]:
     """Yield all figures of the limits of a robot without payload."""
     for look in (_magnitudes, _ranges, _curves):
         yield from look(robot)
 
 
-def _magnitudes(robot: Robot) -> Iterator[Figure]:
+def _magnitudes(robot: Robot) -> Iterator[Check]:
     for kind, rule in RULES.items():
         values = np.abs(robot.limits.both_ways(kind)).max(axis=0) / getattr(
             robot.settings.limits.scale, kind
@@ -98,7 +98,7 @@ def _magnitudes(robot: Robot) -> Iterator[Figure]:
                 message = (
                     f"the {kind.replace('_', ' ')} limit looks like {rule.looks[unit]}"
                 )
-                yield Figure(
+                yield Check(
                     f"robot.limits.{kind}.{name}",
                     message,
                     float(value),
@@ -119,7 +119,7 @@ def _placeholder(value: float, rule: Rule, usual: float, stated: float | None) -
 def _stated(robot: Robot, rule: Rule, joint: int) -> float | None:
     """Return the URDF's limit that a joint's is compared with."""
     found: float | None = getattr(
-        robot.stated_limits[joint], STATED.get(rule.stated, ""), None
+        robot.urdf_limits[joint], STATED.get(rule.stated, ""), None
     )
     return found
 
@@ -146,7 +146,7 @@ def _usual(robot: Robot, rule: Rule) -> Callable[[int], float]:
     return of_joint
 
 
-def _ranges(robot: Robot) -> Iterator[Figure]:
+def _ranges(robot: Robot) -> Iterator[Check]:
     """Look at position ranges: joints with cables make a dozen turns at most."""
     limits = robot.limits
     columns = zip(
@@ -154,7 +154,7 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
         robot.position_units,
         limits.position_lower,
         limits.position_upper,
-        robot.stated_limits,
+        robot.urdf_limits,
         strict=True,
     )
     for name, unit, lower, upper, known in columns:
@@ -169,7 +169,7 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
             usual = min(usual, max(5.0 * (known.upper - known.lower), least))
         # An end beyond this is written for "no limit": in degrees, ranges end at 720.
         if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
-            yield Figure(
+            yield Check(
                 f"robot.limits.position.{name}",
                 f"the position range looks like {'degrees' if unit == 'rad' else 'mm'}",
                 upper - lower,
@@ -180,7 +180,7 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
             )
 
 
-def _curves(robot: Robot) -> Iterator[Figure]:
+def _curves(robot: Robot) -> Iterator[Check]:
     """Look at the torques and the speeds of torque-speed curves."""
     scale = robot.settings.limits.scale.torque
     torque = _usual(robot, _TORQUE)
@@ -196,7 +196,7 @@ def _curves(robot: Robot) -> Iterator[Figure]:
         meant = {"rad": "rpm", "m": "mm per second"}[unit]
         said = "the last speed of the curve looks like"
         aside = "; at the joint, behind its gear"
-        yield Figure(
+        yield Check(
             key,
             f"{said} {meant}",
             curve[-1][0],
@@ -205,4 +205,4 @@ def _curves(robot: Robot) -> Iterator[Figure]:
             aside,
         )
         said = f"the torque of the curve looks like {_TORQUE.looks[unit]}"
-        yield Figure(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])
+        yield Check(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])

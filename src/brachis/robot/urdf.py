@@ -17,7 +17,13 @@ from brachis.common import files
 from brachis.common.files import Kind, check_kind
 from brachis.errors import UnknownNameError, UrdfError
 from brachis.robot.limits import FARTHEST, UrdfLimit
-from brachis.robot.urdf_bodies import Body, StatedChain, inertia_matrix, stated_chain
+from brachis.robot.urdf_bodies import (
+    Body,
+    UrdfDynamics,
+    check_inertia,
+    inertia_matrix,
+    read_dynamics,
+)
 from brachis.robot.urdf_elements import (
     Element,
     UrdfTree,
@@ -114,17 +120,8 @@ def _check_inertia(link: str, inertial: Element, where: str) -> None:
             found=f"{mass:g} kg",
             allowed="<inertia> with the moments about the centre of mass",
         )
-    moments = np.linalg.eigvalsh(inertia_matrix(inertial))
-    slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
-    if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
-        raise UrdfError(
-            f"link {link!r} has a non-physical inertia",
-            where=where,
-            found="principal moments "
-            + ", ".join(f"{m:.4g}" for m in moments)
-            + " kg m^2",
-            allowed="moments >= 0, none above the sum of the other two",
-        )
+    problem = f"link {link!r} has a non-physical inertia"
+    check_inertia(inertia_matrix(inertial), problem, where, UrdfError)
 
 
 @dataclass(frozen=True)
@@ -144,8 +141,8 @@ class UrdfChain:
     xml : str
         The URDF that Pinocchio reads: ``continuous`` joints have become ``revolute`` ones without range, so that
         every joint has one coordinate, and unsupported joints off the chain have become fixed.
-    stated : StatedChain
-        The chain as the text states it, read without Pinocchio.
+    dynamics : UrdfDynamics
+        Joints, bodies and friction as the text states them, read without Pinocchio.
     """
 
     joint_names: tuple[str, ...]
@@ -154,7 +151,7 @@ class UrdfChain:
     tool_frame: str
     base_frame: str
     xml: str
-    stated: StatedChain
+    dynamics: UrdfDynamics
 
 
 def read_chain(
@@ -219,10 +216,10 @@ def read_chain(
         for name in movable
         if name not in chain
     }
-    stated = stated_chain(tree, chain, locked, tool)
-    check_inertias(tree, stated.bodies, where)
+    dynamics = read_dynamics(tree, chain, locked, tool)
+    check_inertias(tree, dynamics.bodies, where)
     limits = tuple(_read_limit(tree.joints[name]) for name in chain)
-    return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), stated)
+    return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), dynamics)
 
 
 def read_file(path: Path) -> str:
@@ -346,7 +343,7 @@ def _plain_xml(tree: UrdfTree) -> str:
 
 
 @dataclass(frozen=True)
-class Limb:
+class DefaultChain:
     """The chain that is taken from a robot unless the user names another.
 
     Attributes
@@ -364,7 +361,7 @@ class Limb:
     leaves: tuple[str, ...]
 
 
-def first_limb(text: str, where: str) -> Limb:
+def default_chain(text: str, where: str) -> DefaultChain:
     """Find the chain of most joints in a URDF: an arm without its fingers, and without the trunk that it shares.
 
     Limbs share less than half of their joints. Of several the first one in the file is taken.
@@ -400,7 +397,9 @@ def first_limb(text: str, where: str) -> Limb:
     if trunk and 2 * count_moving(trunk) < most:
         base = end_of(tree.joints[trunk[-1]], "child")
     last_joint = _common_beginning(limb.values())[-1]
-    return Limb(base, str(end_of(tree.joints[last_joint], "child")), tuple(limb))
+    return DefaultChain(
+        base, str(end_of(tree.joints[last_joint], "child")), tuple(limb)
+    )
 
 
 def _common_beginning(chains: Collection[Sequence[str]]) -> list[str]:

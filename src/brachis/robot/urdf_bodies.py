@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.common.summary import Summary
-from brachis.errors import UrdfError
+from brachis.errors import InputError, UrdfError
 from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of
 
 _ROUNDING = 1e-9
@@ -52,7 +52,7 @@ class Body(Summary):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StatedChain(Summary):
+class UrdfDynamics(Summary):
     """What a URDF says of a chain.
 
     Attributes
@@ -70,9 +70,9 @@ class StatedChain(Summary):
     friction: dict[str, np.ndarray]
 
 
-def stated_chain(
+def read_dynamics(
     tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str
-) -> StatedChain:
+) -> UrdfDynamics:
     """Read a chain of a checked URDF, and sum up the inertias of what each joint moves.
 
     Parameters
@@ -109,7 +109,7 @@ def stated_chain(
         )
         for kind, word in (("viscous", "damping"), ("coulomb", "friction"))
     }
-    return StatedChain(tuple(bodies), placed[tool][1], friction)
+    return UrdfDynamics(tuple(bodies), placed[tool][1], friction)
 
 
 def _unplaced(tree: UrdfTree, link: str, placed: Mapping[str, object]) -> list[str]:
@@ -214,12 +214,36 @@ def _axis(joint: Element) -> np.ndarray:
 
 
 def inertia_matrix(inertial: Element) -> np.ndarray:
-    """Matrix of moments and products, kg m^2."""
-    xx, xy, xz, yy, yz, zz = (
-        numbers_of(inertial, "inertia", key, "0")[0]
-        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    """Matrix of moments and products, (3, 3) kg m^2, of a checked <inertial>."""
+    return symmetric_matrix(
+        {key: numbers_of(inertial, "inertia", key, "0")[0] for key in _MOMENTS.ravel()}
     )
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+_MOMENTS = np.array(
+    [["ixx", "ixy", "ixz"], ["ixy", "iyy", "iyz"], ["ixz", "iyz", "izz"]]
+)
+
+
+def symmetric_matrix(moments: Mapping[str, float]) -> np.ndarray:
+    """Return the (3, 3) matrix of moments and products ``ixx``, ``ixy``, ..., kg m^2."""
+    return np.array([[moments[key] for key in row] for row in _MOMENTS])
+
+
+def check_inertia(
+    matrix: np.ndarray, problem: str, where: str, error: type[InputError]
+) -> None:
+    """Refuse an inertia matrix, (3, 3) kg m^2, that no rigid body has."""
+    moments = np.linalg.eigvalsh(matrix)
+    slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
+    if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
+        found = ", ".join(f"{moment:.4g}" for moment in moments)
+        raise error(
+            problem,
+            where=where,
+            found=f"principal moments {found} kg m^2",
+            allowed="moments >= 0, none above the sum of the other two, about the centre of mass",
+        )
 
 
 def _spread(lever: np.ndarray) -> np.ndarray:

@@ -234,7 +234,7 @@ def with_free_roll(robot: Robot) -> Robot:
         joint_names=(*robot.joint_names, ROLL_JOINT),
         tool_frame=frame,
         limits=old.with_free_joint(),
-        stated_limits=(*robot.stated_limits, UrdfLimit(None, None, None, None)),
+        urdf_limits=(*robot.urdf_limits, UrdfLimit(None, None, None, None)),
         friction=Friction(
             armature=np.append(friction.armature, 0.0),
             viscous=np.append(friction.viscous, 0.0),
