@@ -233,9 +233,9 @@ def test_xacro_that_is_left_is_named():
         (
             "type='revolute'",
             "type='revolut'",
-            "joint 'j1' has no known type; found 'revolut'",
+            "joint 'j1' has an unknown type; found revolut",
         ),
-        ("type='revolute'", "", "joint 'j1' has no known type; found none"),
+        ("type='revolute'", "", "joint 'j1' has an unknown type; found none"),
         (
             "<child link='link2'/>",
             "<child link='link1'/>",

@@ -392,12 +392,13 @@ def read_text(
     path: Path,
     *,
     where: str,
-    folder: Path,
+    folder: Path | None = None,
     found: str | None = None,
     largest: int = LARGEST_TEXT,
     hint: str = "",
+    error: type[InputError] = TaskError,
 ) -> str:
-    """Return the content of a text file in UTF-8.
+    """Return the content of a text file in UTF-8; all line ends become newlines.
 
     Parameters
     ----------
@@ -405,32 +406,32 @@ def read_text(
         The file.
     where : str
         Place that messages name: the file itself, or the key that asks for it.
-    folder : Path
+    folder : Path, optional
         What relative paths are relative to, for the message about a missing file.
     found : str, optional
         The file, for messages whose place is a key.
     largest : int, optional
         Longer files are refused, bytes.
     hint : str, optional
-        What to try where the file is too long.
+        What to try if the file is too long; without a folder also if it is missing.
+    error : type, optional
+        What is raised.
 
     Raises
     ------
-    TaskError
-        The file is missing, is not a text file, too long, or cannot be read.
+    InputError
+        Of the class `error`: the file is missing, is not a text file, too long, or cannot be read.
     """
     try:
-        with io.TextIOWrapper(
-            io.BytesIO(read_file(path, largest)), encoding="utf-8"
-        ) as text:  # any line ends
-            return text.read()
+        content = read_file(path, largest).decode()
+        return io.IncrementalNewlineDecoder(None, translate=True).decode(content)
     except FileNotFoundError:
         problem = "there is no such file"
-        hint = f"Paths are relative to {folder}"
-    except UnicodeDecodeError as error:
-        problem = f"not a text file in UTF-8: {error.reason} at byte {error.start}"
+        hint = f"Paths are relative to {folder}" if folder else hint
+    except UnicodeDecodeError as refusal:
+        problem = f"not a text file in UTF-8: {refusal.reason} at byte {refusal.start}"
         hint = ""
-    except OSError as error:
-        problem = f"the file cannot be read: {error.strerror}"
-        hint = hint if error.errno == errno.EFBIG else ""
-    raise TaskError(problem, found=found, where=where, hint=hint or None)
+    except OSError as refusal:
+        problem = f"the file cannot be read: {refusal.strerror}"
+        hint = hint if refusal.errno == errno.EFBIG else ""
+    raise error(problem, found=found, where=where, hint=hint or None)
