@@ -71,7 +71,7 @@ def motion():
         ),
         (
             lambda: brachis.verify_trajectory(5),
-            "trajectory: no motion; found int; allowed: a Trajectory, a Result, or",
+            "trajectory: not a motion; found int; allowed: a Trajectory, a Result, or",
         ),
     ],
 )
