@@ -71,7 +71,7 @@ def motion():
         ),
         (
             lambda: brachis.verify_trajectory(5),
-            "trajectory: no motion; found int; allowed: a Trajectory, a Result, or",
+            "trajectory: not a motion; found int; allowed: a Trajectory, a Result, or",
         ),
     ],
 )
@@ -123,7 +123,7 @@ def test_a_key_of_a_section_is_found_in_a_file():
         ),
         (lambda motion: motion.at([0.0, "b"]), "t: wrong type"),
         (lambda motion: motion.sample("a"), "dt: wrong type; found 'a'"),
-        (lambda motion: motion.sample([0.1]), r"dt: wrong type; found an array \(1,\)"),
+        (lambda motion: motion.sample([0.1]), r"dt: wrong type; found \[0\.1\]"),
         (lambda motion: export.write(motion, "x.csv", dt="a"), "dt: wrong type"),
         (
             lambda motion: motion.save("x.txt"),

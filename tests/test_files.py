@@ -51,18 +51,18 @@ def endless(request, tmp_path):
     path = tmp_path / request.param
     if request.param == "pipe":
         os.mkfifo(path)
-        return path, "it is a pipe, no file"
+        return path, "it is a pipe, not a file"
     if request.param == "folder":
         path.mkdir()
-        return path, "it is a folder, no file"
+        return path, "it is a folder, not a file"
     if request.param == "socket":
         with socket.socket(socket.AF_UNIX) as server:
             server.bind(str(path)[:100])
         return path, "."  # some systems do not even open it
     if request.param == "zeros":
-        return Path("/dev/zero"), "it is a device, no file"
+        return Path("/dev/zero"), "it is a device, not a file"
     if request.param == "name":
-        return tmp_path / "a\0b", "no name of a file"
+        return tmp_path / "a\0b", "not the name of a file"
     with path.open("wb") as stream:
         stream.truncate(LARGE)  # takes no room
     return path, r"it is 1000000.0 MB long, at most 16 MB are read"
@@ -118,7 +118,8 @@ def dead_process() -> int:
 
 
 def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path):
-    host, dead = files._host(), dead_process()
+    host = files.temporary_in(tmp_path).name.split("-")[1]
+    dead = dead_process()
     tail = "0123456789abcdef"
     ours = [
         f".brachis-{host}-{dead}-{tail}.part",

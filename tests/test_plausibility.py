@@ -23,7 +23,7 @@ from brachis.errors import (
 )
 from brachis.problem.plausibility import of_end_time, of_robot, of_task
 from brachis.robot import Robot
-from brachis.robot.urdf import first_limb, read_file
+from brachis.robot.urdf import default_chain, read_file
 from support.chains import Joint, chain_urdf
 
 ROOT = Path(__file__).parents[1]
@@ -88,7 +88,7 @@ UNLIMITED = LimitSpec(torque=None, velocity=None, acceleration=1.0)
 def with_stated_speeds(file: Path) -> Robot | None:
     """The robot with the URDF's limits but for torques; None for files that hold no arm."""
     try:
-        limb = first_limb(read_file(file), file.name)
+        limb = default_chain(read_file(file), file.name)
         robot = Robot.from_urdf(
             file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED
         )
@@ -96,7 +96,7 @@ def with_stated_speeds(file: Path) -> Robot | None:
         return None
     speeds = [
         np.inf if limit.velocity is None else limit.velocity
-        for limit in robot.stated_limits
+        for limit in robot.urdf_limits
     ]
     return replace(
         robot, limits=robot.limits.with_magnitudes(velocity=np.array(speeds))
@@ -484,13 +484,13 @@ def test_limits_beside_those_of_the_urdf(limits, told_of, sound):
 )
 def test_torques_that_urdfs_state_are_plausible(file):
     try:
-        limb = first_limb(read_file(file), file.name)
+        limb = default_chain(read_file(file), file.name)
         robot = Robot.from_urdf(
             file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED
         )
     except BrachisError:
         return
-    stated = np.array([limit.effort or np.inf for limit in robot.stated_limits])
+    stated = np.array([limit.effort or np.inf for limit in robot.urdf_limits])
     assert (
         of_robot(replace(robot, limits=robot.limits.with_magnitudes(torque=stated)))
         == ()

@@ -24,7 +24,7 @@ PUBLIC = {
     "robot": lambda result: result.trajectory.robot,
     "limits": lambda result: result.trajectory.robot.limits,
     "friction": lambda result: result.trajectory.robot.friction,
-    "stated": lambda result: result.trajectory.robot.stated,
+    "stated": lambda result: result.trajectory.robot.urdf_dynamics,
     "task map": lambda result: brachis.task_map_of(result.trajectory.robot, ["x", "y"]),
     "limit spec": lambda result: result.task.robot.limits,
     "spline": lambda _result: brachis.Spline(

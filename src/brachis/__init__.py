@@ -87,42 +87,26 @@ _MODULES = {
     "report": "apps.report",
     "robots": "robots",
 }
-_HOME = {
-    "Arc": "task.constructors",
-    "BottleneckReport": "apps.bottleneck",
-    "BrachisError": "errors",
-    "Candidate": "optimise.candidate",
-    "Circle": "task.constructors",
-    "Comparison": "apps.comparison",
-    "Helix": "task.constructors",
-    "InputError": "errors",
-    "LimitSpec": "task",
-    "Line": "task.constructors",
-    "PlanningError": "errors",
-    "PlausibilityWarning": "robot.plausibility",
-    "Result": "result",
-    "Robot": "robot",
-    "Samples": "trajectory",
-    "Spline": "task.constructors",
-    "SweepResult": "apps.sweeps",
-    "Task": "task",
-    "TaskMap": "robot",
-    "Trajectory": "trajectory",
-    "Verification": "verify",
-    "bspline_segment": "path",
-    "compare": "apps.comparison",
-    "fit_path": "task",
-    "import_motion": "apps.recording",
-    "load_task": "task",
-    "plan": "planner",
-    "plan_many": "planner",
-    "read_limits": "task",
-    "sweep": "apps.sweeps",
-    "task_map_of": "robot",
-    "transcribe": "planner",
-    "verify_trajectory": "verify",
-    "view": "apps.view",
+_NAMES = {
+    "apps.bottleneck": "BottleneckReport",
+    "apps.comparison": "Comparison compare",
+    "apps.recording": "import_motion",
+    "apps.sweeps": "SweepResult sweep",
+    "apps.view": "view",
+    "errors": "BrachisError InputError PlanningError",
+    "optimise.candidate": "Candidate",
+    "path": "bspline_segment",
+    "planner": "plan plan_many transcribe",
+    "result": "Result",
+    "robot": "Robot TaskMap task_map_of",
+    "robot.plausibility": "PlausibilityWarning",
+    "task": "LimitSpec Task fit_path load_task read_limits",
+    "task.constructors": "Arc Circle Helix Line Spline",
+    "trajectory": "Samples Trajectory",
+    "verify": "Verification verify_trajectory",
 }
+"""The names that each module has for the public."""
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = ["__version__", *_MODULES, *_HOME]  # noqa: PLE0604  (names)
 
@@ -131,16 +115,13 @@ def __getattr__(name: str) -> object:
     """Import a public name when it is first used."""
     if name in _MODULES:
         return importlib.import_module(f"brachis.{_MODULES[name]}")
-    if name not in _HOME:
-        from brachis.errors import nearest
+    if name in _HOME:
+        return getattr(importlib.import_module(f"brachis.{_HOME[name]}"), name)
+    from brachis.errors import nearest
 
-        near = (
-            None if name.startswith("_") else nearest(name, __all__, is_attribute=True)
-        )
-        hint = f". Did you mean {near!r}?" if near else ""
-        message = f"module 'brachis' has no attribute {name!r}{hint}"
-        raise AttributeError(message)
-    return getattr(importlib.import_module(f"brachis.{_HOME[name]}"), name)
+    near = None if name.startswith("_") else nearest(name, __all__, is_attribute=True)
+    hint = f". Did you mean {near!r}?" if near else ""
+    raise AttributeError(f"module 'brachis' has no attribute {name!r}{hint}")
 
 
 def __dir__() -> list[str]:

@@ -1,5 +1,23 @@
 """Errors that brachis raises: one base class, subclasses that carry data.
 
+    BrachisError                    exit code 1
+    |-- PlanningError               the input was sound, and no plan could be made
+    |-- ClusterError                a cluster cannot be reached, was lost, or cannot run plans
+    |-- UnreachableError            a trial point of the optimiser is outside the branch
+    `-- InputError                  the input is wrong; exit code 2
+        |-- TaskError               a task file or task mapping
+        |-- UrdfError               a URDF file
+        |-- ResultFileError         a saved result
+        |-- UnknownNameError        a name that does not exist
+        |-- LimitError              a limit that is missing or not usable
+        |-- PathError               the prescribed path
+        |-- StartError              the start or end posture
+        |-- DecompositionError      a choice of redundant joints without a closed form
+        |-- PlausibilityError       implausible figures, where the plan is strict
+        `-- NotInstalledError       a library of an extra
+    MissingAttributeError           an AttributeError that names the attribute that may be meant
+    BrachisWarning                  a UserWarning
+
 Every message says what was found, what is allowed, where, and what to try; the same facts are attributes, so that a
 caller need not parse text. ``exit_code`` is what the command line returns: 2 for wrong input, 1 for a plan that could
 not be made although the input was sound.
@@ -16,7 +34,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Self, TypedDict, Unpack
 
 
 @dataclass(frozen=True)
@@ -82,6 +100,15 @@ _NAMES_HERE = {
 """Names that other libraries use, and those used here, of which the first one that exists is meant."""
 
 
+class Details(TypedDict, total=False):
+    """What an error says besides the problem; see `BrachisError`."""
+
+    found: object
+    allowed: object
+    where: str | None
+    hint: str | None
+
+
 class BrachisError(Exception):
     """Base class of all errors of brachis.
 
@@ -143,11 +170,9 @@ class BrachisError(Exception):
 
     def put_advice(self, advice: str) -> None:
         """Put advice before the hint."""
-        self.hint = (
-            f"{advice}, or {self.hint[:1].lower()}{self.hint[1:]}"
-            if self.hint
-            else advice
-        )
+        if self.hint:
+            advice += f", or {self.hint[:1].lower()}{self.hint[1:]}"
+        self.hint = advice
         self.args = (self._message(),)
 
     def _message(self) -> str:
@@ -299,15 +324,12 @@ class PathError(InputError):
         problem: str,
         *,
         s_interval: tuple[float, float] | None = None,
-        found: object = None,
-        allowed: object = None,
-        where: str | None = None,
-        hint: str | None = None,
+        **details: Unpack[Details],
     ) -> None:
         self.s_interval = s_interval
-        if s_interval is not None and where is None:
-            where = f"path, s in [{s_interval[0]:.4g}, {s_interval[1]:.4g}]"
-        super().__init__(problem, found=found, allowed=allowed, where=where, hint=hint)
+        if s_interval is not None and not details.get("where"):
+            details["where"] = f"path, s in [{s_interval[0]:.4g}, {s_interval[1]:.4g}]"
+        super().__init__(problem, **details)
 
 
 class StartError(InputError):
@@ -341,10 +363,9 @@ class DecompositionError(InputError):
         self.reasons = dict(reasons or {})
         self.available = tuple(available)
         if self.reasons:
-            problem += "; tried " + "; ".join(
-                f"{family}: {why}" for family, why in self.reasons.items()
-            )
-        choices = " | ".join("[" + ", ".join(names) + "]" for names in self.available)
+            tried = (f"{family}: {why}" for family, why in self.reasons.items())
+            problem += f"; tried {'; '.join(tried)}"
+        choices = " | ".join(f"[{', '.join(names)}]" for names in self.available)
         super().__init__(
             problem,
             found=found,
@@ -435,36 +456,23 @@ class MissingAttributeError(AttributeError):
 
     def __str__(self) -> str:
         """Look for the name that may be meant; most such errors are caught, and nobody reads them."""
-        meant = (
-            None
-            if self._name.startswith("_")
-            else _attribute_meant(self._thing, self._name)
-        )
-        message = (
-            f"{type(self._thing).__name__!r} object has no attribute {self._name!r}"
-        )
+        name = self._name
+        meant = None if name.startswith("_") else _attribute_meant(self._thing, name)
+        message = f"{type(self._thing).__name__!r} object has no attribute {name!r}"
         return message + (f". Did you mean {meant!r}?" if meant else "")
 
 
 def _attribute_meant(thing: object, name: str) -> str | None:
     """Return the attribute of an object, or of one of its parts, that may be meant by a name."""
     own = [each for each in dir(thing) if not each.startswith("_")]
-    parts = [(part, value) for part, value in vars(thing).items() if part in own]
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
         if word in own or "." in word:
             return word
-        within = [
-            f"{part}.{word}"
-            for part, value in parts
-            if hasattr(type(value), word) or word in _contents(value)
-        ]
-        if within:
-            return within[0]
+        for part, value in vars(thing).items():
+            known = hasattr(type(value), word) or word in getattr(value, "__dict__", ())
+            if part in own and known:
+                return f"{part}.{word}"
     return nearest(name, own, is_attribute=True)
-
-
-def _contents(value: object) -> dict[str, object]:
-    return getattr(value, "__dict__", {})
 
 
 def write_apart(value: float, *others: float, digits: int = 4) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.from_task import robot_for
-from brachis.robot.plausibility import tell
+from brachis.robot.plausibility import report_issues
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
 from brachis.search import Search, first_map, try_remedies
@@ -146,7 +146,7 @@ def plan(
         deadline = Deadline.after(asked.search.time_limit - (loaded - began))
         try:
             remarks = of_robot(robot) + of_task(asked)
-            remarks = tell(remarks, strict=asked.strict, stacklevel=3)
+            remarks = report_issues(remarks, strict=asked.strict, stacklevel=3)
             _report_plan(robot, asked, report)
             problem = Problem.of(robot, asked, own_limits)
             places = of_places(
@@ -156,7 +156,7 @@ def plan(
                 problem.end,
                 asked.path_start,
             )
-            remarks += tell(places, strict=asked.strict, stacklevel=3)
+            remarks += report_issues(places, strict=asked.strict, stacklevel=3)
             decompositions = decompositions_of(problem, families)
             check_within_reach(problem.task_map, problem.path)
 
@@ -177,7 +177,7 @@ def plan(
                 smoothed = find_least_motion(best, left, report)
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
-            remarks += tell(end_time, strict=asked.strict, stacklevel=3)
+            remarks += report_issues(end_time, strict=asked.strict, stacklevel=3)
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)
             try_remedies(error, robot, asked, families, own_limits, until)

@@ -44,7 +44,7 @@ class Result(PlannedMotion):
         True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
     not_completed : tuple of str
         What was left undone, in plain words.
-    warnings : tuple of Remark
+    warnings : tuple of Issue
         What of robot, task and motion is implausible.
 
     Examples

@@ -67,7 +67,11 @@ WRONG_TASKS = {
     "other branch": ("branch", "elbow_positive", ["another branch", "elbow_negative"]),
     "unknown solver": ("solver.name", "snopt", ["'snopt'", "uno", "ipopt", "slsqp"]),
     "unknown tool frame": ("robot.tool_frame", "tol", ["'tol'", "Did you mean 'tool'"]),
-    "missing URDF": ("robot.urdf", "nowhere.urdf", ["nowhere.urdf", "does not exist"]),
+    "missing URDF": (
+        "robot.urdf",
+        "nowhere.urdf",
+        ["nowhere.urdf", "there is no such file"],
+    ),
     "no limit at all": (
         "robot.limits.torque",
         None,
@@ -182,7 +186,7 @@ def test_result_that_is_none(command, run, tmp_path):
     broken.write_bytes(b"PK no archive")
     for path, expected in (
         (broken, "not a brachis result"),
-        (tmp_path / "gone.npz", "does not exist"),
+        (tmp_path / "gone.npz", "there is no such file"),
     ):
         outcome = run(command[0], path, *command[1:])
         assert outcome.code == 2

@@ -9,7 +9,7 @@ from scipy.interpolate import BPoly
 from brachis.errors import UnreachableError
 from brachis.kinematics import interpolate
 from brachis.robot import Robot
-from brachis.trajectory.pieces import jerk_coefficients
+from brachis.trajectory.pieces import piece_coefficients
 from support.chains import planar_robot
 from support.motions import Sway, joint_map
 
@@ -63,7 +63,7 @@ def test_the_jerk_of_short_pieces_is_that_of_the_closed_form(gap):
     motion = Sway(chain)
     breaks = np.union1d(np.linspace(0.0, 1.0, 6), 0.5 + gap * np.arange(8))
     nodes = interpolate(chain, motion, breaks, jumps=False)
-    jerk = jerk_coefficients(
+    _, jerk = piece_coefficients(
         nodes.times, nodes.q, nodes.qdot, nodes.qddot, nodes.qddot_before
     )
     short = np.diff(nodes.times) <= gap

@@ -93,16 +93,19 @@ def test_the_rows_of_a_file_of_schema_2_are_not_known(imported, tmp_path):
 
 def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
     with pytest.raises(
-        InputError, match=r"no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"
+        InputError,
+        match=r"the tolerance of a path is out of range; found 0.1; allowed: 2e-07 to 0.001",
     ):
         replace(imported.recovered, tolerance=0.1)
     own = imported.recovered.to_file()
     wrong = {
-        "no tolerance of a path": {"tolerance": 0.1},
+        "the tolerance of a path is out of range": {"tolerance": 0.1},
         "not the rows of a file; found rows ": {"rows": [[0.0, 1.0, 2.0, 3.0]]},
         "error .4,.; allowed: rows .K, 4. with ascending times": {"error": [0.0] * 4},
-        "rows: wrong type": {"rows": "none"},
-        "not the rows": {"rows": [[0.0, 1.0, 2.0, 3.0], [1.0, 1.0, 2.0, float("nan")]]},
+        "recovered.rows: .*found 'none'": {"rows": "none"},
+        "not a finite number": {
+            "rows": [[0.0, 1.0, 2.0, 3.0], [1.0, 1.0, 2.0, float("nan")]]
+        },
     }
     for message, change in wrong.items():
         monkeypatch.setattr(

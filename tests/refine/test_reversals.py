@@ -29,8 +29,11 @@ def swinging(phases, amplitude=1.0, offset=0.0):
 
 
 def rubbing(n, width, coulomb=1.0):
-    return Friction.of(
-        [f"j{i}" for i in range(n)], coulomb=coulomb, coulomb_velocity=width
+    return Friction(
+        armature=np.zeros(n),
+        viscous=np.zeros(n),
+        coulomb=np.full(n, coulomb),
+        v_eps=np.full(n, width),
     )
 
 

@@ -20,7 +20,7 @@ from brachis.apps.report.motion import reported_motion
 from brachis.apps.report.page import _plotly
 from brachis.errors import NotInstalledError
 from brachis.robot.from_task import robot_from_settings
-from brachis.robot.plausibility import Remark
+from brachis.robot.plausibility import Issue
 
 from .conftest import data_of, floats
 
@@ -202,7 +202,7 @@ def test_a_saved_motion_is_verified_again_and_told_as_the_plan(
 def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(
     planar, tmp_path
 ):
-    remark = Remark(
+    remark = Issue(
         "robot.limits.velocity", "looks like degrees", "120 rad/s", "1 to 60 rad/s"
     )
     result = dataclasses.replace(

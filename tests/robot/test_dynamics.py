@@ -207,14 +207,14 @@ def test_brachis_counts_armature_once():
 @pytest.mark.parametrize(
     ("friction", "words"),
     [
-        ({"viscous": -1.0}, r"robot\.friction\.viscous\.j1: is negative"),
+        ({"viscous": -1.0}, r"friction\.viscous: out of range; found -1\.0"),
         (
             {"armature": [0.0, float("nan"), 0.0]},
-            r"robot\.friction\.armature\.j2: is negative, too large or not a number",
+            r"friction\.armature\[1\]: not a finite number",
         ),
         (
             {"coulomb_velocity": 0.0},
-            r"robot\.friction\.coulomb_velocity: is not a usable speed",
+            r"friction\.coulomb_velocity: out of range; found 0\.0; allowed: > 0",
         ),
         (
             {"coulomb": [1.0]},

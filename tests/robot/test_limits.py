@@ -233,7 +233,7 @@ def test_range_of_a_wrong_shape(value):
 
 def test_coulomb_friction_that_no_torque_overcomes_is_refused():
     friction = {"coulomb": {"j2": 90.0}}
-    with pytest.raises(InputError, match="Coulomb friction holds joint 'j2'"):
+    with pytest.raises(InputError, match="Coulomb friction of joint 'j2' is not below"):
         planar_robot("RR", friction=friction)
     strong = LimitSpec(torque={"j2": 100.0})
     assert (
@@ -289,7 +289,7 @@ def test_a_range_of_no_width_is_empty():
     [
         ({"coulomb_velocity": 1e-308}, "robot.friction.coulomb_velocity"),
         ({"armature": 1e300}, "robot.friction.armature.j1"),
-        ({"viscous": float("inf")}, "robot.friction.viscous.j1"),
+        ({"viscous": float("inf")}, "robot: friction.viscous"),
     ],
 )
 def test_friction_that_no_drive_has_is_refused(friction, where):
@@ -301,10 +301,10 @@ def test_friction_that_no_drive_has_is_refused(friction, where):
 def test_positions_and_gravity_that_no_robot_has_are_refused():
     with pytest.raises(InputError, match="is no posture"):
         planar_robot("CC").posture([1e300, 0.0], "start.joints")
-    with pytest.raises(InputError, match=r"robot\.gravity"):
+    with pytest.raises(InputError, match=r"robot: gravity\[2\]: out of range"):
         planar_robot("RR", gravity=[0.0, 0.0, -1e300])
     with pytest.raises(InputError, match=r"robot\.locked_joints\.j2"):
-        planar_robot("RR", locked_joints={"j2": 1e300})
+        planar_robot("RR", locked_joints={"j2": 1e7})
 
 
 @pytest.mark.parametrize(

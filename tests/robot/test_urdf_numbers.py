@@ -9,7 +9,7 @@ import pytest
 from brachis import LimitSpec
 from brachis.errors import UrdfError
 from brachis.robot import Robot
-from brachis.robot.urdf_bodies import check_bodies, stated_chain
+from brachis.robot.urdf_bodies import check_bodies, read_dynamics
 from brachis.robot.urdf_elements import read_tree
 from support.chains import INERTIAL, Joint, chain_urdf, planar_urdf
 
@@ -131,7 +131,7 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
     robot = Robot.from_urdf(
         "file.urdf", urdf_text=text, tool_frame="tool", locked_joints={}
     )
-    bodies = stated_chain(
+    bodies = read_dynamics(
         read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool"
     ).bodies
     assert [body.joint for body in bodies] == list(robot.joint_names)
@@ -143,7 +143,7 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
         assert bodies[0].links == ("link1", "aside")
         assert bodies[0].mass == 3.5
         # The held flap counts where it is held: another position is another body.
-        other = stated_chain(
+        other = read_dynamics(
             read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4}, "tool"
         ).bodies
         assert np.abs(other[0].com - bodies[0].com).max() > 1e-3
@@ -155,7 +155,7 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
 )
 def test_a_model_that_weighs_something_else_is_refused(kind, change):
     robot = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
-    bodies = stated_chain(
+    bodies = read_dynamics(
         read_tree(TEXT, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool"
     ).bodies
     model, old = robot.model.copy(), robot.model.inertias[2]
@@ -178,7 +178,7 @@ def test_long_chains_are_summed_up_without_recursion():
         for i in range(2999)
     )
     tree = read_tree(f"<robot name='long'>{links}{joints}</robot>", "file.urdf")
-    assert stated_chain(tree, (), {}, tree.root).bodies == ()
+    assert read_dynamics(tree, (), {}, tree.root).bodies == ()
 
 
 def test_ghost_links_are_named():
@@ -233,9 +233,9 @@ def test_xacro_that_is_left_is_named():
         (
             "type='revolute'",
             "type='revolut'",
-            "joint 'j1' has no known type; found 'revolut'",
+            "joint 'j1' has an unknown type; found revolut",
         ),
-        ("type='revolute'", "", "joint 'j1' has no known type; found none"),
+        ("type='revolute'", "", "joint 'j1' has an unknown type; found none"),
         (
             "<child link='link2'/>",
             "<child link='link1'/>",

@@ -255,7 +255,7 @@ def test_a_file_of_moveit_is_read(loaded, tmp_path):
         limits=read_limits(tmp_path / "joint_limits.yaml"),
     )
     np.testing.assert_array_equal(
-        robot.limits.velocity, [1.0, np.inf, robot.stated_limits[2].velocity * 0.5]
+        robot.limits.velocity, [1.0, np.inf, robot.urdf_limits[2].velocity * 0.5]
     )
     np.testing.assert_array_equal(robot.limits.acceleration, [3.75, 5.0, np.inf])
 

@@ -30,7 +30,7 @@ from brachis.robot.dynamics import rigid_torque
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.task_map.protocol import AXES
-from brachis.robot.urdf import first_limb, read_chain, read_file
+from brachis.robot.urdf import default_chain, read_chain, read_file
 from brachis.task import LimitSpec, load_task
 from brachis.task.yaml_reader import read_yaml
 
@@ -420,7 +420,7 @@ def starter_task(
     folder : path, optional
         Where the task file will be; the URDF's path in it is relative to it where that is near.
     tool_frame, base_frame : str, optional
-        As in a task. By default the ends of the chain of most joints; see `first_limb`.
+        As in a task. By default the ends of the chain of most joints; see `default_chain`.
     listener : callable, optional
         Is told what is done.
 
@@ -445,7 +445,7 @@ def starter_task(
     text = read_file(path)
     base, tool = base_frame, tool_frame
     if tool is None:
-        limb = first_limb(text, str(path))
+        limb = default_chain(text, str(path))
         base, tool = base or limb.base, limb.tool
     chain = read_chain(
         text, str(path), tool_frame=tool, base_frame=base, locked_joints={}

@@ -1,4 +1,4 @@
-"""Arguments of public functions: wrong names and types, told like all wrong input."""
+"""Arguments of public functions: wrong names and types are refused like all wrong input."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ def check_keywords(
             signature.bind(*args, **kwargs)
         except TypeError as error:
             allowed = ", ".join(
-                _in_words(parameter) for parameter in parameters.values()
+                each.name
+                + ("=" if each.kind is each.KEYWORD_ONLY else "")
+                + (" (needed)" if each.default is each.empty else "")
+                for each in parameters.values()
             )
             raise InputError(str(error), where=name, allowed=allowed) from None
         return function(*args, **kwargs)
@@ -55,10 +58,8 @@ def check_keywords(
     return call
 
 
-def _in_words(parameter: inspect.Parameter) -> str:
-    """Say how an argument is given."""
-    needed = " (needed)" if parameter.default is parameter.empty else ""
-    return f"{parameter.name}{'=' if parameter.kind is parameter.KEYWORD_ONLY else ''}{needed}"
+def _wrong_type(value: object, where: str, allowed: str) -> InputError:
+    return InputError("wrong type", where=where, found=repr(value), allowed=allowed)
 
 
 def file_name(value: object, where: str) -> Path:
@@ -70,9 +71,7 @@ def file_name(value: object, where: str) -> Path:
         It is something else.
     """
     if not isinstance(value, str | os.PathLike):
-        raise InputError(
-            "wrong type", where=where, found=repr(value), allowed="the name of a file"
-        )
+        raise _wrong_type(value, where, "the name of a file")
     return Path(value)
 
 
@@ -84,9 +83,7 @@ def check_callable(value: object, where: str) -> None:
     InputError
     """
     if value is not None and not callable(value):
-        raise InputError(
-            "wrong type", where=where, found=repr(value), allowed="a function, or None"
-        )
+        raise _wrong_type(value, where, "a function, or None")
 
 
 def check_list(value: object, where: str, of: str) -> None:
@@ -116,21 +113,14 @@ def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(
-            "wrong type", where=where, found=repr(value), allowed=f"a number, {unit}"
-        ) from None
+        raise _wrong_type(value, where, f"a number, {unit}") from None
 
 
 def number(value: float, where: str, unit: str) -> float:
     """Return one number as a float; see `numbers`."""
     found = numbers(value, where, unit)
     if found.ndim:
-        raise InputError(
-            "wrong type",
-            where=where,
-            found=f"an array {found.shape}",
-            allowed=f"a number, {unit}",
-        )
+        raise _wrong_type(value, where, f"a number, {unit}")
     return float(found)
 
 
@@ -142,12 +132,9 @@ def count(value: int, where: str) -> int:
     InputError
         It is something else.
     """
+    allowed = "a whole number >= 1"
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise InputError(
-            "wrong type", where=where, found=repr(value), allowed="a whole number >= 1"
-        )
+        raise _wrong_type(value, where, allowed)
     if value < 1:
-        raise InputError(
-            "out of range", where=where, found=value, allowed="a whole number >= 1"
-        )
+        raise InputError("out of range", where=where, found=value, allowed=allowed)
     return int(value)

@@ -2,10 +2,6 @@
 
 What is written has a temporary name first, ``.brachis-<host>-<process>-<random>.part``, which says whose it is: a
 process that was killed cannot remove its own, so that the next one that writes into the folder does.
-
-What a file is, told from how it begins, and what to do with it where another kind is expected.
-
-Reading text files, with errors that say why a file cannot be read.
 """
 
 from __future__ import annotations
@@ -25,24 +21,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 from brachis.errors import InputError, TaskError
 
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer
-
 LARGEST_TEXT = 16_000_000
-"""Of a text file that is read, bytes."""
+"""Bytes of a text file that is read."""
 
-_TEMPORARY = re.compile(r"\.brachis-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{16}\.part")
-_KINDS = {
-    stat.S_ISDIR: "a folder",
-    stat.S_ISCHR: "a device",
-    stat.S_ISBLK: "a device",
-    stat.S_ISFIFO: "a pipe",
-    stat.S_ISSOCK: "a socket",
-}
+_TEMPORARY = re.compile(r"\.brachis-[0-9a-f]{8}-([0-9]+)-[0-9a-f]{16}\.part")
 
 
 def status_of(path: str | os.PathLike[str]) -> os.stat_result | None:
@@ -87,37 +73,35 @@ def read_file(
             path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC
         )  # so as not to wait for a pipe's writer
     except ValueError as error:
-        raise OSError(errno.EINVAL, f"no name of a file: {error}") from error
-    refusal = _refusal(os.fstat(descriptor), largest)
+        raise OSError(errno.EINVAL, f"not the name of a file: {error}") from error
+    status = os.fstat(descriptor)
+    kind = _SPECIAL.get(stat.S_IFMT(status.st_mode))
+    refusal = None
+    if kind is not None:
+        refusal = (errno.EINVAL, f"it is {kind}, not a file")
+    elif status.st_size > largest:
+        size = status.st_size / 1e6
+        text = f"it is {size:.1f} MB long, at most {largest / 1e6:g} MB are read"
+        refusal = (errno.EFBIG, text)
     if refusal is not None:
         os.close(descriptor)
         raise OSError(*refusal, os.fspath(path))
     with os.fdopen(descriptor, "rb") as stream:
-        content = (
-            stream.read(largest + 1 if beginning is None else beginning) or b""
-        )  # None: the kernel says no more
-    if (
-        len(content) > largest
-    ):  # files that the kernel makes up as they are read have no size
-        raise OSError(
-            errno.EFBIG, f"it is longer than {largest / 1e6:g} MB", os.fspath(path)
-        )
+        # None: a file of the kernel has nothing to say now.
+        content = stream.read(largest + 1 if beginning is None else beginning) or b""
+    if len(content) > largest:  # files of the kernel have no size before they are read
+        text = f"it is longer than {largest / 1e6:g} MB"
+        raise OSError(errno.EFBIG, text, os.fspath(path))
     return content
 
 
-def _refusal(status: os.stat_result, largest: int) -> tuple[int, str] | None:
-    """Say why what has this status is not read, as number and text of an `OSError`."""
-    kind = next(
-        (name for is_kind, name in _KINDS.items() if is_kind(status.st_mode)), None
-    )
-    if kind is not None:
-        return errno.EINVAL, f"it is {kind}, no file"
-    if status.st_size > largest:
-        return (
-            errno.EFBIG,
-            f"it is {status.st_size / 1e6:.1f} MB long, at most {largest / 1e6:g} MB are read",
-        )
-    return None
+_SPECIAL = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+}
 
 
 def temporary_in(folder: Path) -> Path:
@@ -125,17 +109,19 @@ def temporary_in(folder: Path) -> Path:
 
     Only names of this program are looked at whose process is of this host and runs no more.
     """
+    # Hosts that share a folder are told apart: their process numbers say nothing about each other's.
+    host = hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
     with suppress(OSError):
-        for path in folder.iterdir():
+        for path in folder.glob(f".brachis-{host}-*.part"):
             found = _TEMPORARY.fullmatch(path.name)
-            if found is not None and found[1] == _host() and not _runs(int(found[2])):
-                _remove(path)
-    return folder / f".brachis-{_host()}-{os.getpid()}-{secrets.token_hex(8)}.part"
-
-
-def _host() -> str:
-    """Tell hosts apart that share a folder: their process numbers say nothing about each other's."""
-    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
+            if found is None or _runs(int(found[1])):
+                continue
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                with suppress(OSError):
+                    path.unlink()
+    return folder / f".brachis-{host}-{os.getpid()}-{secrets.token_hex(8)}.part"
 
 
 def _runs(process: int) -> bool:
@@ -143,18 +129,9 @@ def _runs(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # it is somebody else's, or no number of a process
+    except (OSError, OverflowError):  # somebody else's, or no number of a process
         return True
     return True
-
-
-def _remove(path: Path) -> None:
-    """Remove a temporary file or folder; where that is not possible it stays."""
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        with suppress(OSError):
-            path.unlink()
 
 
 def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
@@ -166,9 +143,12 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
     """
     suffix = Path(path).suffix
     if suffix and not suffix[1:].isdigit() and suffix.lower() != allowed:
-        problem = "the suffix is that of another format"
         raise InputError(
-            problem, where=os.fspath(path), found=suffix, allowed=allowed, hint=hint
+            "the suffix is that of another format",
+            where=os.fspath(path),
+            found=suffix,
+            allowed=allowed,
+            hint=hint,
         )
 
 
@@ -198,21 +178,19 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         in_place = status is not None and not stat.S_ISREG(status.st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
-        file = _File(
-            temporary, "w" if in_place else "x"
-        )  # unlike tempfile's, with the permissions of a new file
+        # Unlike tempfile's, a new file has the usual permissions.
+        file = temporary.open("wb" if in_place else "xb")
     try:
-        with io.BufferedWriter(file) as stream:
-            yield stream
-    except OSError as error:
-        if file.failure is None:  # the block's own
-            raise
-        raise _cannot_be_written(path, file.failure) from error
-    else:
+        content = io.BytesIO()
+        yield content
+        with writing_errors(path), file:
+            file.write(content.getbuffer())
         if not in_place:
             with writing_errors(path):
                 temporary.replace(target)
     finally:
+        with suppress(OSError):
+            file.close()
         if not in_place:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
@@ -224,39 +202,8 @@ def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:
-        raise _cannot_be_written(path, error) from error
-
-
-def _cannot_be_written(
-    path: str | os.PathLike[str], error: OSError | ValueError
-) -> InputError:
-    return InputError(
-        "cannot be written",
-        where=str(path),
-        found=getattr(error, "strerror", None) or str(error),
-    )
-
-
-class _File(io.FileIO):
-    """A file that remembers why it could not be written."""
-
-    failure: OSError | None = None
-
-    def write(self, data: ReadableBuffer, /) -> int:
-        """Write as `FileIO` does."""
-        try:
-            return super().write(data)
-        except OSError as error:
-            self.failure = error
-            raise
-
-    def close(self) -> None:
-        """Close as `FileIO` does; some file systems report here that a write failed."""
-        try:
-            super().close()
-        except OSError as error:
-            self.failure = error
-            raise
+        found = getattr(error, "strerror", None) or str(error)
+        raise InputError("cannot be written", where=str(path), found=found) from error
 
 
 def shipped_folder(folder: str) -> Path:
@@ -279,16 +226,11 @@ def mesh_file(name: str, folder: Path) -> Path | None:
     scheme, given, within = name.partition("://")
     within = within if given else name
     above = [folder, *folder.absolute().parents]
-    python = [
-        Path(place) / share
-        for place in (*sys.path, sys.prefix)
-        for share in ("cmeel.prefix/share", "share")
-    ]
-    found = (
-        [place / within for place in above]
-        + ros_files(within)
-        + [place / within for place in python]
-    )
+    found = [place / within for place in above] + ros_files(within)
+    for place in (*sys.path, sys.prefix):
+        found += [
+            Path(place, share, within) for share in ("cmeel.prefix/share", "share")
+        ]
     if scheme == "package":  # which may be in a folder of another name
         found += [place / within.partition("/")[2] for place in above]
     return next((path for path in found if is_file(path)), None)
@@ -296,29 +238,20 @@ def mesh_file(name: str, folder: Path) -> Path | None:
 
 def ros_files(within: str) -> list[Path]:
     """Name the places where ROS may have a file of a package, ``<package>/<file>``."""
+
+    def places(variable: str) -> list[Path]:
+        listed = os.environ.get(variable, "").split(os.pathsep)
+        return [Path(place) for place in listed if place]
+
     package, _, inner = within.partition("/")
-    roots = [
-        Path(place)
-        for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
-        if place
-    ]
-    shares = [
-        Path(place, "share")
-        for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-        if place
-    ]
-    return [root / inner for root in roots if root.name == package] + [
-        root / within for root in roots + shares
-    ]
+    roots = places("ROS_PACKAGE_PATH")
+    shares = [place / "share" for place in places("AMENT_PREFIX_PATH")]
+    inside = [root / inner for root in roots if root.name == package]
+    return inside + [root / within for root in roots + shares]
 
 
 TASK_SUFFIXES = (".yaml", ".yml")
 """Suffixes of task files."""
-_LOOKED_AT = 16_384
-"""Bytes at the beginning of a file."""
-_TASK = re.compile(rb"^brachis\s*:", re.MULTILINE)
-_SWEEP = re.compile(rb"^sweep\s*:", re.MULTILINE)
-_FIGURES = b'{\n  "t_end"'
 
 
 class Kind(Enum):
@@ -343,20 +276,21 @@ _ADVICE = {
 def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     """Tell what a file is; None where it cannot be read, or is something else."""
     try:
-        beginning = read_file(
-            path, 4 * LARGEST_TEXT, beginning=_LOOKED_AT
-        ).removeprefix(codecs.BOM_UTF8)
+        content = read_file(path, 4 * LARGEST_TEXT, beginning=16_384)
     except OSError:
         return None
-    if beginning.startswith(b"PK"):
-        return Kind.RESULT
-    if beginning.startswith(_FIGURES):
-        return Kind.FIGURES
-    if re.search(rb"<robot\b", beginning) and beginning.lstrip().startswith(b"<"):
-        return Kind.URDF
-    if _SWEEP.search(beginning):
-        return Kind.SWEEP
-    return Kind.TASK if _TASK.search(beginning) else None
+    beginning = content.removeprefix(codecs.BOM_UTF8)
+    patterns = {
+        Kind.RESULT: rb"\APK",
+        Kind.FIGURES: rb'\A\{\n  "t_end"',
+        Kind.URDF: rb"\A\s*<(?s:.*)<?robot\b",
+        Kind.SWEEP: rb"(?m)^sweep\s*:",
+        Kind.TASK: rb"(?m)^brachis\s*:",
+    }
+    for kind, pattern in patterns.items():
+        if re.search(pattern, beginning):
+            return kind
+    return None
 
 
 def check_kind(
@@ -392,12 +326,13 @@ def read_text(
     path: Path,
     *,
     where: str,
-    folder: Path,
+    folder: Path | None = None,
     found: str | None = None,
     largest: int = LARGEST_TEXT,
     hint: str = "",
+    error: type[InputError] = TaskError,
 ) -> str:
-    """Return the content of a text file in UTF-8.
+    """Return the content of a text file in UTF-8; all line ends become newlines.
 
     Parameters
     ----------
@@ -405,32 +340,32 @@ def read_text(
         The file.
     where : str
         Place that messages name: the file itself, or the key that asks for it.
-    folder : Path
+    folder : Path, optional
         What relative paths are relative to, for the message about a missing file.
     found : str, optional
         The file, for messages whose place is a key.
     largest : int, optional
         Longer files are refused, bytes.
     hint : str, optional
-        What to try where the file is too long.
+        What to try if the file is too long; without a folder also if it is missing.
+    error : type, optional
+        What is raised.
 
     Raises
     ------
-    TaskError
-        The file is missing, is not a text file, too long, or cannot be read.
+    InputError
+        Of the class `error`: the file is missing, is not a text file, too long, or cannot be read.
     """
     try:
-        with io.TextIOWrapper(
-            io.BytesIO(read_file(path, largest)), encoding="utf-8"
-        ) as text:  # any line ends
-            return text.read()
+        content = read_file(path, largest).decode()
+        return io.IncrementalNewlineDecoder(None, translate=True).decode(content)
     except FileNotFoundError:
         problem = "there is no such file"
-        hint = f"Paths are relative to {folder}"
-    except UnicodeDecodeError as error:
-        problem = f"not a text file in UTF-8: {error.reason} at byte {error.start}"
+        hint = f"Paths are relative to {folder}" if folder else hint
+    except UnicodeDecodeError as refusal:
+        problem = f"not a text file in UTF-8: {refusal.reason} at byte {refusal.start}"
         hint = ""
-    except OSError as error:
-        problem = f"the file cannot be read: {error.strerror}"
-        hint = hint if error.errno == errno.EFBIG else ""
-    raise TaskError(problem, found=found, where=where, hint=hint or None)
+    except OSError as refusal:
+        problem = f"the file cannot be read: {refusal.strerror}"
+        hint = hint if refusal.errno == errno.EFBIG else ""
+    raise error(problem, found=found, where=where, hint=hint or None)

@@ -34,13 +34,11 @@ class SigintHandler:
         Whether a press also raises KeyboardInterrupt.
     """
 
-    def __init__(self) -> None:
-        self.pending = False
-        self.raising = False
+    pending = False
+    raising = False
 
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Remember a press, and interrupt the program where that may be."""
-        del number, frame
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        """Remember a press, and interrupt the program if it may be interrupted here."""
         self.remember()
         if self.raising:
             raise KeyboardInterrupt
@@ -48,12 +46,8 @@ class SigintHandler:
     def remember(self) -> None:
         """Remember a press; end the program if one is pending already."""
         if self.pending:
-            os.write(
-                2,
-                b"\x1b[?25h\nbrachis: interrupted\n"
-                if os.isatty(2)
-                else b"brachis: interrupted\n",
-            )
+            show_cursor = b"\x1b[?25h\n" if os.isatty(2) else b""
+            os.write(2, show_cursor + b"brachis: interrupted\n")
             os._exit(INTERRUPTED)
         self.pending = True
 
@@ -65,24 +59,21 @@ def install() -> None:
         sys.unraisablehook = _quiet(sys.unraisablehook)
 
 
-def presses() -> SigintHandler | None:
-    """Return the handler that remembers presses; None within another program, for example."""
+def presses() -> SigintHandler:
+    """Return the handler that remembers presses; within another program, for example, one that knows of none."""
     handler = signal.getsignal(signal.SIGINT)
-    return handler if isinstance(handler, SigintHandler) else None
+    return handler if isinstance(handler, SigintHandler) else SigintHandler()
 
 
 def check() -> None:
     """Raise KeyboardInterrupt if a press went unheard."""
-    handler = presses()
-    if handler is not None and handler.pending:
+    if presses().pending:
         raise KeyboardInterrupt
 
 
 def clear() -> None:
-    """Put down that the press was heard."""
-    handler = presses()
-    if handler is not None:
-        handler.pending = False
+    """Forget a press that was heard."""
+    presses().pending = False
 
 
 @contextlib.contextmanager
@@ -92,9 +83,6 @@ def interruptible() -> Iterator[None]:
     A press that was swallowed within ends the block with KeyboardInterrupt, whatever came of it otherwise.
     """
     handler = presses()
-    if handler is None:
-        yield
-        return
     handler.raising = True
     try:
         check()
@@ -120,9 +108,8 @@ def defer() -> Iterator[None]:
     For what must not be broken off, or might swallow it: imports of compiled libraries, finalisers.
     """
     before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(
-        before
-    ):  # ignored, or not Python's
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or not callable(before):  # ignored, or not Python's
         yield
         return
     pressed = False
@@ -146,9 +133,8 @@ def defer() -> Iterator[None]:
 def block_in_children() -> Iterator[None]:
     """Let processes that are started within this block never hear Ctrl-C; this one hears a press at its end."""
     with defer():
-        before = signal.pthread_sigmask(
-            signal.SIG_BLOCK, {signal.SIGINT}
-        )  # which processes inherit
+        # Processes inherit the mask.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
         finally:

@@ -1,4 +1,4 @@
-"""What a plan is doing: told to a listener, to the log named ``brachis``, and on a line that changes."""
+"""What a plan is doing: reported to a listener, to the log named ``brachis``, and on a line that changes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 Listener = Callable[[str], None]
-"""Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
-_LOG = logging.getLogger("brachis")
-_PAUSE = 0.1
-"""Least time between two iterations that are shown, s."""
+"""Takes what the planner is doing in plain words, between iterations; may raise KeyboardInterrupt."""
 
 
 class Iteration(str):
@@ -27,7 +24,7 @@ class Iteration(str):
 def report_progress(
     listener: Listener | None, progress: bool | None
 ) -> Iterator[Listener]:
-    """Give a listener that logs every step, tells it to another listener, and shows it.
+    """Give a listener that logs every step, hands it to another listener, and shows it.
 
     Parameters
     ----------
@@ -35,20 +32,21 @@ def report_progress(
     progress : bool or None
         Whether steps are shown; None: in notebooks, unless there is a listener.
     """
-    shown = listener is None and _in_notebook() if progress is None else progress
-    line = _Line() if shown else None
+    if progress is None:
+        progress = listener is None and _in_notebook()
+    line = _Line() if progress else None
+    log = logging.getLogger("brachis")
 
-    def tell(text: str) -> None:
-        _LOG.log(
-            logging.DEBUG if isinstance(text, Iteration) else logging.INFO, "%s", text
-        )
+    def report(text: str) -> None:
+        level = logging.DEBUG if isinstance(text, Iteration) else logging.INFO
+        log.log(level, "%s", text)
         if listener is not None:
             listener(text)
         if line is not None:
             line.show(text)
 
     try:
-        yield tell
+        yield report
     finally:
         if line is not None:
             line.clear()
@@ -66,9 +64,9 @@ class _Line:
         self._last = 0.0
 
     def show(self, text: str) -> None:
-        """Show a step in place of the one before; of quick iterations a few."""
+        """Show a step in place of the one before; of iterations ten a second."""
         now = time.monotonic()
-        if isinstance(text, Iteration) and now - self._last < _PAUSE:
+        if isinstance(text, Iteration) and now - self._last < 0.1:
             return
         self._last = now
         if _in_notebook():

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 from brachis.errors import MissingAttributeError
 
 COLUMNS = 100
+"""Characters up to which a summary stands on one line."""
 LINES = 22
-_ROOM = 104
-"""Characters of one value."""
-_ITEMS = 8
+"""Entries of a summary: with name and prompt they fit into a terminal of 24 lines."""
 
 
 class Summary:
@@ -56,49 +55,36 @@ class Summary:
     def _entries(self) -> list[tuple[str, str]]:
         given = list(self.summary().items())
         entries = [(key, show_value(value)) for key, value in given[:LINES]]
-        return entries + (
-            [("...", f"{len(given) - LINES} more")] if len(given) > LINES else []
-        )
+        if len(given) > LINES:
+            entries.append(("...", f"{len(given) - LINES} more"))
+        return entries
 
 
-def show_value(value: Any, room: int = _ROOM) -> str:
-    """Show a value in at most `room` characters: arrays by their shape, long sequences by their length."""
+def show_value(value: Any, room: int = 104, items: int = 8) -> str:
+    """Show a value in at most `room` characters and `items`: arrays by their shape, long sequences by their length."""
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple) and shape:
-        return (
-            _list_items(value.tolist(), room)
-            if len(shape) == 1 and shape[0] <= _ITEMS
-            else f"array {shape}"
-        )
+        if len(shape) > 1 or shape[0] > items:
+            return f"array {shape}"
+        value = value.tolist()
     if isinstance(value, float):
         return f"{value:.6g}"
+    count = 0
     if isinstance(value, str):
-        return _shorten(value, room)
-    if type(value) in {list, tuple}:  # not those with names
-        return _list_items(value, room)
-    if isinstance(value, Mapping):
-        items = ", ".join(
-            f"{key}: {show_value(each, room)}"
-            for key, each in list(value.items())[:_ITEMS]
-        )
-        return (
-            items
-            if len(items) <= room and len(value) <= _ITEMS
-            else f"{len(value)} entries"
-        )
-    text = repr(value)
-    return text if len(text) <= room and "\n" not in text else type(value).__name__
-
-
-def _shorten(text: str, room: int) -> str:
-    if len(text) <= room and "\n" not in text:
-        return text
-    count = f"... ({len(text)} characters)"
-    return text.partition("\n")[0][: room - len(count)] + count
-
-
-def _list_items(values: list[Any] | tuple[Any, ...], room: int) -> str:
-    text = f"[{', '.join(show_value(each, room) for each in values[:_ITEMS])}]"
-    return (
-        text if len(text) <= room and len(values) <= _ITEMS else f"{len(values)} items"
-    )
+        text = value
+        ending = f"... ({len(text)} characters)"
+        instead = text.partition("\n")[0][: room - len(ending)] + ending
+    elif type(value) in {list, tuple}:  # not those with names
+        count = len(value)
+        text = f"[{', '.join(show_value(each, room) for each in value[:items])}]"
+        instead = f"{count} items"
+    elif isinstance(value, Mapping):
+        count = len(value)
+        pairs = list(value.items())[:items]
+        text = ", ".join(f"{key}: {show_value(each, room)}" for key, each in pairs)
+        instead = f"{count} entries"
+    else:
+        text = repr(value)
+        instead = type(value).__name__
+    fits = len(text) <= room and count <= items and "\n" not in text
+    return text if fits else instead

@@ -16,7 +16,7 @@ from brachis.errors import PathError, write_apart
 from brachis.problem.plausible_limits import limit_figures
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import TURN, UNITS
-from brachis.robot.plausibility import Figure, Remark, link_lengths, reach, remarks
+from brachis.robot.plausibility import Check, Issue, find_issues, link_lengths, reach
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
 from brachis.task import Task, ToolPose
@@ -79,16 +79,16 @@ Some of the largest figures are ratios to the robot's own measure.
 """
 
 
-def _figure(key: str, value: float, scale: float = 1.0, where: str = "") -> Figure:
+def _figure(key: str, value: float, scale: float = 1.0, where: str = "") -> Check:
     """Compare a value with `scale` times the largest usual one."""
     message, largest, unit, aside = USUAL[key]
-    return Figure(where or key, message, value, largest * scale, unit, aside)
+    return Check(where or key, message, value, largest * scale, unit, aside)
 
 
-def of_task(task: Task) -> tuple[Remark, ...]:
+def of_task(task: Task) -> tuple[Issue, ...]:
     """Look at speeds and accelerations of the tool, and at the points that the path was fitted to."""
     of_points = [
-        Remark(
+        Issue(
             f"path: {fit.source}",
             fit.doubt,
             f"{fit.length:.4g} m",
@@ -97,7 +97,7 @@ def of_task(task: Task) -> tuple[Remark, ...]:
         for fit in task.fits
         if fit.doubt
     ]
-    return (*remarks(_tool(task)), *_angles(task), *of_points)
+    return (*find_issues(_tool(task)), *_angles(task), *of_points)
 
 
 def of_places(
@@ -106,7 +106,7 @@ def of_places(
     start: np.ndarray | None,
     end: np.ndarray | None,
     path_start: Sequence[float] | ToolPose | None,
-) -> tuple[Remark, ...]:
+) -> tuple[Issue, ...]:
     """Look at what a task says about where the robot is, in postures or along a path of joints.
 
     Parameters
@@ -133,12 +133,12 @@ def of_places(
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
         turn = float(np.ptp(along[:, -1]))
         figures += [_figure("path_start", begins), _figure("path", turn)]
-    return tuple(remarks(figures))
+    return tuple(find_issues(figures))
 
 
 def _positions(
     robot: Robot, key: str, postures: np.ndarray, *, may_wind: bool
-) -> Iterator[Figure]:
+) -> Iterator[Check]:
     """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
@@ -149,7 +149,7 @@ def _positions(
         turns = 5.0 if may_wind else 1.0
         usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
         shown = f"{value:.6g}"
-        yield Figure(
+        yield Check(
             f"{key}.{robot.joint_names[i]}",
             "the position looks like degrees",
             abs(value),
@@ -160,16 +160,16 @@ def _positions(
         )
 
 
-def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
+def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
     """Look at a motion's end time, s, beside the `least` that the planner allows, s."""
     if t_end > 1.01 * least:
         return ()
     message = "the end time is the least that the planner knows, so that no limit holds the motion back"
     usual = "more; see the units of limits, lengths and masses"
-    return (Remark("t_end", message, f"{t_end:.6g} s", usual),)
+    return (Issue("t_end", message, f"{t_end:.6g} s", usual),)
 
 
-def _tool(task: Task) -> Iterator[Figure]:
+def _tool(task: Task) -> Iterator[Check]:
     """Look at the largest of every kind of limit; feed rates have units of their own."""
     limits = task.tool_limits
     speed = limits.speed
@@ -185,7 +185,7 @@ def _tool(task: Task) -> Iterator[Figure]:
     message = f"the speed looks like {meant}"
     for key in ("start_speed", "end_speed"):
         value = _largest([getattr(task.boundary, key)])
-        yield Figure(f"boundary.{key}", message, value, 50.0, task.speed_unit)
+        yield Check(f"boundary.{key}", message, value, 50.0, task.speed_unit)
 
 
 def _largest(values: Iterable[float | None]) -> float:
@@ -193,7 +193,7 @@ def _largest(values: Iterable[float | None]) -> float:
     return max((one for one in values if one is not None and one < 1e5), default=0.0)
 
 
-def _angles(task: Task) -> Iterator[Remark]:
+def _angles(task: Task) -> Iterator[Issue]:
     """Look for eighths of up to two turns in rad where degrees belong.
 
     They are written with two decimals: 3.14 is half a turn, 5.5 is not seven eighths.
@@ -207,7 +207,7 @@ def _angles(task: Task) -> Iterator[Remark]:
         eighths = round(degrees / (0.125 * TURN))
         if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * TURN * eighths) < 2e-3:
             usual = f"{math.degrees(degrees):.4g} deg for that angle"
-            yield Remark(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
+            yield Issue(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
 
 
 def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
@@ -222,7 +222,7 @@ def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
         yield key, content
 
 
-def of_robot(robot: Robot) -> tuple[Remark, ...]:
+def of_robot(robot: Robot) -> tuple[Issue, ...]:
     """Look at limits, friction, lengths, masses, payload and mounting of a robot."""
     bare = robot.with_payload(None) if robot.settings.payload else robot
     figures = (
@@ -231,21 +231,21 @@ def of_robot(robot: Robot) -> tuple[Remark, ...]:
         *_masses(bare),
         *_payload(robot, bare),
     )
-    return (*_scales(robot), *_friction(robot), *remarks(figures))
+    return (*_scales(robot), *_friction(robot), *find_issues(figures))
 
 
-def _scales(robot: Robot) -> Iterator[Remark]:
+def _scales(robot: Robot) -> Iterator[Issue]:
     message = "the factor raises limits far beyond what was stated"
     usual = "0.1 to 1; a percentage is divided by 100"
     for kind, factor in robot.settings.limits.scale.model_dump().items():
         if factor > 10.0:
-            yield Remark(f"robot.limits.scale.{kind}", message, f"{factor:g}", usual)
+            yield Issue(f"robot.limits.scale.{kind}", message, f"{factor:g}", usual)
 
 
-def _friction(robot: Robot) -> Iterator[Remark]:
+def _friction(robot: Robot) -> Iterator[Issue]:
     """Look at damping of the URDF, which is often there to calm a simulation."""
     message = "the damping of the URDF takes more than the largest torque at the largest speed"
-    for i, damping in enumerate(robot.stated.friction["viscous"]):
+    for i, damping in enumerate(robot.urdf_dynamics.friction["viscous"]):
         fastest = robot.limits.velocity[i]
         torque = robot.limits.torque[i]
         position_unit = robot.position_units[i]
@@ -255,10 +255,10 @@ def _friction(robot: Robot) -> Iterator[Remark]:
             unit = UNITS["viscous"][position_unit]
             usual = f"below {torque / fastest:.3g} {unit}; viscous: null leaves it out"
             where = f"robot.friction.viscous.{robot.joint_names[i]}"
-            yield Remark(where, message, f"{damping:.6g} {unit}", usual)
+            yield Issue(where, message, f"{damping:.6g} {unit}", usual)
 
 
-def _lengths(robot: Robot) -> Iterator[Figure]:
+def _lengths(robot: Robot) -> Iterator[Check]:
     """Look at the way from joint to joint, tool offset, mounting and gravity."""
     *links, last = link_lengths(robot)
     settings = robot.settings
@@ -271,7 +271,7 @@ def _lengths(robot: Robot) -> Iterator[Figure]:
     yield _figure("robot.gravity", math.hypot(*settings.gravity))
 
 
-def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
+def _payload(robot: Robot, bare: Robot) -> Iterator[Check]:
     """Look at what the tool carries."""
     payload = robot.settings.payload
     if payload is None:
@@ -287,7 +287,7 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
     yield _figure("robot.payload.inertia", moment, payload.mass * size**2)
 
 
-def _masses(robot: Robot) -> Iterator[Figure]:
+def _masses(robot: Robot) -> Iterator[Check]:
     size = max(1.0, reach(robot))
     bodies = list(robot.model.inertias)[1:]
     for name, body in zip(robot.joint_names, bodies, strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 
 from brachis.robot import Robot
 from brachis.robot.joints import UNITS
-from brachis.robot.plausibility import Figure, link_lengths
+from brachis.robot.plausibility import Check, link_lengths
 from brachis.task import LIMIT_KINDS
 from brachis.task.limit_kinds import FASTEST, UsualLimit
 
@@ -17,13 +17,13 @@ _HOLDS = 50.0
 """Arms hold a tenth to five times their own weight at full reach."""
 
 
-def limit_figures(robot: Robot) -> Iterator[Figure]:
+def limit_figures(robot: Robot) -> Iterator[Check]:
     """Yield all figures of the limits of a robot without payload."""
     for look in (_magnitudes, _ranges, _curves):
         yield from look(robot)
 
 
-def _magnitudes(robot: Robot) -> Iterator[Figure]:
+def _magnitudes(robot: Robot) -> Iterator[Check]:
     for kind, row in LIMIT_KINDS.items():
         usual = row.usual
         if usual is None:
@@ -40,7 +40,7 @@ def _magnitudes(robot: Robot) -> Iterator[Figure]:
             if not has_curve and not _placeholder(
                 value, usual, largest(i), _stated(robot, usual, i)
             ):
-                yield Figure(
+                yield Check(
                     f"robot.limits.{kind}.{name}",
                     f"the {row.name.replace('_', ' ')} limit looks like {usual.mistaken_unit[unit]}",
                     float(value),
@@ -63,7 +63,7 @@ def _placeholder(
 def _stated(robot: Robot, usual: UsualLimit, joint: int) -> float | None:
     """Return the URDF's limit that a joint's is compared with."""
     kind = usual.urdf_kind
-    return robot.stated_limits[joint].of_kind(kind) if kind else None
+    return robot.urdf_limits[joint].of_kind(kind) if kind else None
 
 
 def _largest(robot: Robot, usual: UsualLimit) -> Callable[[int], float]:
@@ -85,7 +85,7 @@ def _largest(robot: Robot, usual: UsualLimit) -> Callable[[int], float]:
     return of_joint
 
 
-def _ranges(robot: Robot) -> Iterator[Figure]:
+def _ranges(robot: Robot) -> Iterator[Check]:
     """Look at position ranges: joints with cables make a dozen turns at most."""
     limits = robot.limits
     columns = zip(
@@ -93,7 +93,7 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
         robot.position_units,
         limits.position_lower,
         limits.position_upper,
-        robot.stated_limits,
+        robot.urdf_limits,
         strict=True,
     )
     for name, unit, lower, upper, known in columns:
@@ -108,7 +108,7 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
             usual = min(usual, max(5.0 * (known.upper - known.lower), least))
         # An end beyond this is written for "no limit": in degrees, ranges end at 720.
         if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
-            yield Figure(
+            yield Check(
                 f"robot.limits.position.{name}",
                 f"the position range looks like {'degrees' if unit == 'rad' else 'mm'}",
                 upper - lower,
@@ -119,7 +119,7 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
             )
 
 
-def _curves(robot: Robot) -> Iterator[Figure]:
+def _curves(robot: Robot) -> Iterator[Check]:
     """Look at the torques and the speeds of torque-speed curves."""
     scale = robot.settings.limits.scale.torque
     usual_torque = LIMIT_KINDS["torque"].usual
@@ -137,7 +137,7 @@ def _curves(robot: Robot) -> Iterator[Figure]:
         meant = {"rad": "rpm", "m": "mm per second"}[unit]
         said = "the last speed of the curve looks like"
         aside = "; at the joint, behind its gear"
-        yield Figure(
+        yield Check(
             key,
             f"{said} {meant}",
             curve[-1][0],
@@ -146,4 +146,4 @@ def _curves(robot: Robot) -> Iterator[Figure]:
             aside,
         )
         said = f"the torque of the curve looks like {usual_torque.mistaken_unit[unit]}"
-        yield Figure(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])
+        yield Check(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])

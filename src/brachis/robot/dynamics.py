@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
 
 from brachis.robot.robot import Robot
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -39,31 +43,24 @@ class SharedTorques:
     qddot: np.ndarray
 
     @cached_property
-    def _torques(self) -> dict[int, tuple[Robot, np.ndarray]]:
-        return {}
-
-    @cached_property
-    def _derivatives_of_torques(self) -> dict[int, tuple[Robot, TorqueDerivatives]]:
+    def _known(self) -> dict[tuple[Callable[..., Any], int], tuple[Robot, Any]]:
         return {}
 
     def torque(self, robot: Robot) -> np.ndarray:
-        """See `torque`; not to be written to."""
-        known = self._torques.get(id(robot))
-        if (
-            known is None or known[0] is not robot
-        ):  # a number says nothing in another process
-            known = self._torques[id(robot)] = (
-                robot,
-                torque(robot, self.q, self.qdot, self.qddot),
-            )
-        return known[1]
+        """Joint torques, (K, n); not to be written to."""
+        return self._once(torque, robot)
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
-        """See `torque_derivatives`; not to be written to."""
-        known = self._derivatives_of_torques.get(id(robot))
+        """Return the derivatives of the joint torques; not to be written to."""
+        return self._once(torque_derivatives, robot)
+
+    def _once(self, function: Callable[..., _T], robot: Robot) -> _T:
+        key = function, id(robot)
+        known = self._known.get(key)
+        # The robot is compared too: in another process an id may be that of another object.
         if known is None or known[0] is not robot:
-            slopes = torque_derivatives(robot, self.q, self.qdot, self.qddot)
-            known = self._derivatives_of_torques[id(robot)] = robot, slopes
+            known = robot, function(robot, self.q, self.qdot, self.qddot)
+            self._known[key] = known
         return known[1]
 
 
@@ -90,44 +87,43 @@ def rigid_torque(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
     """Joint torques of K states without friction and armature; parameters as for `torque`."""
-    model, data, rnea = robot.model, robot.model.createData(), pin.rnea
+    model = robot.model
+    data = model.createData()
     rigid = np.empty_like(q)
     for k in range(len(q)):
-        rigid[k] = rnea(model, data, q[k], qdot[k], qddot[k])
+        rigid[k] = pin.rnea(model, data, q[k], qdot[k], qddot[k])
     return rigid
 
 
 def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Mass matrices with armature, (K, n, n), of K postures (K, n)."""
-    model, data, crba = robot.model, robot.model.createData(), pin.crba
+    model = robot.model
+    data = model.createData()
     matrices = np.empty((len(q), robot.n, robot.n))
     for k in range(len(q)):
-        matrices[k] = crba(model, data, q[k])
-    upper = np.triu(matrices)
-    matrices = upper + np.swapaxes(np.triu(matrices, 1), 1, 2)
-    diagonal = np.arange(robot.n)
-    matrices[:, diagonal, diagonal] += robot.friction.armature
-    return matrices
+        matrices[k] = pin.crba(model, data, q[k])
+    return _with_armature(robot, matrices)
 
 
 def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    model, data, derivatives = (
-        robot.model,
-        robot.model.createData(),
-        pin.computeRNEADerivatives,
-    )
-    by_q, by_qdot, by_qddot = (np.empty((len(q), robot.n, robot.n)) for _ in range(3))
+    model = robot.model
+    data = model.createData()
+    by_q, by_qdot, by_qddot = np.empty((3, len(q), robot.n, robot.n))
     for k in range(len(q)):
-        by_q[k], by_qdot[k], by_qddot[k] = derivatives(
+        by_q[k], by_qdot[k], by_qddot[k] = pin.computeRNEADerivatives(
             model, data, q[k], qdot[k], qddot[k]
         )
-    # Some versions of Pinocchio fill the upper triangle of the mass matrix only.
-    upper = np.triu(by_qddot)
-    by_qddot = upper + np.swapaxes(np.triu(by_qddot, 1), 1, 2)
     diagonal = np.arange(robot.n)
-    by_qddot[:, diagonal, diagonal] += robot.friction.armature
     by_qdot[:, diagonal, diagonal] += robot.friction.velocity_derivative(qdot)
-    return TorqueDerivatives(by_q, by_qdot, by_qddot)
+    return TorqueDerivatives(by_q, by_qdot, _with_armature(robot, by_qddot))
+
+
+def _with_armature(robot: Robot, matrices: np.ndarray) -> np.ndarray:
+    """Complete mass matrices, (K, n, n), of which Pinocchio may fill the upper triangle alone, and add the armature."""
+    complete = np.triu(matrices) + np.swapaxes(np.triu(matrices, 1), 1, 2)
+    diagonal = np.arange(robot.n)
+    complete[:, diagonal, diagonal] += robot.friction.armature
+    return complete

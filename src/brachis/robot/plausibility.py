@@ -1,11 +1,4 @@
-"""Figures that are hardly meant, as warnings or errors.
-
-A figure beside what such figures usually are.
-
-How large a robot is.
-
-Hints for errors that come of degrees for rad, mm for m, or another order; and what no robot of its size reaches.
-"""
+"""Implausible figures: what they look like, such as degrees for rad or mm for m, reported as warnings or errors."""
 
 from __future__ import annotations
 
@@ -24,7 +17,7 @@ from brachis.robot.task_map.protocol import AXES
 
 
 class PlausibilityWarning(BrachisWarning):
-    """A figure of the robot, the task or the motion is hardly meant.
+    """A figure of the robot, the task or the motion is implausible.
 
     Examples
     --------
@@ -40,8 +33,8 @@ class PlausibilityWarning(BrachisWarning):
 
 
 @dataclass(frozen=True)
-class Remark:
-    """A figure that is allowed and hardly meant.
+class Issue:
+    """A figure that is allowed and implausible.
 
     Attributes
     ----------
@@ -69,40 +62,25 @@ class Remark:
         return asdict(self)
 
 
-def _together(remarks: tuple[Remark, ...]) -> tuple[Remark, ...]:
-    """Make one remark of those that say the same of several joints."""
-    groups: dict[tuple[str, str], list[Remark]] = {}
-    for remark in remarks:
-        groups.setdefault((remark.where.rpartition(".")[0], remark.message), []).append(
-            remark
-        )
-    return tuple(
-        group[0] if len(group) == 1 else _of_all(stem, group)
-        for (stem, _), group in groups.items()
-    )
-
-
-def _of_all(stem: str, group: list[Remark]) -> Remark:
-    """Make one remark of several below a key."""
+def _join(stem: str, group: list[Issue]) -> Issue:
+    """Make one issue of several with the same message below one key."""
+    if len(group) == 1:
+        return group[0]
     found = ", ".join(
-        f"{remark.where.removeprefix(f'{stem}.')} {remark.found}" for remark in group
+        f"{issue.where.removeprefix(f'{stem}.')} {issue.found}" for issue in group
     )
-    return Remark(
-        stem,
-        group[0].message,
-        found,
-        "; ".join(dict.fromkeys(remark.usual for remark in group)),
-    )
+    usual = "; ".join(dict.fromkeys(issue.usual for issue in group))
+    return Issue(stem, group[0].message, found, usual)
 
 
-def tell(
-    remarks: tuple[Remark, ...], *, strict: bool | None, stacklevel: int = 2
-) -> tuple[Remark, ...]:
-    """Warn of remarks, or refuse some or all of them; return them, one for all joints of which they say the same.
+def report_issues(
+    issues: tuple[Issue, ...], *, strict: bool | None, stacklevel: int = 2
+) -> tuple[Issue, ...]:
+    """Warn of issues, or refuse some or all of them; return them, one for all joints with the same message.
 
     Parameters
     ----------
-    remarks : tuple of Remark
+    issues : tuple of Issue
     strict : bool or None
         Whether they are errors; None: those of the start posture are.
     stacklevel : int, optional
@@ -112,21 +90,25 @@ def tell(
     ------
     PlausibilityError
     """
-    remarks = _together(remarks)
+    groups: dict[tuple[str, str], list[Issue]] = {}
+    for issue in issues:
+        stem = issue.where.rpartition(".")[0]
+        groups.setdefault((stem, issue.message), []).append(issue)
+    joined = tuple(_join(stem, group) for (stem, _), group in groups.items())
     refused = [
-        str(each)
-        for each in remarks
-        if strict or (strict is None and each.where.startswith("start.joints"))
+        str(issue)
+        for issue in joined
+        if strict or (strict is None and issue.where.startswith("start.joints"))
     ]
     if refused:
         raise PlausibilityError(refused)
-    for remark in remarks:
-        warnings.warn(str(remark), PlausibilityWarning, stacklevel=stacklevel)
-    return remarks
+    for issue in joined:
+        warnings.warn(str(issue), PlausibilityWarning, stacklevel=stacklevel)
+    return joined
 
 
 @dataclass(frozen=True)
-class Figure:
+class Check:
     """A figure, and the largest one that is usual.
 
     Attributes
@@ -134,14 +116,14 @@ class Figure:
     where : str
         Task key, or joint or link of the robot.
     message : str
-        What it looks like where it is larger.
+        What it looks like if it is larger.
     value, usual : float
-        In `unit`; a NaN is never remarked upon.
+        In `unit`; a NaN passes.
     unit : str
     aside : str
         What is said behind what is usual: for what, or what else to write.
     shown : str
-        The figure in words, where it is more than one number.
+        The figure in words, if it is more than one number.
     """
 
     where: str
@@ -153,13 +135,13 @@ class Figure:
     shown: str = ""
 
 
-def remarks(figures: Iterable[Figure]) -> Iterator[Remark]:
-    """Remark upon the figures that are larger than usual."""
-    for figure in figures:
-        if figure.value > figure.usual:
-            found = figure.shown or f"{figure.value:.6g}"
-            usual = f"below {figure.usual:.3g} {figure.unit}{figure.aside}"
-            yield Remark(figure.where, figure.message, f"{found} {figure.unit}", usual)
+def find_issues(checks: Iterable[Check]) -> Iterator[Issue]:
+    """Yield an issue for every figure that is larger than usual."""
+    for check in checks:
+        if check.value > check.usual:
+            found = check.shown or f"{check.value:.6g}"
+            usual = f"below {check.usual:.3g} {check.unit}{check.aside}"
+            yield Issue(check.where, check.message, f"{found} {check.unit}", usual)
 
 
 def link_lengths(robot: Robot) -> list[float]:
@@ -173,58 +155,47 @@ def link_lengths(robot: Robot) -> list[float]:
 
 def reach(robot: Robot) -> float:
     """How far the tool frame can be from the first joint at most, m, in the ranges of slides that the URDF states."""
+    limits = robot.limits
+    columns = zip(
+        limits.position_lower,
+        limits.position_upper,
+        robot.urdf_limits,
+        robot.position_units,
+        strict=True,
+    )
     slides = [
-        max(
-            abs(end)
-            for end in (lower, upper, stated.lower, stated.upper)
-            if end is not None
-        )
-        for lower, upper, stated, unit in zip(
-            robot.limits.position_lower,
-            robot.limits.position_upper,
-            robot.stated_limits,
-            robot.position_units,
-            strict=True,
-        )
+        max(abs(lower), abs(upper), abs(urdf.lower or 0.0), abs(urdf.upper or 0.0))
+        for lower, upper, urdf, unit in columns
         if unit == "m"
     ]
     return sum(link_lengths(robot)) + sum(slides)
 
 
-_TURN = 2.0 * math.pi
-_THOUSAND = 1000.0
 _ROUNDED = 1e-3
-"""Places are given to the millimetre."""
-_HARDLY = 3.0
-"""Nobody misses the robot by more than so many times its reach."""
-_STATIONS = 401
+"""m, or entries of a rotation matrix: positions are given to the millimetre."""
 
 
 def position_hint(value: float, lower: float, upper: float, unit: str) -> str | None:
-    """Say what a position, rad or m, beyond its range looks like, if it would be within it in degrees or mm."""
-    if unit == "rad" and abs(value) > _TURN and lower <= math.radians(value) <= upper:
-        return (
-            f"It looks like degrees: {value:.6g} deg are {math.radians(value):.6g} rad"
-        )
+    """Return what a position, rad or m, beyond its range looks like, if it would be within it in degrees or mm."""
+    angle = math.radians(value)
+    if unit == "rad" and abs(value) > 2.0 * math.pi and lower <= angle <= upper:
+        return f"It looks like degrees: {value:.6g} deg are {angle:.6g} rad"
+    length = value / 1000.0
     largest = max(abs(lower), abs(upper))
-    if (
-        unit == "m"
-        and abs(value) > 10.0 * largest
-        and lower <= value / _THOUSAND <= upper
-    ):
-        return f"It looks like mm: {value:.6g} mm are {value / _THOUSAND:.6g} m"
+    if unit == "m" and abs(value) > 10.0 * largest and lower <= length <= upper:
+        return f"It looks like mm: {value:.6g} mm are {length:.6g} m"
     return None
 
 
 def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str | None:
-    """Say what a stated position, (p,), looks like where the tool is elsewhere: mm, or rows that are swapped."""
+    """Return what a stated position, (p,), looks like if the tool is elsewhere: mm, or rows that are swapped."""
     if not np.abs(here - stated).max(initial=0.0) > _ROUNDED:
         return None
-    if np.abs(here - stated / _THOUSAND).max() <= _ROUNDED:
+    if np.abs(here - stated / 1000.0).max() <= _ROUNDED:
         return "The path looks like mm: divided by 1000 it is where the tool is"
-    for order in (
-        itertools.permutations(range(len(here))) if len(here) <= len(AXES) else ()
-    ):
+    if len(here) > len(AXES):
+        return None
+    for order in itertools.permutations(range(len(here))):
         if np.abs(here[list(order)] - stated).max() <= _ROUNDED:
             found = ", ".join(rows[i] for i in order)
             return f"It looks like the order {found}: the tool is there if they are read so"
@@ -232,7 +203,7 @@ def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str
 
 
 def turn_hint(here: np.ndarray, stated: np.ndarray) -> str | None:
-    """Say that an orientation, a rotation matrix (3, 3), looks like a quaternion with w last, where that is `here`."""
+    """Return that an orientation, a matrix (3, 3), looks like a quaternion with w last, if read so it is `here`."""
     read = pin.Quaternion(stated)
     meant = pin.Quaternion(read.z, read.w, read.x, read.y).matrix()
     near = np.abs(meant - here).max() <= _ROUNDED < np.abs(stated - here).max()

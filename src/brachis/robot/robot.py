@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self, Unpack
+from typing import Any, Self, TypedDict, Unpack
 
 import numpy as np
 import pinocchio as pin
 
 from brachis.common.arguments import check_keywords
 from brachis.common.summary import Summary
-from brachis.errors import InputError, UnknownNameError
+from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot.friction import Friction
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import (
     FARTHEST,
-    LARGEST,
     Limits,
     UrdfLimit,
     per_joint_values,
@@ -27,11 +26,11 @@ from brachis.robot.limits import (
     without_joints,
 )
 from brachis.robot.model import build_model
-from brachis.robot.settings import settings_used
 from brachis.robot.urdf import read_chain, read_file
-from brachis.robot.urdf_bodies import StatedChain
+from brachis.robot.urdf_bodies import UrdfDynamics
 from brachis.robot.urdf_elements import read_tree
 from brachis.task import (
+    FROM_URDF,
     LimitKeywords,
     LimitSpec,
     Payload,
@@ -40,9 +39,23 @@ from brachis.task import (
     check_robot_settings,
 )
 
-STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 ROLL_JOINT = "tool_roll"
-"""The virtual joint by which a tool rolls freely about its z axis; see `free_roll`."""
+"""The virtual joint by which a tool rolls freely about its z axis; see `bind`."""
+
+
+class RobotKeywords(TypedDict, total=False):
+    """What `Robot.from_urdf` takes besides the URDF."""
+
+    tool_frame: str | None
+    base_frame: str | None
+    gravity: Sequence[float] | np.ndarray
+    locked_joints: Mapping[str, float] | None
+    limits: LimitSpec | LimitKeywords | None
+    friction: Mapping[str, object] | None
+    payload: Mapping[str, object] | Payload | None
+    tool_offset: Mapping[str, object] | Placement | None
+    mounting: str | Mapping[str, object] | Placement
+    speed_override: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,9 +72,9 @@ class Robot(Summary):
         Link names of the URDF.
     limits : Limits
         Limits of the n joints.
-    stated_limits : tuple of UrdfLimit
+    urdf_limits : tuple of UrdfLimit
         Limits as the URDF states them.
-    stated : StatedChain
+    urdf_dynamics : UrdfDynamics
         Joints, bodies and friction as the URDF states them, without payload, mounting and tool offset.
     friction : Friction
         Torque terms beside the rigid-body model's.
@@ -87,8 +100,8 @@ class Robot(Summary):
     tool_frame: str
     base_frame: str
     limits: Limits
-    stated_limits: tuple[UrdfLimit, ...]
-    stated: StatedChain
+    urdf_limits: tuple[UrdfLimit, ...]
+    urdf_dynamics: UrdfDynamics
     friction: Friction
     settings: RobotSettings
     source: str
@@ -113,16 +126,7 @@ class Robot(Summary):
         path: str | os.PathLike[str],
         *,
         urdf_text: str | None = None,
-        tool_frame: str | None = None,
-        base_frame: str | None = None,
-        gravity: Sequence[float] = STANDARD_GRAVITY,
-        locked_joints: Mapping[str, float] | None = None,
-        limits: LimitSpec | LimitKeywords | None = None,
-        friction: Mapping[str, object] | None = None,
-        payload: Mapping[str, object] | Payload | None = None,
-        tool_offset: Mapping[str, object] | Placement | None = None,
-        mounting: str | Mapping[str, object] | Placement = "floor",
-        speed_override: float = 1.0,
+        **keywords: Unpack[RobotKeywords],
     ) -> Robot:
         """Build the model of the chain base -> tool; every joint off the chain is locked.
 
@@ -132,20 +136,23 @@ class Robot(Summary):
             URDF file. Mesh files are not read.
         urdf_text : str, optional
             Text of the URDF where it is already known; `path` then only names it.
+        **keywords
+            Keys of the ``robot`` part of a task; None for what is as by default.
         tool_frame : str, optional
             Link at the end of the chain; the only leaf link if left out.
         base_frame : str, optional
             Link at the beginning of the chain; the root link if left out. Positions are those in the world frame,
             which is the URDF's root link unless `mounting` says otherwise.
         gravity : (3,) sequence of float, optional
-            Gravitational acceleration in the world frame, m/s^2.
+            Gravitational acceleration in the world frame, m/s^2; (0, 0, -9.81) if left out.
         locked_joints : mapping of str to float, optional
             Joints held at a position, rad or m.
         limits : LimitSpec or mapping, optional
             Limits that override or complete the URDF's; those of joints off the chain, which stand still, have no
             effect.
         friction : mapping, optional
-            Keyword arguments of `Friction.of`; what it leaves out is taken from the URDF.
+            ``armature``, ``viscous``, ``coulomb``, ...: keys of `FrictionSettings`; what it leaves out is taken from
+            the URDF.
         payload : mapping or Payload, optional
             ``mass``, kg; ``com``, (3,) m, and ``inertia`` about it, kg m^2, in the tool frame of the URDF.
         tool_offset : mapping or Placement, optional
@@ -162,56 +169,72 @@ class Robot(Summary):
         Raises
         ------
         UrdfError, UnknownNameError, LimitError, InputError
-            TaskError, one of them, where payload, tool offset, mounting or speed override are not what they should be.
+            TaskError, one of them, where a keyword has a wrong form.
         """
-        added = check_robot_settings(
-            {
-                "payload": payload,
-                "tool_offset": tool_offset or {},
-                "mounting": mounting,
-                "speed_override": speed_override,
-            }
-        )
-        spec = (
-            check_robot_settings({"limits": limits}).limits
-            if isinstance(limits, Mapping)
-            else limits or LimitSpec()
-        )
-        vector = _vector(gravity)
-        text = read_file(Path(path)) if urdf_text is None else urdf_text
+        given = {key: value for key, value in keywords.items() if value is not None}
+        given["urdf"] = str(Path(path).absolute())
+        spec = given.get("limits")
+        if isinstance(spec, LimitSpec):  # checked below, where the joints are known
+            del given["limits"]
+        settings = check_robot_settings(given)
+        if isinstance(spec, LimitSpec):
+            settings = settings.model_copy(update={"limits": spec})
+        return cls.from_settings(settings, str(path), urdf_text)
+
+    @classmethod
+    def from_settings(
+        cls, settings: RobotSettings, source: str, urdf_text: str | None = None
+    ) -> Robot:
+        """Build the robot from the ``robot`` part of a task.
+
+        Parameters
+        ----------
+        settings : RobotSettings
+            ``urdf`` is not read.
+        source : str
+            The URDF file.
+        urdf_text : str, optional
+            Its text, if it is known already.
+
+        Raises
+        ------
+        TaskError
+            A file of limits was not read, because `load_task` did not make the task.
+        UrdfError, UnknownNameError, LimitError, InputError
+            See `from_urdf`.
+        """
+        if settings.limits_file is not None:
+            raise TaskError(
+                "the file of limits was not read",
+                where="robot.limits_file",
+                found=settings.limits_file,
+                hint="Make the task with brachis.load_task, or give robot.limits",
+            )
+        text = read_file(Path(source)) if urdf_text is None else urdf_text
         chain = read_chain(
             text,
-            str(path),
-            tool_frame=tool_frame,
-            base_frame=base_frame,
-            locked_joints=dict(locked_joints or {}),
+            source,
+            tool_frame=settings.tool_frame,
+            base_frame=settings.base_frame,
+            locked_joints=settings.locked_joints,
         )
-        spec = without_joints(spec, chain.locked)
-        model, names = build_model(chain, vector, added, str(path)), chain.joint_names
-        resolved = resolve_limits(spec, names, chain.limits, added.speed_override)
-        terms = Friction.of(names, chain.stated.friction, **dict(friction or {}))
-        terms.check_against(model, resolved.torque)
+        names = chain.joint_names
+        spec = without_joints(settings.limits, chain.locked)
+        limits = resolve_limits(spec, names, chain.limits, settings.speed_override)
+        model = build_model(chain, settings, source)
+        friction = Friction.of(names, chain.dynamics.friction, settings.friction)
+        friction.check_against(model, limits.torque)
         return cls(
             model=model,
             joint_names=names,
             tool_frame=chain.tool_frame,
             base_frame=chain.base_frame,
-            limits=resolved,
-            stated_limits=chain.limits,
-            stated=chain.stated,
-            friction=terms,
-            settings=settings_used(
-                added,
-                path,
-                names,
-                tool_frame,
-                base_frame,
-                vector,
-                locked_joints,
-                spec,
-                friction,
-            ),
-            source=str(path),
+            limits=limits,
+            urdf_limits=chain.limits,
+            urdf_dynamics=chain.dynamics,
+            friction=friction,
+            settings=_without_defaults(settings, spec, names),
+            source=source,
             urdf=text,
         )
 
@@ -236,7 +259,7 @@ class Robot(Summary):
         >>> robot.limits.torque.tolist(), robot.limits.velocity.tolist()
         ([20.0, 10.0, 10.0], [2.0, 2.0, 2.0])
         """
-        own = self.joint_names[: len(self.joint_names) - self.rolls_freely]
+        own = self.urdf_joints
         kept = to_spec(self.limits, own)
         changes: dict[str, Any] = {}
         for kind, value in limits.items():
@@ -250,7 +273,7 @@ class Robot(Summary):
             else:
                 changes[kind] = value
         spec = LimitSpec(**{**vars(kept), **changes})
-        resolved = resolve_limits(spec, own, self.stated_limits[: len(own)])
+        resolved = resolve_limits(spec, own, self.urdf_limits[: len(own)])
         resolved = resolved.with_free_joint() if self.rolls_freely else resolved
         self.friction.check_against(self.model, resolved.torque)
         settings = self.settings.model_copy(
@@ -288,29 +311,17 @@ class Robot(Summary):
         >>> brachis.robots.iiwa14.with_payload(5.0, com=[0, 0, 0.1]).settings.payload
         Payload(mass=5, com=[0, 0, 0.1])
         """
-        settings = self.settings
-        payload = (
-            None if mass is None else {"mass": mass, "com": com, "inertia": inertia}
-        )
-        made = Robot.from_urdf(
-            self.source,
-            urdf_text=self.urdf,
-            tool_frame=settings.tool_frame,
-            base_frame=settings.base_frame,
-            gravity=self.model.gravity.linear,
-            locked_joints=settings.locked_joints,
-            limits=settings.limits,
-            friction=settings.friction.model_dump(),
-            payload=payload,
-            tool_offset=settings.tool_offset,
-            mounting=settings.mounting,
-            speed_override=settings.speed_override,
-        )
-        return (
-            made
-            if self.rolls_freely
-            else replace(made, limits=self.limits, friction=self.friction)
-        )
+        given = {"mass": mass, "com": com, "inertia": inertia}
+        asked = check_robot_settings({"payload": None if mass is None else given})
+        changes = {
+            "payload": asked.payload,
+            "gravity": tuple(self.model.gravity.linear),
+        }
+        settings = self.settings.model_copy(update=changes)
+        robot = Robot.from_settings(settings, self.source, self.urdf)
+        if self.rolls_freely:
+            return robot
+        return replace(robot, limits=self.limits, friction=self.friction)
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
@@ -346,6 +357,11 @@ class Robot(Summary):
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+    @property
+    def urdf_joints(self) -> tuple[str, ...]:
+        """Names of the joints without the virtual one by which the tool rolls freely."""
+        return self.joint_names[: self.n - self.rolls_freely]
 
     @property
     def frame_id(self) -> int:
@@ -441,15 +457,21 @@ def _with_roll(joints: object, n: int) -> object:
     return joints
 
 
-def _vector(gravity: Sequence[float]) -> np.ndarray:
-    """Gravity as (3,), m/s^2."""
-    try:
-        vector = np.asarray(gravity, dtype=float)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (3,) or not np.all(np.abs(vector) <= LARGEST):
-        allowed = f"[x, y, z] in m/s^2, finite, at most {LARGEST:g} in size"
-        raise InputError(
-            "is not a vector", where="robot.gravity", found=gravity, allowed=allowed
-        )
-    return vector
+def _without_defaults(
+    settings: RobotSettings, limits: LimitSpec, names: Sequence[str]
+) -> RobotSettings:
+    """Leave out settings that are as by default, and state limits joint by joint, so that others can be added."""
+    by_name: dict[str, Any] = {}
+    for each in fields(limits):
+        value = getattr(limits, each.name)
+        if isinstance(value, tuple | dict):
+            listed = per_joint_values("limits", value, names, FROM_URDF)
+            pairs = zip(names, listed, strict=True)
+            kept = {name: entry for name, entry in pairs if entry != FROM_URDF}
+            by_name[each.name] = kept or each.default
+    used = settings.model_copy(update={"limits": replace(limits, **by_name)})
+    default = RobotSettings()
+    checked = check_robot_settings(dict(used))
+    return RobotSettings(
+        **{key: value for key, value in checked if value != getattr(default, key)}
+    )

@@ -13,12 +13,18 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from brachis.common import files
-from brachis.common.files import Kind, check_kind
+from brachis.common import files, tolerances
 from brachis.errors import UnknownNameError, UrdfError
 from brachis.robot.limits import FARTHEST, UrdfLimit
-from brachis.robot.urdf_bodies import Body, StatedChain, inertia_matrix, stated_chain
+from brachis.robot.urdf_bodies import (
+    Body,
+    UrdfDynamics,
+    check_inertia,
+    inertia_matrix,
+    read_dynamics,
+)
 from brachis.robot.urdf_elements import (
+    ENTRIES,
     Element,
     UrdfTree,
     end_of,
@@ -27,11 +33,7 @@ from brachis.robot.urdf_elements import (
     read_tree,
 )
 
-MOVING_TYPES = ("revolute", "continuous", "prismatic")
-_PINOCCHIO_LIMIT = {"effort": "0", "velocity": "0", "lower": "-1e9", "upper": "1e9"}
-"""Limits of the model: brachis checks those of the URDF and of the task by itself."""
-
-_NUMERIC = ("origin", "axis", "mass", "inertia", "dynamics")
+_MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
 def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
@@ -39,16 +41,16 @@ def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
     for name in chain:
         joint = tree.joints[name]
         kind = joint.get("type")
-        if kind not in MOVING_TYPES:
+        if kind not in _MOVING_TYPES:
             raise UrdfError(
                 f"joint {name!r} cannot be planned for",
                 where=where,
                 found=f"type {kind!r}",
-                allowed=", ".join(MOVING_TYPES),
+                allowed=", ".join(_MOVING_TYPES),
                 hint="Lock it with robot.locked_joints, or set robot.base_frame below it",
             )
         axis = numbers_of(joint, "axis", "xyz", "1 0 0")
-        if not np.linalg.norm(axis) > 1e-9:
+        if not np.linalg.norm(axis) > tolerances.ANGLE:
             raise UrdfError(
                 f"joint {name!r} has no axis",
                 where=where,
@@ -57,10 +59,8 @@ def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
             )
     for name in _movable(tree):
         mimic = tree.joints[name].find("mimic")
-        if mimic is None:
-            continue
-        leader = mimic.get("joint")
-        if name in chain or leader in chain:
+        leader = None if mimic is None else mimic.get("joint")
+        if leader is not None and not {name, leader}.isdisjoint(chain):
             raise UrdfError(
                 f"joint {name!r} mimics {leader!r}",
                 where=where,
@@ -84,8 +84,7 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
         for name in body.links:
             inertial = tree.links[name].find("inertial")
             if inertial is not None:
-                _check_inertia(name, inertial, where)
-    for body in bodies:
+                _check_inertial(f"link {name!r}", inertial, where)
         if not body.mass > 0.0:
             raise UrdfError(
                 f"the body moved by joint {body.joint!r} has no mass",
@@ -95,36 +94,25 @@ def check_inertias(tree: UrdfTree, bodies: Sequence[Body], where: str) -> None:
             )
 
 
-def _check_inertia(link: str, inertial: Element, where: str) -> None:
-    """Refuse a negative mass and an inertia matrix that breaks the triangle inequality."""
-    mass = numbers_of(inertial, "mass", "value", "0")[0]
+def _check_inertial(link: str, inertial: Element, where: str) -> None:
+    """Refuse a negative mass, a mass without moments of inertia, and moments that no body can have."""
+    mass = number_of(inertial, "mass", "value", 0.0)
     if mass < 0.0:
         raise UrdfError(
-            f"link {link!r} has a non-physical mass",
+            f"{link} has a negative mass",
             where=where,
             found=f"{mass:g} kg",
             allowed=">= 0 kg",
         )
-    if inertial.find("inertia") is None:
-        if mass == 0.0:
-            return
+    if mass > 0.0 and inertial.find("inertia") is None:
         raise UrdfError(
-            f"link {link!r} has a mass but no <inertia>",
+            f"{link} has a mass but no <inertia>",
             where=where,
             found=f"{mass:g} kg",
             allowed="<inertia> with the moments about the centre of mass",
         )
-    moments = np.linalg.eigvalsh(inertia_matrix(inertial))
-    slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
-    if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
-        raise UrdfError(
-            f"link {link!r} has a non-physical inertia",
-            where=where,
-            found="principal moments "
-            + ", ".join(f"{m:.4g}" for m in moments)
-            + " kg m^2",
-            allowed="moments >= 0, none above the sum of the other two",
-        )
+    problem = f"{link} has a non-physical inertia"
+    check_inertia(inertia_matrix(inertial), problem, where, UrdfError)
 
 
 @dataclass(frozen=True)
@@ -144,8 +132,8 @@ class UrdfChain:
     xml : str
         The URDF that Pinocchio reads: ``continuous`` joints have become ``revolute`` ones without range, so that
         every joint has one coordinate, and unsupported joints off the chain have become fixed.
-    stated : StatedChain
-        The chain as the text states it, read without Pinocchio.
+    dynamics : UrdfDynamics
+        Joints, bodies and friction as the text states them, read without Pinocchio.
     """
 
     joint_names: tuple[str, ...]
@@ -154,7 +142,7 @@ class UrdfChain:
     tool_frame: str
     base_frame: str
     xml: str
-    stated: StatedChain
+    dynamics: UrdfDynamics
 
 
 def read_chain(
@@ -219,10 +207,10 @@ def read_chain(
         for name in movable
         if name not in chain
     }
-    stated = stated_chain(tree, chain, locked, tool)
-    check_inertias(tree, stated.bodies, where)
+    dynamics = read_dynamics(tree, chain, locked, tool)
+    check_inertias(tree, dynamics.bodies, where)
     limits = tuple(_read_limit(tree.joints[name]) for name in chain)
-    return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), stated)
+    return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), dynamics)
 
 
 def read_file(path: Path) -> str:
@@ -231,38 +219,25 @@ def read_file(path: Path) -> str:
     Raises
     ------
     UrdfError
-        The file is missing, not text, another file of brachis, or no regular file of a size that a URDF may have.
+        The file is missing, not text, another file of brachis, or not a regular file of a size that a URDF may have.
     """
-    check_kind(path, Kind.URDF, UrdfError)
-    try:
-        return files.read_file(path).decode()
-    except FileNotFoundError as error:
-        ours = files.shipped_folder("robots") / path.name / "robot.urdf"
-        hint = (
-            f"The robot of this name that comes with brachis is {ours}"
-            if files.is_file(ours)
-            else ""
-        )
-        raise UrdfError(
-            "the URDF file does not exist", where=str(path), hint=hint
-        ) from error
-    except UnicodeDecodeError as error:
-        raise UrdfError(
-            "the URDF file cannot be read", where=str(path), found=str(error)
-        ) from error
-    except OSError as error:
-        raise UrdfError(
-            f"the URDF file cannot be read: {error.strerror}", where=str(path)
-        ) from error
+    files.check_kind(path, files.Kind.URDF, UrdfError)
+    ours = files.shipped_folder("robots") / path.name / "robot.urdf"
+    hint = f"The robot of this name that comes with brachis is {ours}"
+    return files.read_text(
+        path,
+        where=str(path),
+        hint=hint if files.is_file(ours) else "",
+        error=UrdfError,
+    )
 
 
 def _find_tool(tree: UrdfTree, tool_frame: str | None, where: str) -> str:
     """Check the named tool frame, or take the only leaf link."""
     if tool_frame is not None:
         if tool_frame not in tree.links:
-            raise UnknownNameError(
-                "frame", tool_frame, tree.links, where=f"{where}: tool_frame"
-            )
+            place = f"{where}: tool_frame"
+            raise UnknownNameError("frame", tool_frame, tree.links, where=place)
         return tool_frame
     leaves = _leaves(tree)
     if len(leaves) != 1:
@@ -293,7 +268,7 @@ def _joints_between(tree: UrdfTree, base: str, tool: str, where: str) -> list[st
                 found=f"{base} -> {tool}",
             )
         joints.append(tree.above[link])
-        link = str(end_of(tree.joints[joints[-1]], "parent"))
+        link = end_of(tree.joints[joints[-1]], "parent")
     return joints[::-1]
 
 
@@ -301,23 +276,20 @@ def _rest_position(joint: Element) -> float:
     """Position at which a joint off the chain is held: zero, or the nearest end of its range."""
     if joint.get("type") == "continuous":
         return 0.0
-    lower = number_of(joint, "limit", "lower")
-    upper = number_of(joint, "limit", "upper")
-    low = -np.inf if lower is None else lower
-    high = np.inf if upper is None else upper
-    return float(np.clip(0.0, low, high)) if low <= high else 0.0
+    lower = number_of(joint, "limit", "lower", -np.inf)
+    upper = number_of(joint, "limit", "upper", np.inf)
+    return float(np.clip(0.0, lower, upper)) if lower <= upper else 0.0
 
 
 def _read_limit(joint: Element) -> UrdfLimit:
     """Read the limits of one joint; the range of a revolute or prismatic joint may have to come from the task."""
-    lower = number_of(joint, "limit", "lower")
-    upper = number_of(joint, "limit", "upper")
-    velocity = number_of(joint, "limit", "velocity")
-    effort = number_of(joint, "limit", "effort")
-    if joint.get("type") == "continuous":
-        return UrdfLimit(None, None, velocity, effort)
-    if lower is None or upper is None:
-        return UrdfLimit(None, None, velocity, effort, needs_range=True)
+    lower, upper, velocity, effort = (
+        number_of(joint, "limit", key, None)
+        for key in ("lower", "upper", "velocity", "effort")
+    )
+    turns_freely = joint.get("type") == "continuous"
+    if turns_freely or lower is None or upper is None:
+        return UrdfLimit(None, None, velocity, effort, needs_range=not turns_freely)
     return UrdfLimit(lower, upper, velocity, effort)
 
 
@@ -328,25 +300,35 @@ def _plain_xml(tree: UrdfTree) -> str:
         plain = etree.SubElement(robot, "link", name=name)
         plain.extend(_copy_parts(link, "inertial"))
     taken = set(tree.links)
+    kinds = {"prismatic": "prismatic", "revolute": "revolute", "continuous": "revolute"}
     for name, joint in tree.joints.items():
-        kind = "fixed"
-        if joint.get("type") in MOVING_TYPES:
-            kind = "prismatic" if joint.get("type") == "prismatic" else "revolute"
+        kind = kinds.get(joint.get("type"), "fixed")
         unique = name
         while kind == "fixed" and unique in taken:  # Pinocchio looks frames up by name
             unique += "_joint"
         taken.add(unique)
         plain = etree.SubElement(robot, "joint", name=unique, type=kind)
-        plain.extend(
-            _copy_parts(joint, "parent", "child", "origin", "axis", "dynamics")
-        )
-        if kind != "fixed":
-            etree.SubElement(plain, "limit", _PINOCCHIO_LIMIT)
+        plain.extend(_copy_parts(joint, "parent", "child", "origin", "axis"))
+        if kind != "fixed":  # brachis checks the limits of the URDF itself
+            wide = {"effort": "0", "velocity": "0", "lower": "-1e9", "upper": "1e9"}
+            etree.SubElement(plain, "limit", wide)
     return str(etree.tostring(robot, encoding="unicode"))
 
 
+def _copy_parts(owner: Element, *tags: str) -> list[Element]:
+    """Copy parts of a checked link or joint, with its numbers as Python writes them."""
+    attributes = {entry.attribute for kind in ENTRIES.values() for entry in kind}
+    parts = [copy.deepcopy(part) for part in owner if part.tag in tags]
+    for part in parts:
+        for element in part.iter(etree.Element):
+            for key in attributes & set(element.keys()):
+                numbers = map(float, element.get(key).split())
+                element.set(key, " ".join(map(str, numbers)))
+    return parts
+
+
 @dataclass(frozen=True)
-class Limb:
+class DefaultChain:
     """The chain that is taken from a robot unless the user names another.
 
     Attributes
@@ -364,7 +346,7 @@ class Limb:
     leaves: tuple[str, ...]
 
 
-def first_limb(text: str, where: str) -> Limb:
+def default_chain(text: str, where: str) -> DefaultChain:
     """Find the chain of most joints in a URDF: an arm without its fingers, and without the trunk that it shares.
 
     Limbs share less than half of their joints. Of several the first one in the file is taken.
@@ -377,7 +359,7 @@ def first_limb(text: str, where: str) -> Limb:
     tree = read_tree(text, where)
 
     def count_moving(chain: Iterable[str]) -> int:
-        return sum(tree.joints[name].get("type") in MOVING_TYPES for name in chain)
+        return sum(tree.joints[name].get("type") in _MOVING_TYPES for name in chain)
 
     chains = {
         leaf: _joints_between(tree, tree.root, leaf, where) for leaf in _leaves(tree)
@@ -388,19 +370,17 @@ def first_limb(text: str, where: str) -> Limb:
             "no joint moves", where=where, found=f"chains to {', '.join(chains)}"
         )
     longest = [chain for chain in chains.values() if count_moving(chain) == most]
-
-    def is_branch(chain: Sequence[str]) -> bool:
-        """Tell whether a chain parts from the limb in its upper half, and moves there; frames are not fingers."""
+    limb = {}
+    for leaf, chain in chains.items():
+        # What parts from the limb in its upper half, and moves there, is a branch of it; frames are not fingers.
         shared = count_moving(_common_beginning([longest[0], chain]))
-        return 2 * shared >= most and (count_moving(chain) > shared or shared == most)
-
-    limb = {leaf: chain for leaf, chain in chains.items() if is_branch(chain)}
+        if 2 * shared >= most and (count_moving(chain) > shared or shared == most):
+            limb[leaf] = chain
     trunk = _common_beginning(longest)
-    base = None
-    if trunk and 2 * count_moving(trunk) < most:
-        base = end_of(tree.joints[trunk[-1]], "child")
+    parts = trunk and 2 * count_moving(trunk) < most
+    base = end_of(tree.joints[trunk[-1]], "child") if parts else None
     last_joint = _common_beginning(limb.values())[-1]
-    return Limb(base, str(end_of(tree.joints[last_joint], "child")), tuple(limb))
+    return DefaultChain(base, end_of(tree.joints[last_joint], "child"), tuple(limb))
 
 
 def _common_beginning(chains: Collection[Sequence[str]]) -> list[str]:
@@ -411,35 +391,3 @@ def _common_beginning(chains: Collection[Sequence[str]]) -> list[str]:
             break
         shared.append(joints[0])
     return shared
-
-
-def _copy_parts(owner: Element, *tags: str) -> list[Element]:
-    """Copy parts of a checked link or joint, with plain numbers and canonical angles."""
-    parts = [copy.deepcopy(part) for part in owner if part.tag in tags]
-    for part in parts:
-        for element in part.iter(*_NUMERIC):
-            for key, text in element.attrib.items():
-                values = np.array(text.split(), dtype=float)
-                if key == "rpy":
-                    values = _canonical_angles(*values)
-                element.set(key, " ".join(map(str, values)))
-    return parts
-
-
-def _canonical_angles(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Return roll, pitch and yaw of the same rotation, (3,), with a pitch within 90 degrees."""
-    sin_roll, sin_pitch, sin_yaw = np.sin([roll, pitch, yaw])
-    cos_roll, cos_pitch, cos_yaw = np.cos([roll, pitch, yaw])
-    # Adding zero turns -0 into 0, so that half a turn is pi and not -pi.
-    x_axis = cos_pitch * np.array([cos_yaw, sin_yaw]) + 0.0
-    level = np.sqrt(x_axis[0] * x_axis[0] + x_axis[1] * x_axis[1])
-    new_pitch = np.arctan2(sin_pitch, level)
-    if level > 4.0 * np.finfo(float).eps:
-        new_roll = np.arctan2(cos_pitch * sin_roll + 0.0, cos_pitch * cos_roll)
-        return np.array([new_roll, new_pitch, np.arctan2(x_axis[1], x_axis[0])])
-    # At a pitch of 90 degrees roll and yaw turn about the same axis.
-    new_roll = np.arctan2(
-        sin_roll * cos_yaw - sin_pitch * (cos_roll * sin_yaw),
-        sin_pitch * (sin_roll * sin_yaw) + cos_roll * cos_yaw,
-    )
-    return np.array([new_roll, new_pitch, 0.0])

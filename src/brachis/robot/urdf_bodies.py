@@ -9,11 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.common.summary import Summary
-from brachis.errors import UrdfError
-from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of
-
-_ROUNDING = 1e-9
-_ZEROS = "0 0 0"
+from brachis.errors import InputError, UrdfError
+from brachis.robot.urdf_elements import Element, UrdfTree, end_of, number_of, numbers_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,7 +49,7 @@ class Body(Summary):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StatedChain(Summary):
+class UrdfDynamics(Summary):
     """What a URDF says of a chain.
 
     Attributes
@@ -70,9 +67,9 @@ class StatedChain(Summary):
     friction: dict[str, np.ndarray]
 
 
-def stated_chain(
+def read_dynamics(
     tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str
-) -> StatedChain:
+) -> UrdfDynamics:
     """Read a chain of a checked URDF, and sum up the inertias of what each joint moves.
 
     Parameters
@@ -86,57 +83,37 @@ def stated_chain(
     tool : str
         Link at the chain's end.
     """
-    placed: dict[str, tuple[str | None, np.ndarray]] = {tree.root: (None, np.eye(4))}
-    for link in tree.links:
-        for each in _unplaced(tree, link, placed):
-            placed[each] = _placement(tree, each, placed, chain, locked)
-    carried: dict[str, list[str]] = {name: [] for name in chain}
-    for link in tree.links:
-        carrier, _ = placed[link]
-        if carrier is not None:
-            carried[carrier].append(link)
+    carriers: dict[str, str | None] = {tree.root: None}  # joints of the chain
+    placements = {
+        tree.root: np.eye(4)
+    }  # of links, in the child links of their carriers
+    befores = {}  # placements of joints of the chain
+    for link in tree.downward[1:]:
+        name = tree.above[link]
+        joint = tree.joints[name]
+        parent = end_of(joint, "parent")
+        placement = placements[parent] @ _origin(joint, "origin")
+        if name in chain:
+            carriers[link] = name
+            placements[link] = np.eye(4)
+            befores[name] = placement
+        else:
+            held = _displacement(joint, locked.get(name, 0.0))
+            carriers[link] = carriers[parent]
+            placements[link] = placement @ held
     bodies = []
     for name in chain:
-        joint, links = (
-            tree.joints[name],
-            [(link, tree.links[link], placed[link][1]) for link in carried[name]],
-        )
-        before = placed[str(end_of(joint, "parent"))][1] @ _origin(joint, "origin")
-        bodies.append(_body(name, before, joint, links))
+        links = {
+            link: placements[link] for link in tree.links if carriers[link] == name
+        }
+        bodies.append(_read_body(tree, name, befores[name], links))
     friction = {
         kind: np.array(
-            [numbers_of(tree.joints[name], "dynamics", word, "0")[0] for name in chain]
+            [number_of(tree.joints[name], "dynamics", word, 0.0) for name in chain]
         )
         for kind, word in (("viscous", "damping"), ("coulomb", "friction"))
     }
-    return StatedChain(tuple(bodies), placed[tool][1], friction)
-
-
-def _unplaced(tree: UrdfTree, link: str, placed: Mapping[str, object]) -> list[str]:
-    """List a link and the links above it that are not placed yet, the highest first."""
-    way = []
-    while link not in placed:
-        way.append(link)
-        link = str(end_of(tree.joints[tree.above[link]], "parent"))
-    return way[::-1]
-
-
-def _placement(
-    tree: UrdfTree,
-    link: str,
-    placed: Mapping[str, tuple[str | None, np.ndarray]],
-    chain: Sequence[str],
-    locked: Mapping[str, float],
-) -> tuple[str | None, np.ndarray]:
-    """Give the joint of the chain that carries a link, and the link's (4, 4) placement in that joint's child link."""
-    name = tree.above[link]
-    if name in chain:
-        return name, np.eye(4)
-    joint = tree.joints[name]
-    carrier, parent = placed[str(end_of(joint, "parent"))]
-    return carrier, parent @ _origin(joint, "origin") @ _held(
-        joint, locked.get(name, 0.0)
-    )
+    return UrdfDynamics(tuple(bodies), placements[tool], friction)
 
 
 def check_bodies(model: pin.Model, bodies: Sequence[Body], where: str) -> None:
@@ -163,7 +140,7 @@ def check_bodies(model: pin.Model, bodies: Sequence[Body], where: str) -> None:
             ("inertia", "kg m^2", inertia.inertia, body.inertia, body.size),
         )
         for kind, unit, found, stated, size in figures:
-            if not np.abs(found - stated).max() <= _ROUNDING * max(size, _ROUNDING):
+            if not np.abs(found - stated).max() <= 1e-9 * max(size, 1e-9):
                 raise UrdfError(
                     f"the body moved by joint {body.joint!r} has another {kind} in the model than in the file",
                     where=where,
@@ -173,21 +150,22 @@ def check_bodies(model: pin.Model, bodies: Sequence[Body], where: str) -> None:
                 )
 
 
-def _body(
-    name: str,
-    placement: np.ndarray,
-    joint: Element,
-    links: Sequence[tuple[str, Element, np.ndarray]],
+def _read_body(
+    tree: UrdfTree, name: str, placement: np.ndarray, links: Mapping[str, np.ndarray]
 ) -> Body:
     """Sum up links with their placements in the joint's frame."""
-    mass, moment, second = 0.0, np.zeros(3), np.zeros((3, 3))
-    for _, element, placed in links:
-        inertial = element.find("inertial")
+    joint = tree.joints[name]
+    mass = 0.0
+    moment = np.zeros(3)
+    second = np.zeros((3, 3))
+    for link, placed in links.items():
+        inertial = tree.links[link].find("inertial")
         if inertial is None:
             continue
         frame = placed @ _origin(inertial, "origin")
-        rotation, lever = frame[:3, :3], frame[:3, 3]
-        (weight,) = numbers_of(inertial, "mass", "value", "0")
+        rotation = frame[:3, :3]
+        lever = frame[:3, 3]
+        weight = number_of(inertial, "mass", "value", 0.0)
         mass += weight
         moment += weight * lever
         second += rotation @ inertia_matrix(inertial) @ rotation.T + weight * _spread(
@@ -199,7 +177,7 @@ def _body(
         placement=placement,
         axis=_axis(joint),
         sliding=joint.get("type") == "prismatic",
-        links=tuple(link for link, _, _ in links),
+        links=tuple(links),
         mass=mass,
         com=com,
         inertia=second - mass * _spread(com),
@@ -214,12 +192,36 @@ def _axis(joint: Element) -> np.ndarray:
 
 
 def inertia_matrix(inertial: Element) -> np.ndarray:
-    """Matrix of moments and products, kg m^2."""
-    xx, xy, xz, yy, yz, zz = (
-        numbers_of(inertial, "inertia", key, "0")[0]
-        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    """Matrix of moments and products, (3, 3) kg m^2, of a checked <inertial>."""
+    return symmetric_matrix(
+        {key: number_of(inertial, "inertia", key, 0.0) for key in _MOMENTS.ravel()}
     )
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+_MOMENTS = np.array(
+    [["ixx", "ixy", "ixz"], ["ixy", "iyy", "iyz"], ["ixz", "iyz", "izz"]]
+)
+
+
+def symmetric_matrix(moments: Mapping[str, float]) -> np.ndarray:
+    """Return the (3, 3) matrix of moments and products ``ixx``, ``ixy``, ..., kg m^2."""
+    return np.array([[moments[key] for key in row] for row in _MOMENTS])
+
+
+def check_inertia(
+    matrix: np.ndarray, problem: str, where: str, error: type[InputError]
+) -> None:
+    """Refuse an inertia matrix, (3, 3) kg m^2, that no rigid body has."""
+    moments = np.linalg.eigvalsh(matrix)
+    slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
+    if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
+        found = ", ".join(f"{moment:.4g}" for moment in moments)
+        raise error(
+            problem,
+            where=where,
+            found=f"principal moments {found} kg m^2",
+            allowed="moments >= 0, none above the sum of the other two, about the centre of mass",
+        )
 
 
 def _spread(lever: np.ndarray) -> np.ndarray:
@@ -230,27 +232,20 @@ def _spread(lever: np.ndarray) -> np.ndarray:
 def _origin(owner: Element, path: str) -> np.ndarray:
     """Placement, (4, 4), that an origin describes: roll, pitch and yaw about fixed axes."""
     placed = np.eye(4)
-    roll, pitch, yaw = numbers_of(owner, path, "rpy", _ZEROS)
-    placed[:3, :3] = _turn(np.array([0.0, 0.0, 1.0]), yaw)
-    placed[:3, :3] = (
-        placed[:3, :3]
-        @ _turn(np.array([0.0, 1.0, 0.0]), pitch)
-        @ _turn(np.array([1.0, 0.0, 0.0]), roll)
-    )
-    placed[:3, 3] = numbers_of(owner, path, "xyz", _ZEROS)
+    x, y, z = np.eye(3)
+    roll, pitch, yaw = numbers_of(owner, path, "rpy", "0 0 0")
+    placed[:3, :3] = _turn(z, yaw) @ _turn(y, pitch) @ _turn(x, roll)
+    placed[:3, 3] = numbers_of(owner, path, "xyz", "0 0 0")
     return placed
 
 
-def _held(joint: Element, position: float) -> np.ndarray:
+def _displacement(joint: Element, position: float) -> np.ndarray:
     """Displacement, (4, 4), of a joint that is held at a position, rad or m."""
     placed = np.eye(4)
-    if position == 0.0:
-        return placed
-    axis = _axis(joint)
     if joint.get("type") == "prismatic":
-        placed[:3, 3] = position * axis
+        placed[:3, 3] = position * _axis(joint)
     elif joint.get("type") in ("revolute", "continuous"):
-        placed[:3, :3] = _turn(axis, position)
+        placed[:3, :3] = _turn(_axis(joint), position)
     return placed
 
 

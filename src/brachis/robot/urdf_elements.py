@@ -1,25 +1,22 @@
-"""The elements of a URDF: well-formed XML without macros, names that are there once, joints between them, one tree.
+"""The elements of a URDF: well-formed XML without macros, unique names, joints between links that form one tree.
 
-Every number of a URDF that counts is one, and finite: parsers further on drop an inertia with a NaN in silence.
+Every number that is used is checked to be finite: other parsers drop an inertia with a NaN in silence.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from lxml import etree
 
 from brachis.errors import UrdfError, nearest
 
 Element: TypeAlias = Any  # lxml comes without types
-JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-_SHOWN = 20
-"""Characters of a file that is not a URDF."""
+_JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _EXPAND = "Expand the file with xacro first: xacro robot.xacro > robot.urdf"
 
 
@@ -35,15 +32,20 @@ class UrdfTree:
         By name, in the order of the file.
     above : mapping of str to str
         For every link but the root the name of the joint that it hangs from.
-    root : str
-        The link that hangs from no joint.
+    downward : tuple of str
+        All links, from the root on, every one after the link that it hangs from.
     """
 
     robot: Element
     links: Mapping[str, Element]
     joints: Mapping[str, Element]
     above: Mapping[str, str]
-    root: str
+    downward: tuple[str, ...]
+
+    @property
+    def root(self) -> str:
+        """The link that hangs from no joint."""
+        return self.downward[0]
 
 
 def read_tree(text: str, where: str) -> UrdfTree:
@@ -63,43 +65,56 @@ def read_tree(text: str, where: str) -> UrdfTree:
         number is missing or wrong, or an element is there twice. The message names file, line, and link or joint.
     """
     robot = _robot_element(text, where)
-    links, joints = _by_name(robot, "link", where), _by_name(robot, "joint", where)
+    links = _by_name(robot, "link", where)
+    joints = _by_name(robot, "joint", where)
     if not links:
         raise UrdfError("the URDF has no links", where=where)
     for name, joint in joints.items():
-        _check_type(name, joint.get("type"), where)
+        kind = joint.get("type") or "none"
+        if kind not in _JOINT_TYPES:
+            raise UrdfError(
+                f"joint {name!r} has an unknown type",
+                where=where,
+                found=kind,
+                allowed=", ".join(_JOINT_TYPES),
+                hint=_suggest(kind, _JOINT_TYPES),
+            )
     above = _joints_above(links, joints, where)
-    root = _root(links, joints, above, where)
-    tree = UrdfTree(robot, links, joints, above, root)
-    _check_numbers(tree, where)
-    return tree
+    downward = _list_downward(links, joints, above, where)
+    for kind, owners in (("link", links), ("joint", joints)):
+        for owner in owners.values():
+            for entry in ENTRIES[kind]:
+                _check_entry(owner, entry, where)
+    return UrdfTree(robot, links, joints, above, downward)
 
 
-def place_of(element: Element, where: str) -> str:
-    """Say where an element is: the file, its line, and the link or joint that it is part of."""
-    text = f"{where}, line {element.sourceline}"
-    owners = (
-        each
-        for each in (element, *element.iterancestors())
-        if each.tag in ("link", "joint")
-    )
-    owner = next(owners, None)
-    return text if owner is None else f"{text}: {owner.tag} {owner.get('name')!r}"
+def _suggest(name: str, valid: Iterable[str]) -> str | None:
+    near = nearest(name, valid)
+    return f"Did you mean {near!r}?" if near else None
 
 
-def end_of(joint: Element, end: str) -> str | None:
-    """Name of the link at a joint's ``parent`` or ``child`` end; None where none is named."""
+def _place_of(element: Element, where: str) -> str:
+    """Return where an element is: the file, its line, and the link or joint that it is part of."""
+    place = f"{where}, line {element.sourceline}"
+    for each in (element, *element.iterancestors()):
+        if each.tag in ("link", "joint"):
+            return f"{place}: {each.tag} {each.get('name')!r}"
+    return place
+
+
+def end_of(joint: Element, end: str) -> str:
+    """Name of the link at a joint's ``parent`` or ``child`` end; empty if none is named."""
     element = joint.find(end)
-    return None if element is None else element.get("link")
+    return "" if element is None else element.get("link", "")
 
 
 def _robot_element(text: str, where: str) -> Element:
-    """Parse the text, and refuse what is no expanded URDF."""
+    """Parse the text, and refuse anything but an expanded URDF."""
     if not text.lstrip("\ufeff\t\r\n ").startswith("<"):
         raise UrdfError(
             "the file is not a URDF",
             where=where,
-            found=f"{text[:_SHOWN]!r} at its beginning",
+            found=f"{text[:20]!r} at its beginning",
             allowed="XML, with the root element <robot>",
             hint="brachis inspect takes a URDF, the name of a robot, or a task file (.yaml)",
         )
@@ -109,12 +124,11 @@ def _robot_element(text: str, where: str) -> Element:
     try:
         robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
     except etree.XMLSyntaxError as error:
-        hint = _EXPAND if "xacro" in str(error) else None
         raise UrdfError(
             "the URDF file is not well-formed XML",
             where=where,
             found=str(error),
-            hint=hint,
+            hint=_EXPAND if "xacro" in str(error) else None,
         ) from error
     if robot.tag != "robot":
         raise UrdfError(
@@ -125,24 +139,18 @@ def _robot_element(text: str, where: str) -> Element:
             hint=_EXPAND,
         )
     for element in robot.iter(etree.Element):
-        macro = "xacro" in (etree.QName(element).namespace or "") or str(
-            element.tag
-        ).startswith("xacro:")
-        expression = next(
-            (
-                f"{key}={value!r}"
-                for key, value in element.attrib.items()
-                if "${" in value
-            ),
-            None,
-        )
-        if macro or expression:
-            prefix = f"{element.prefix}:" if element.prefix else ""
-            shown = f"<{prefix}{etree.QName(element).localname}{' ' + expression if expression else ''}>"
+        name = etree.QName(element)
+        expressions = [
+            f" {key}={value!r}" for key, value in element.items() if "${" in value
+        ]
+        prefix = f"{element.prefix}:" if element.prefix else ""
+        tag = f"{prefix}{name.localname}"
+        is_macro = "xacro" in (name.namespace or "") or tag.startswith("xacro:")
+        if is_macro or expressions:
             raise UrdfError(
                 "the URDF has xacro macros",
-                where=place_of(element, where),
-                found=shown,
+                where=_place_of(element, where),
+                found=f"<{tag}{''.join(expressions[:1])}>",
                 allowed="a plain URDF",
                 hint=_EXPAND,
             )
@@ -151,14 +159,16 @@ def _robot_element(text: str, where: str) -> Element:
 
 def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
     """Links or joints by their names."""
-    elements = robot.findall(kind)
-    for element in elements:
-        if not element.get("name"):
-            raise UrdfError(
-                f"a <{kind}> has no name", where=f"{where}, line {element.sourceline}"
-            )
-    names = Counter(str(element.get("name")) for element in elements)
-    repeated = [name for name, count in names.items() if count > 1]
+    named: dict[str, Element] = {}
+    repeated: dict[str, None] = {}
+    for element in robot.findall(kind):
+        name = element.get("name")
+        if not name:
+            place = f"{where}, line {element.sourceline}"
+            raise UrdfError(f"a <{kind}> has no name", where=place)
+        if name in named:
+            repeated[name] = None
+        named[name] = element
     if repeated:
         raise UrdfError(
             f"{kind}s share a name",
@@ -166,20 +176,7 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
             found=", ".join(repeated),
             allowed="each name once",
         )
-    return {str(element.get("name")): element for element in elements}
-
-
-def _check_type(name: str, kind: str | None, where: str) -> None:
-    if kind in JOINT_TYPES:
-        return
-    near = nearest(kind or "", JOINT_TYPES)
-    raise UrdfError(
-        f"joint {name!r} has no known type",
-        where=where,
-        found=repr(kind) if kind else "none",
-        allowed=", ".join(JOINT_TYPES),
-        hint=f"Did you mean {near!r}?" if near else None,
-    )
+    return named
 
 
 def _joints_above(
@@ -191,19 +188,15 @@ def _joints_above(
         for end in ("parent", "child"):
             link = end_of(joint, end)
             if link not in links:
-                near = nearest(link or "", links)
+                add = f"Add <link name={link!r}/>" if link else None
                 raise UrdfError(
                     f"the {end} of joint {name!r} is not a link of the robot",
                     where=f"{where}, line {joint.sourceline}",
                     found=link or "none",
                     allowed=", ".join(links),
-                    hint=f"Did you mean {near!r}?"
-                    if near
-                    else f"Add <link name={link!r}/>"
-                    if link
-                    else None,
+                    hint=_suggest(link, links) or add,
                 )
-        child = str(end_of(joint, "child"))
+        child = end_of(joint, "child")
         if child in above:
             raise UrdfError(
                 "the links do not form one tree",
@@ -215,13 +208,13 @@ def _joints_above(
     return above
 
 
-def _root(
+def _list_downward(
     links: Mapping[str, Element],
     joints: Mapping[str, Element],
     above: Mapping[str, str],
     where: str,
-) -> str:
-    """Find the only link that hangs from no joint."""
+) -> tuple[str, ...]:
+    """List all links, every one after the link that it hangs from."""
     roots = [name for name in links if name not in above]
     if len(roots) != 1:
         raise UrdfError(
@@ -230,22 +223,20 @@ def _root(
             found=f"root links: {', '.join(roots) or 'none'}",
             allowed="one link without a joint above it",
         )
-    below: dict[str | None, list[str]] = {}
+    below: dict[str, list[str]] = {name: [] for name in links}
     for child, joint in above.items():
-        below.setdefault(end_of(joints[joint], "parent"), []).append(child)
-    reached, waiting = set(roots), list(roots)
-    while waiting:
-        found = below.get(waiting.pop(), [])
-        reached.update(found)
-        waiting += found
-    if len(reached) < len(links):
-        looped = ", ".join(name for name in links if name not in reached)
+        below[end_of(joints[joint], "parent")].append(child)
+    downward = roots
+    for link in downward:  # which grows on the way
+        downward.extend(below[link])
+    if len(downward) < len(links):
+        looped = ", ".join(name for name in links if name not in downward)
         raise UrdfError(
             "the links do not form one tree",
             where=where,
             found=f"a loop of links: {looped}",
         )
-    return roots[0]
+    return tuple(downward)
 
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -310,17 +301,6 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
 """All that is read from links and joints, and what a number there means."""
 
 
-def _check_numbers(tree: UrdfTree, where: str) -> None:
-    """Refuse what is not a finite number, at links and joints off the chain as well."""
-    for kind, owners in (("link", tree.links), ("joint", tree.joints)):
-        paths = dict.fromkeys(entry.path.split("/")[0] for entry in ENTRIES[kind])
-        for owner in owners.values():
-            for path in paths:
-                _check_single(owner.findall(path), where)
-            for entry in ENTRIES[kind]:
-                _check_entry(owner, entry, where)
-
-
 def numbers_of(
     owner: Element, path: str, attribute: str, absent: str
 ) -> tuple[float, ...]:
@@ -330,71 +310,62 @@ def numbers_of(
     return tuple(float(word) for word in text.split())
 
 
-def number_of(owner: Element, path: str, attribute: str) -> float | None:
-    """Return the number of a checked attribute of a link or joint; None if it is absent."""
+_Absent = TypeVar("_Absent", float, None)
+
+
+def number_of(
+    owner: Element, path: str, attribute: str, absent: _Absent
+) -> float | _Absent:
+    """Return the number of a checked attribute of a link or joint; `absent` if it is not there."""
     numbers = numbers_of(owner, path, attribute, "")
-    return numbers[0] if numbers else None
-
-
-def _check_single(elements: list[Element], where: str) -> None:
-    if len(elements) > 1:
-        raise UrdfError(
-            f"<{elements[1].tag}> is there twice",
-            where=place_of(elements[1], where),
-            allowed="one, or none",
-        )
+    return numbers[0] if numbers else absent
 
 
 def _check_entry(owner: Element, entry: Entry, where: str) -> None:
-    """Check one attribute of a link or joint."""
-    elements = owner.findall(entry.path)
-    _check_single(elements, where)
-    if not elements:
-        return
+    """Refuse an attribute of a link or joint that is not a finite number, or an element that is there twice."""
+    elements = [owner]
+    for tag in entry.path.split("/"):
+        elements = elements[0].findall(tag)
+        if not elements:
+            return
+        if len(elements) > 1:
+            raise UrdfError(
+                f"<{tag}> is there twice",
+                where=_place_of(elements[1], where),
+                allowed="one, or none",
+            )
     text = elements[0].get(entry.attribute)
-    if text is None and not entry.required:
-        return
-    words = [] if text is None else text.split()
-    if len(words) == entry.count and all(
-        _is_number(word, entry.largest) for word in words
+    if _are_numbers((text or "").split(), entry) or (
+        text is None and not entry.required
     ):
         return
-    tag = entry.path.rsplit("/", 1)[-1]
-    kind = (
-        "a finite number"
-        if entry.count == 1
-        else f"{entry.count} finite numbers separated by spaces"
-    )
-    bound = (
-        f", at most {entry.largest:g} in size" if math.isfinite(entry.largest) else ""
-    )
+    numbers = f"{entry.count} finite numbers separated by spaces"
+    finite = numbers if entry.count > 1 else "a finite number"
+    largest = f", at most {entry.largest:g} in size" if entry.largest < math.inf else ""
     raise UrdfError(
-        f"<{tag} {entry.attribute}> is missing"
-        if text is None
-        else f"<{tag} {entry.attribute}> is wrong",
-        where=place_of(elements[0], where),
+        f"<{tag} {entry.attribute}> is {'missing' if text is None else 'wrong'}",
+        where=_place_of(elements[0], where),
         found=None if text is None else f'{entry.attribute}="{text}"',
-        allowed=f"{kind}, {entry.unit}{bound}",
-        hint=_instead(text or "", entry),
+        allowed=f"{finite}, {entry.unit}{largest}",
+        hint=_suggest_numbers(text or "", entry),
     )
 
 
-def _is_number(word: str, largest: float) -> bool:
-    return (
-        _NUMBER.fullmatch(word) is not None
+def _are_numbers(words: list[str], entry: Entry) -> bool:
+    return len(words) == entry.count and all(
+        _NUMBER.fullmatch(word)
         and math.isfinite(float(word))
-        and abs(float(word)) <= largest
+        and abs(float(word)) <= entry.largest
+        for word in words
     )
 
 
-def _instead(text: str, entry: Entry) -> str | None:
-    """Say what to write instead: spaces for separating commas, points for decimal ones, no units."""
+def _suggest_numbers(text: str, entry: Entry) -> str | None:
+    """Return what to write instead: spaces for separating commas, points for decimal ones, no units."""
     spaced = text.replace(",", " ").replace(";", " ").split()
     pointed = text.replace(",", ".").split()
     for words in (spaced, pointed):
-        if len(words) == entry.count and all(
-            _is_number(word, entry.largest) for word in words
-        ):
+        if _are_numbers(words, entry):
             return f'Write {entry.attribute}="{" ".join(words)}"'
     bare = [match.group() for match in _NUMBER.finditer(text)]
     if len(bare) == entry.count:

@@ -12,7 +12,7 @@ from brachis.optimise.backends import SolverReport
 from brachis.optimise.candidate import Candidate
 from brachis.optimise.least_motion import LeastMotion
 from brachis.robot.from_task import in_use
-from brachis.robot.plausibility import Remark
+from brachis.robot.plausibility import Issue
 from brachis.task import FitReport, Task
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification
@@ -35,7 +35,7 @@ class PlannedMotion(Summary):
     candidates: tuple[Candidate, ...] = ()
     interrupted: bool = False
     not_completed: tuple[str, ...] = ()
-    warnings: tuple[Remark, ...] = ()
+    warnings: tuple[Issue, ...] = ()
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
         """Sample the trajectory every `dt` seconds; see `Trajectory.sample`."""

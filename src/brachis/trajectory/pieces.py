@@ -20,45 +20,19 @@ from __future__ import annotations
 
 import numpy as np
 
-_ROUNDING = float(np.finfo(float).eps)
-"""Of a number that is the difference of two, as a part of the larger one."""
 
-
-def travel_without_bend(
-    times: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray
-) -> np.ndarray:
-    """Travel of every piece, (L, n), if its jerk were linear in time; parameters as `relative_coefficients`."""
-    h = np.diff(times)[:, None]
-    return np.asarray(
-        0.5 * h * (qdot[:-1] + qdot[1:]) - h**2 / 12.0 * (before[1:] - after[:-1])
-    )
-
-
-def _misses(
+def piece_coefficients(
     times: np.ndarray,
     q: np.ndarray,
     qdot: np.ndarray,
     after: np.ndarray,
     before: np.ndarray,
-) -> np.ndarray:
-    """Return the part of every piece's travel, (L, n), that bends its jerk: what remains beyond rounding."""
-    miss = np.diff(q, axis=0) - travel_without_bend(times, qdot, after, before)
-    far, fast = (np.maximum(np.abs(part[1:]), np.abs(part[:-1])) for part in (q, qdot))
-    rounding = _ROUNDING * (far + np.diff(times)[:, None] * fast)
-    return np.asarray(miss - np.clip(miss, -rounding, rounding))
-
-
-def relative_coefficients(
-    times: np.ndarray,
-    q: np.ndarray,
-    qdot: np.ndarray,
-    after: np.ndarray,
-    before: np.ndarray,
-) -> np.ndarray:
-    """Bernstein coefficients of ``q(t) - q[i]`` on every piece i between nodes i and i + 1.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bernstein coefficients of ``q(t) - q[i]`` and of the jerk on every piece i between nodes i and i + 1.
 
     A Bezier curve of degree 5 and length h begins with q = c0, qdot = 5 (c1 - c0) / h and
-    qddot = 20 (c2 - 2 c1 + c0) / h^2, and ends likewise.
+    qddot = 20 (c2 - 2 c1 + c0) / h^2, and ends likewise. The jerk comes from the nodes themselves: third differences
+    of the coefficients of the positions would multiply their rounding.
 
     Parameters
     ----------
@@ -71,39 +45,33 @@ def relative_coefficients(
 
     Returns
     -------
-    (6, L, n) ndarray
+    positions : (6, L, n) ndarray
+        rad or m.
+    jerks : (3, L, n) ndarray
+        rad/s^3 or m/s^3.
     """
     h = np.diff(times)[:, None]
-    slope, bend = h / 5.0, h**2 / 20.0
-    way = travel_without_bend(times, qdot, after, before) + _misses(
-        times, q, qdot, after, before
-    )
-    left = [
-        np.zeros_like(way),
-        slope * qdot[:-1],
-        2.0 * slope * qdot[:-1] + bend * after[:-1],
+    v0 = qdot[:-1]
+    v1 = qdot[1:]
+    a0 = after[:-1]
+    a1 = before[1:]
+    linear = 0.5 * h * (v0 + v1) - h**2 / 12.0 * (a1 - a0)  # travel if b were zero
+    far, fast = (np.maximum(np.abs(part[1:]), np.abs(part[:-1])) for part in (q, qdot))
+    rounding = np.finfo(float).eps * (far + h * fast)
+    miss = np.diff(q, axis=0) - linear
+    miss = miss - np.clip(miss, -rounding, rounding)
+    travel = linear + miss
+    slope = h / 5.0
+    bend = h**2 / 20.0
+    positions = [
+        np.zeros_like(travel),
+        slope * v0,
+        2.0 * slope * v0 + bend * a0,
+        travel - 2.0 * slope * v1 + bend * a1,
+        travel - slope * v1,
+        travel,
     ]
-    right = [
-        way - 2.0 * slope * qdot[1:] + bend * before[1:],
-        way - slope * qdot[1:],
-        way,
-    ]
-    return np.stack([*left, *right])
-
-
-def jerk_coefficients(
-    times: np.ndarray,
-    q: np.ndarray,
-    qdot: np.ndarray,
-    after: np.ndarray,
-    before: np.ndarray,
-) -> np.ndarray:
-    """Bernstein coefficients of the jerk of every piece, (3, L, n); parameters as `relative_coefficients`.
-
-    From the nodes themselves: third differences of the coefficients of the positions would multiply their rounding.
-    """
-    h = np.diff(times)[:, None]
-    mean = (before[1:] - after[:-1]) / h
-    slope = 3.0 * (after[:-1] + before[1:]) / h - 6.0 * np.diff(qdot, axis=0) / h**2
-    bend = 60.0 * _misses(times, q, qdot, after, before) / h**3
-    return np.stack([mean - slope + bend, mean - 2.0 * bend, mean + slope + bend])
+    m = (a1 - a0) / h
+    a = 3.0 * (a0 + a1) / h - 6.0 * np.diff(qdot, axis=0) / h**2
+    b = 60.0 * miss / h**3
+    return np.stack(positions), np.stack([m - a + b, m - 2.0 * b, m + a + b])

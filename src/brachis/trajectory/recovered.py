@@ -1,8 +1,7 @@
-"""What is known of a motion that was not planned here."""
+"""Where a motion comes from that was not planned here, and how well its path is known."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,13 +10,16 @@ import numpy as np
 from brachis.common.arguments import number, numbers
 from brachis.common.arrays import freeze
 from brachis.errors import InputError
+from brachis.task.fields import Model
 
-SMALLEST, LARGEST = 2e-7, 1e-3
-"""Tolerances, m and rad."""
+SMALLEST = 2e-7
+"""m and rad: paths are not fitted to a smaller tolerance."""
+LARGEST = 1e-3
+"""m and rad: a path known to a larger tolerance says nothing."""
 
 
 def check_tolerance(tolerance: float) -> float:
-    """Return a tolerance, m and rad; refuse one that says nothing of a path, or is narrower than paths are fitted.
+    """Return a tolerance, m and rad; refuse one outside [`SMALLEST`, `LARGEST`].
 
     Raises
     ------
@@ -25,14 +27,23 @@ def check_tolerance(tolerance: float) -> float:
     """
     tolerance = number(tolerance, "tolerance", "m and rad")
     if not SMALLEST <= tolerance <= LARGEST:
-        allowed = f"{SMALLEST:g} to {LARGEST:g} m and rad"
         raise InputError(
-            "is no tolerance of a path",
+            "the tolerance of a path is out of range",
             where="tolerance",
             found=tolerance,
-            allowed=allowed,
+            allowed=f"{SMALLEST:g} to {LARGEST:g} m and rad",
         )
     return tolerance
+
+
+class StoredRecovery(Model, extra="ignore", strict=True):
+    """What a result file says of a motion that was not planned; the rows are missing in schema 2."""
+
+    source: str
+    tolerance: float
+    told: list[str]
+    rows: list[list[float]] | None = None
+    error: list[float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,61 +91,28 @@ class Recovered:
 
     def to_file(self) -> dict[str, Any]:
         """Return all as plain data for JSON."""
-        return {
-            **self.to_dict(),
-            "rows": self.rows.tolist(),
-            "error": self.error.tolist(),
-        }
+        arrays = {"rows": self.rows.tolist(), "error": self.error.tolist()}
+        return {**self.to_dict(), **arrays}
 
     @classmethod
-    def of_file(cls, data: object, n: int) -> Recovered | None:
-        """Read what `to_file` wrote of a motion of `n` joints; None for None.
+    def of_file(cls, stored: StoredRecovery, n: int) -> Recovered:
+        """Take what `to_file` wrote of a motion of `n` joints.
 
         Raises
         ------
         InputError
-            It is something else.
+            The rows are not those of such a motion.
         """
-        if data is None:
-            return None
-        parts = dict(data) if isinstance(data, Mapping) else {}
-        source, tolerance, told = (
-            parts.get(name) for name in ("source", "tolerance", "told")
-        )
-        listed = isinstance(told, list) and all(isinstance(line, str) for line in told)
-        if not isinstance(source, str) or type(tolerance) is not float or not listed:
-            allowed = "source, tolerance, told, rows, error; or null"
-            raise InputError(
-                "wrong type",
-                where="recovered",
-                found=", ".join(parts) or type(data).__name__,
-                allowed=allowed,
-            )
         rows = numbers(
-            parts.get("rows", np.empty((0, 1 + n))),
-            "recovered.rows",
-            "s, then rad or m",
+            stored.rows or np.empty((0, 1 + n)), "recovered.rows", "s, then rad or m"
         )
-        error = numbers(parts.get("error", np.zeros(n)), "recovered.error", "rad or m")
-        if not rows.size:
-            return cls(
-                source, tolerance, tuple(told or ()), rows.reshape(0, 1 + n), error
-            )
-        fits = (
-            rows.shape == (len(np.atleast_1d(rows)), 1 + n)
-            and len(rows) > 1
-            and error.shape == (n,)
-        )
-        finite = np.isfinite(rows).all() and np.isfinite(error).all()
-        if not fits or not finite or not (np.diff(rows[:, 0]) > 0.0).all():
-            found = f"rows {rows.shape}, error {error.shape}"
-            allowed = (
-                f"rows (K, {1 + n}) with ascending times, error ({n},); finite numbers"
-            )
+        error = np.array(stored.error or np.zeros(n))
+        fits = rows.shape == (len(rows), 1 + n) and len(rows) != 1
+        if not (fits and error.shape == (n,) and (np.diff(rows[:, 0]) > 0.0).all()):
             raise InputError(
                 "not the rows of a file",
                 where="recovered",
-                found=found,
-                allowed=allowed,
+                found=f"rows {rows.shape}, error {error.shape}",
+                allowed=f"rows (K, {1 + n}) with ascending times, error ({n},)",
             )
-        return cls(source, tolerance, tuple(told or ()), rows, error)
+        return cls(stored.source, stored.tolerance, tuple(stored.told), rows, error)

@@ -1,15 +1,10 @@
-"""Joint motion along a path, evaluated at any time.
-
-Where the tool is, and how fast, in a batch of states.
-
-Motions as they are given: a trajectory, what has one, or its file.
-"""
+"""Joint motion along a path, evaluated at any time; also as an argument: a trajectory, what has one, or its file."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar
@@ -18,13 +13,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from brachis.common import tolerances
 from brachis.common.arguments import file_name, number, numbers
-from brachis.common.arrays import freeze
+from brachis.common.arrays import freeze, with_like_signs
 from brachis.common.summary import Summary
 from brachis.errors import InputError, UnknownNameError, write_apart, write_count
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
-from brachis.trajectory.pieces import jerk_coefficients, relative_coefficients
+from brachis.trajectory.pieces import piece_coefficients
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples
@@ -53,27 +49,23 @@ def tool_motion(
     speed : (K,) ndarray
         m/s.
     """
-    model, data, frame = robot.model, robot.model.createData(), robot.frame_id
-    position, quaternion, speed = (
-        np.empty((len(q), 3)),
-        np.empty((len(q), 4)),
-        np.empty(len(q)),
-    )
+    model = robot.model
+    data = model.createData()
+    frame = robot.frame_id
+    position = np.empty((len(q), 3))
+    quaternion = np.empty((len(q), 4))
+    speed = np.empty(len(q))
     for k in range(len(q)):
         pin.forwardKinematics(model, data, q[k], qdot[k])
         placement = pin.updateFramePlacement(model, data, frame)
         position[k] = placement.translation
         quaternion[k] = np.roll(pin.Quaternion(placement.rotation).coeffs(), 1)
         speed[k] = np.linalg.norm(pin.getFrameVelocity(model, data, frame).linear)
-    turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0
-    quaternion[1:] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]
-    return position, quaternion, speed
+    return position, with_like_signs(quaternion), speed
 
 
 CONTINUOUS_TORQUE = 3
 """Least B-spline degree that gives continuous acceleration, and so torque."""
-ENDINGS = ("exact", "hold")
-"""What the last sample of a motion may be; see `Trajectory.sample`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,44 +148,44 @@ class Trajectory(Summary):
     @cached_property
     def pieces(self) -> BPoly:
         """Joint positions less those of the node before, as SciPy's piecewise polynomial over time; see `position`."""
-        from scipy.interpolate import BPoly
-
-        coefficients = relative_coefficients(
-            self.times, self.q, self.qdot, self.qddot, self.qddot_before
-        )
-        pieces = BPoly(coefficients, self.times)
-        pieces.c.setflags(write=False)
-        return pieces
+        return self._polynomials[0]
 
     @cached_property
     def jerk_pieces(self) -> BPoly:
         """Joint jerks as SciPy's piecewise polynomial over time: the third derivative of `pieces`, to rounding."""
+        return self._polynomials[1]
+
+    @cached_property
+    def _polynomials(self) -> tuple[BPoly, ...]:
         from scipy.interpolate import BPoly
 
-        coefficients = jerk_coefficients(
-            self.times, self.q, self.qdot, self.qddot, self.qddot_before
+        nodes = (self.times, self.q, self.qdot, self.qddot, self.qddot_before)
+        polynomials = tuple(
+            BPoly(coefficients, self.times)
+            for coefficients in piece_coefficients(*nodes)
         )
-        pieces = BPoly(coefficients, self.times)
-        pieces.c.setflags(write=False)
-        return pieces
+        for polynomial in polynomials:
+            polynomial.c.setflags(write=False)
+        return polynomials
 
     @cached_property
     def path_spline(self) -> BSpline:
         """s(t) as SciPy's B-spline over time in seconds."""
-        from scipy.interpolate import BSpline
-
-        return BSpline(self.knots * self.t_end, self.control_points[0], self.degree)
+        return self._spline(self.control_points[0])
 
     @cached_property
     def redundant_spline(self) -> BSpline:
         """Positions of the r redundant joints, or sigma of the chart, as SciPy's B-spline over time in seconds."""
+        return self._spline(self.control_points[1:].T)
+
+    def _spline(self, control_points: np.ndarray) -> BSpline:
         from scipy.interpolate import BSpline
 
-        return BSpline(self.knots * self.t_end, self.control_points[1:].T, self.degree)
+        return BSpline(self.knots * self.t_end, control_points, self.degree)
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
         """Path coordinate s at times `t`, same shape."""
-        return np.asarray(self.path_spline(self._checked(t)))
+        return np.asarray(self.path_spline(self._check_times(t)))
 
     def position(self, t: ArrayLike) -> np.ndarray:
         """Joint positions at times `t`: (n,) for a number, (K, n) for (K,); rad or m.
@@ -203,7 +195,7 @@ class Trajectory(Summary):
         InputError
             A time lies outside [0, t_end].
         """
-        times = self._checked(t)
+        times = self._check_times(t)
         node = np.clip(
             np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2
         )
@@ -211,19 +203,19 @@ class Trajectory(Summary):
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
         """Joint velocities, as `position`; rad/s or m/s."""
-        return np.asarray(self.pieces(self._checked(t), nu=1))
+        return np.asarray(self.pieces(self._check_times(t), nu=1))
 
     def acceleration(self, t: ArrayLike) -> np.ndarray:
         """Joint accelerations, as `position`; rad/s^2 or m/s^2."""
-        return np.asarray(self.pieces(self._checked(t), nu=2))
+        return np.asarray(self.pieces(self._check_times(t), nu=2))
 
     def jerk(self, t: ArrayLike) -> np.ndarray:
         """Joint jerks, as `position`; rad/s^3 or m/s^3. At a node the value behind it."""
-        return np.asarray(self.jerk_pieces(self._checked(t)))
+        return np.asarray(self.jerk_pieces(self._check_times(t)))
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""
-        t = self._checked(t)
+        t = self._check_times(t)
         states = (
             np.atleast_2d(part(t))
             for part in (self.position, self.velocity, self.acceleration)
@@ -273,37 +265,36 @@ class Trajectory(Summary):
         UnknownNameError
             `last` is neither.
         """
-        if last not in ENDINGS:
-            raise UnknownNameError("ending", last, ENDINGS, where="last")
+        if last not in ("exact", "hold"):
+            raise UnknownNameError("ending", last, ("exact", "hold"), where="last")
         dt = number(dt, "dt", "s")
         if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):
             raise InputError(
-                "is not a usable period",
+                "the period is out of range",
                 where="dt",
                 found=f"{dt} s",
                 allowed="> 0 s, at most 1e7 samples",
             )
-        whole = int(np.ceil(self.t_end / dt * (1.0 - 1e-12)))
-        before = np.arange(whole) * dt
-        if last == "hold" and (
-            self.task.boundary.periodic or self.task.boundary.end_speed
-        ):
+        boundary = self.task.boundary
+        if last == "hold" and (boundary.periodic or boundary.end_speed):
             raise InputError(
                 "a motion that does not end at rest cannot be held",
                 where="last",
                 allowed="exact",
             )
+        whole = int(np.ceil(self.t_end / dt * (1.0 - tolerances.ROUNDING)))
+        before = np.arange(whole) * dt
         if last == "exact":
             return self.at(np.append(before, self.t_end))
-        moving, rest = self.at(before), np.zeros((1, self.robot.n))
+        moving = self.at(before)
+        rest = np.zeros((1, self.robot.n))
         end = self.position(self.t_end)[None]
         held = self._samples(np.array([whole * dt]), np.ones(1), end, rest, rest)
-        names = (field.name for field in fields(moving))
         return Samples(
-            *(
-                np.concatenate([getattr(moving, name), getattr(held, name)])
-                for name in names
-            )
+            **{
+                name: np.concatenate([values, getattr(held, name)])
+                for name, values in vars(moving).items()
+            }
         )
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
@@ -322,18 +313,19 @@ class Trajectory(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
-        in_chart = self.chart_rows.size > 0
+        none = "none by name: a chart" if self.chart_rows.size else "none"
+        source = Path(self.robot.source)
+        intervals = write_count(len(self.knots) - 2 * self.degree - 1, "interval")
         return {
             "end time": f"{self.t_end:.4f} s",
-            "robot": f"{Path(self.robot.source).parent.name}/{Path(self.robot.source).name}",
+            "robot": f"{source.parent.name}/{source.name}",
             "joints": ", ".join(self.joint_names),
-            "redundant joints": ", ".join(self.redundant_joints)
-            or ("none by name: a chart" if in_chart else "none"),
+            "redundant joints": ", ".join(self.redundant_joints) or none,
             "branch": self.branch or "none",
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
             **({"recovered from": self.recovered.source} if self.recovered else {}),
-            "splines": f"degree {self.degree}, {write_count(len(self.knots) - 2 * self.degree - 1, 'interval')}",
+            "splines": f"degree {self.degree}, {intervals}",
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -366,19 +358,9 @@ class Trajectory(Summary):
         ResultFileError
             The file is missing, broken or of another schema version, or its parts do not fit each other.
         """
-        content = read_result(file_name(path, "path"))
-        return cls(
-            task=content.task,
-            urdf=content.urdf,
-            robot=content.robot,
-            redundant_joints=content.redundant_joints,
-            branch=content.branch,
-            degree=content.degree,
-            recovered=content.recovered,
-            **content.arrays,
-        )
+        return cls(**read_result(file_name(path, "path")))
 
-    def _checked(self, t: ArrayLike) -> np.ndarray:
+    def _check_times(self, t: ArrayLike) -> np.ndarray:
         """Refuse times outside the trajectory; rounding at the ends is forgiven."""
         times = numbers(t, "t", "s")
         slack = 1e-9 * self.t_end
@@ -414,7 +396,7 @@ def motion_of(given: Motion, where: str = "trajectory") -> Trajectory:
     Raises
     ------
     ResultFileError
-        A file is none of a motion.
+        A file is not that of a motion.
     InputError
         It is something else.
     """
@@ -426,7 +408,7 @@ def motion_of(given: Motion, where: str = "trajectory") -> Trajectory:
     if not isinstance(motion, Trajectory):
         allowed = "a Trajectory, a Result, or the npz file of one"
         raise InputError(
-            "no motion", where=where, found=type(given).__name__, allowed=allowed
+            "not a motion", where=where, found=type(given).__name__, allowed=allowed
         )
     return motion
 

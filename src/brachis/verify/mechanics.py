@@ -56,7 +56,7 @@ class _Weight:
 def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n)."""
     offset, count = _matrix(robot.settings.tool_offset), len(q)
-    tool = robot.stated.tool @ offset
+    tool = robot.urdf_dynamics.tool @ offset
     roll = (
         q[:, -1] if robot.rolls_freely else np.zeros(count)
     )  # about the tool frame's z axis
@@ -65,7 +65,7 @@ def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray
         for axis in np.eye(3)
     )
     origin = np.tile(tool[:3, 3:], count)
-    for joint, body in reversed(list(enumerate(robot.stated.bodies))):
+    for joint, body in reversed(list(enumerate(robot.urdf_dynamics.bodies))):
         if body.sliding:
             origin = origin + body.axis[:, None] * q[:, joint]
         else:
@@ -133,7 +133,7 @@ def _rigid(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
     """Torques (K, n) without armature and friction."""
-    tau, bodies = np.zeros_like(q), robot.stated.bodies
+    tau, bodies = np.zeros_like(q), robot.urdf_dynamics.bodies
     motions = _motions(robot, q, qdot, qddot)
     force, moment = np.zeros((3, len(q))), np.zeros((3, len(q)))
     for joint in reversed(range(len(bodies))):
@@ -163,7 +163,7 @@ def _motions(
     )
     spin, gain, acceleration = still, still, np.tile(upwards[:, None], len(q))
     motions: list[tuple[np.ndarray, ...]] = []
-    for joint, body in enumerate(robot.stated.bodies):
+    for joint, body in enumerate(robot.urdf_dynamics.bodies):
         way, axis = body.placement[:3, 3, None], body.axis[:, None]
         acceleration = acceleration + cross(gain, way) + cross(spin, cross(spin, way))
         spin, gain, acceleration = (
@@ -190,10 +190,10 @@ def _motions(
 
 def _weights(robot: Robot, joint: int) -> list[_Weight]:
     """List what a joint carries: its own body and, at the end of the chain, the payload."""
-    body, payload = robot.stated.bodies[joint], robot.settings.payload
+    body, payload = robot.urdf_dynamics.bodies[joint], robot.settings.payload
     weights = [_Weight(body.mass, body.com[:, None], body.inertia)]
-    if payload is not None and joint == len(robot.stated.bodies) - 1:
-        tool, given = robot.stated.tool, payload.inertia
+    if payload is not None and joint == len(robot.urdf_dynamics.bodies) - 1:
+        tool, given = robot.urdf_dynamics.tool, payload.inertia
         inertia = np.zeros((3, 3))
         if given is not None:
             inertia = np.diag([given.ixx, given.iyy, given.izz])

@@ -306,8 +306,8 @@ def _robot_of_urdf(
     stated = {
         kind: np.array([np.inf if value is None else value for value in values])
         for kind, values in (
-            ("velocity", [limit.velocity for limit in robot.stated_limits]),
-            ("torque", [limit.effort for limit in robot.stated_limits]),
+            ("velocity", [limit.velocity for limit in robot.urdf_limits]),
+            ("torque", [limit.effort for limit in robot.urdf_limits]),
         )
     }
     return replace(
@@ -322,11 +322,11 @@ def _frames(
     urdf: Path, base: str | None, tool: str | None, remarks: list[str]
 ) -> tuple[str | None, str]:
     """Take the first limb of the URDF where base and tool frame are not given, and say so where there is a choice."""
-    from brachis.robot.urdf import first_limb, read_file
+    from brachis.robot.urdf import default_chain, read_file
 
     if tool is not None:
         return base, tool
-    limb = first_limb(read_file(urdf), str(urdf))
+    limb = default_chain(read_file(urdf), str(urdf))
     if limb.base and base is None:
         remarks.append(
             f"base frame: {limb.base}, from which several limbs part; --base-frame names another one"

@@ -21,7 +21,7 @@ from brachis.common import files
 from brachis.common.files import atomic_write, status_of, writing_errors
 from brachis.errors import InputError
 from brachis.robot.urdf import check_inertias, read_file
-from brachis.robot.urdf_bodies import stated_chain
+from brachis.robot.urdf_bodies import read_dynamics
 from brachis.robot.urdf_elements import read_tree
 
 
@@ -113,7 +113,7 @@ def check_composed(text: str, joint: str, where: str) -> None:
     UrdfError
     """
     tree = read_tree(text, where)
-    carried = stated_chain(tree, (joint,), {}, tree.root)
+    carried = read_dynamics(tree, (joint,), {}, tree.root)
     check_inertias(tree, carried.bodies, where)
 
 

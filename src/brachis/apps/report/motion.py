@@ -13,7 +13,7 @@ from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
 from brachis.optimise.candidate import Candidate
 from brachis.problem.plausibility import of_robot, of_task
-from brachis.robot.plausibility import Remark
+from brachis.robot.plausibility import Issue
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
 
@@ -36,7 +36,7 @@ class ReportedMotion:
         Those active longest first.
     held_back : tuple of str
         What holds the motion back, a sentence each.
-    remarks : tuple of Remark
+    remarks : tuple of Issue
         What is implausible in robot and task.
     not_completed : tuple of str
         What the search did not complete.
@@ -54,7 +54,7 @@ class ReportedMotion:
     ratios: LimitRatios
     saturations: tuple[Saturation, ...]
     held_back: tuple[str, ...]
-    remarks: tuple[Remark, ...]
+    remarks: tuple[Issue, ...]
     not_completed: tuple[str, ...]
     candidates: tuple[Candidate, ...]
     planned: dict[str, str]

@@ -1,12 +1,9 @@
-"""The task map that a task asks for.
+"""The task map that a task asks for: of the tool, with a tool that rolls freely, or of the joints themselves.
 
-The joints themselves as task coordinates: what a path prescribes is the motion of every joint.
-
-Free roll about the tool axis: a virtual joint after the tool frame, of zero inertia and without limits.
-
-A pose whose rotation about the tool frame's z axis is left open has five rows. With a revolute joint about this axis
-added to the chain it is a pose of six rows again, and the joint is one more that may be redundant: the closed forms for
-poses serve both.
+Free roll about the tool axis is a virtual joint after the tool frame, of zero inertia and without limits. A pose whose
+rotation about the tool frame's z axis is left open has five rows. With a revolute joint about this axis added to the
+chain it is a pose of six rows again, and the joint is one more that may be redundant: the closed forms for poses serve
+both.
 """
 
 from __future__ import annotations
@@ -18,6 +15,7 @@ from typing import NoReturn
 import numpy as np
 import pinocchio as pin
 
+from brachis.common import tolerances
 from brachis.errors import InputError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import UrdfLimit
@@ -50,34 +48,30 @@ class JointSpace(TaskMap):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """See `TaskMap.units`."""
+        """Unit of every joint's position."""
         return self.robot.position_units
 
     def values(self, q: np.ndarray) -> np.ndarray:
-        """See `TaskMap.values`."""
+        """Return the joint positions themselves."""
         return q
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """See `TaskMap.difference`; whole turns count, since the path says in which turn a joint is."""
+        """Return the displacement joint by joint; whole turns count, since the path says in which turn a joint is."""
         return np.asarray(first - second, dtype=float)
 
     def jacobian(self, twists: np.ndarray) -> np.ndarray:
-        """See `TaskMap.jacobian`."""
+        """Return identity matrices, (K, n, n)."""
         return np.broadcast_to(np.eye(self.m), (twists.shape[1], self.m, self.m))
 
-    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """See `TaskMap.bias`."""
-        return np.zeros_like(qdot)
-
     def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """See `TaskMap.velocity_slopes`."""
+        """Return zeros, (K, n, n)."""
         return np.zeros((len(qdot), self.m, self.m))
 
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
-        """See `TaskMap.derivatives`."""
-        zeros = np.zeros((len(qdot), self.m, self.m))
+        """Return zeros, (K, n, n) each."""
+        zeros = self.velocity_slopes(twists, qdot)
         return TaskDerivatives(zeros, zeros, zeros)
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> NoReturn:
@@ -91,8 +85,6 @@ class JointSpace(TaskMap):
 
 FREE_ROLL = "pose_free_roll"
 JOINTS = "joints"
-WORDS = ("position", "pose", FREE_ROLL, JOINTS)
-_IN_PLANE = 1.0 - 1e-9
 
 
 def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
@@ -109,24 +101,34 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     >>> brachis.task_map_of(brachis.robots.iiwa14, "pose").m
     6
     """
-    if rows == "position":
-        rows = AXES
-    if isinstance(rows, str):
-        return _of_word(robot, rows)
-    names, positions = tuple(rows), position_rows(rows)
+    if rows == JOINTS:
+        return JointSpace(robot)
+    if rows == FREE_ROLL and not robot.rolls_freely:
+        raise InputError(
+            "the robot's tool does not roll freely",
+            where="task_space",
+            found=rows,
+            hint="brachis.robot.bind makes a robot whose tool does",
+        )
+    if rows in ("pose", FREE_ROLL):
+        return Pose(robot)
+    if isinstance(rows, str) and rows != "position":
+        raise InputError(
+            "this task space does not exist",
+            where="task_space",
+            found=rows,
+            allowed=f"rows out of {', '.join(ROWS)}, or one of position, pose, {FREE_ROLL}, {JOINTS}",
+        )
+    names = AXES if rows == "position" else tuple(rows)
+    positions = position_rows(names)
     if names == POSE_ROWS:
         return Pose(robot)
-    if (
-        any(row not in ROWS for row in names)
-        or len(set(names)) != len(names)
-        or not positions
-    ):
-        allowed = f"{', '.join(ROWS)}, each once"
+    if not set(names) <= set(ROWS) or len(set(names)) < len(names) or not positions:
         raise InputError(
             "rows are not usable",
             where="task_space",
             found=list(names),
-            allowed=allowed,
+            allowed=f"{', '.join(ROWS)}, each once",
         )
     if YAW not in names:
         return WorldRows(robot, names)
@@ -138,39 +140,16 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
             allowed="[x, y, yaw]",
         )
     rotation = robot.tool_placement(np.zeros(robot.n)).rotation
-    in_plane = np.linalg.norm(rotation[[AXES.index(row) for row in positions]], axis=0)
-    if in_plane.max() < _IN_PLANE:
+    plane = [AXES.index(row) for row in positions]
+    lies_in_plane = np.linalg.norm(rotation[plane], axis=0) >= 1.0 - tolerances.ANGLE
+    if not lies_in_plane.any():
         raise InputError(
             "no axis of the tool frame lies in the plane in which yaw turns",
             where="task_space",
             found=list(names),
             hint="Attach a tool frame with an axis in this plane",
         )
-    return RowsAndYaw(robot, names, int(np.argmax(in_plane >= _IN_PLANE)))
-
-
-def _of_word(robot: Robot, word: str) -> Pose | JointSpace:
-    """Return the joints or the poses, after a check that the tool can roll where that is asked for."""
-    if word not in WORDS:
-        raise InputError(
-            "this task space does not exist",
-            where="task_space",
-            found=word,
-            allowed=f"rows out of {', '.join(ROWS)}, or one of {', '.join(WORDS)}",
-        )
-    if word == JOINTS:
-        return JointSpace(robot)
-    if word == FREE_ROLL and not robot.rolls_freely:
-        raise InputError(
-            "the robot's tool does not roll freely",
-            where="task_space",
-            found=word,
-            hint="brachis.robot.bind makes a robot whose tool does",
-        )
-    return Pose(robot)
-
-
-_NO_SPEED_SCALE = 1.0
+    return RowsAndYaw(robot, names, int(np.argmax(lies_in_plane)))
 
 
 def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskMap]:
@@ -217,28 +196,26 @@ def with_free_roll(robot: Robot) -> Robot:
         )
     model = robot.model.copy()
     tool = model.frames[robot.frame_id]
-    joint = model.addJoint(
-        tool.parentJoint, pin.JointModelRZ(), tool.placement, ROLL_JOINT
-    )
-    frame = f"{robot.tool_frame}/{ROLL_JOINT}"
+    turning = pin.JointModelRZ()
+    joint = model.addJoint(tool.parentJoint, turning, tool.placement, ROLL_JOINT)
+    name = f"{robot.tool_frame}/{ROLL_JOINT}"
+    origin = pin.SE3.Identity()
     model.addFrame(
-        pin.Frame(
-            frame, joint, robot.frame_id, pin.SE3.Identity(), pin.FrameType.OP_FRAME
-        )
+        pin.Frame(name, joint, robot.frame_id, origin, pin.FrameType.OP_FRAME)
     )
-    old, friction = robot.limits, robot.friction
+    friction = robot.friction
     return replace(
         robot,
         rolls_freely=True,
         model=model,
         joint_names=(*robot.joint_names, ROLL_JOINT),
-        tool_frame=frame,
-        limits=old.with_free_joint(),
-        stated_limits=(*robot.stated_limits, UrdfLimit(None, None, None, None)),
+        tool_frame=name,
+        limits=robot.limits.with_free_joint(),
+        urdf_limits=(*robot.urdf_limits, UrdfLimit(None, None, None, None)),
         friction=Friction(
             armature=np.append(friction.armature, 0.0),
             viscous=np.append(friction.viscous, 0.0),
             coulomb=np.append(friction.coulomb, 0.0),
-            v_eps=np.append(friction.v_eps, _NO_SPEED_SCALE),
+            v_eps=np.append(friction.v_eps, 1.0),
         ),
     )

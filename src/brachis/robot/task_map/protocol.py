@@ -1,7 +1,4 @@
-"""What a task map is: from joint positions to task coordinates, with its derivatives.
-
-Names of the rows of task spaces.
-"""
+"""What a task map is: from joint positions to task coordinates, with its derivatives; and how their rows are called."""
 
 from __future__ import annotations
 
@@ -94,9 +91,8 @@ class TaskMap(Summary, ABC):
 
     def __post_init__(self) -> None:
         """Look the axes up, and make a workspace."""
-        object.__setattr__(
-            self, "axes", tuple(AXES.index(row) for row in self.rows if row in AXES)
-        )
+        axes = tuple(AXES.index(row) for row in self.rows if row in AXES)
+        object.__setattr__(self, "axes", axes)
         object.__setattr__(self, "_data", self.robot.model.createData())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -124,13 +120,11 @@ class TaskMap(Summary, ABC):
             They are not as many as the rows, or do not make a pose.
         """
         if isinstance(stated, ToolPose) or len(stated) != self.m:
-            found = "a pose" if isinstance(stated, ToolPose) else len(stated)
-            allowed = f"{self.m}: {', '.join(self.rows)}"
             raise InputError(
                 "has the wrong number of coordinates",
                 where=where,
-                found=found,
-                allowed=allowed,
+                found="a pose" if isinstance(stated, ToolPose) else len(stated),
+                allowed=f"{self.m}: {', '.join(self.rows)}",
             )
         return np.array(stated, dtype=float)
 
@@ -157,7 +151,9 @@ class TaskMap(Summary, ABC):
 
     def twists(self, q: np.ndarray) -> np.ndarray:
         """Columns (6, K, n) of the tool frame's Jacobian at K postures (K, n): linear, then angular velocity."""
-        model, data, frame = self.robot.model, self._data, self.robot.frame_id
+        model = self.robot.model
+        data = self._data
+        frame = self.robot.frame_id
         columns = np.empty((len(q), 6, self.robot.n))
         for k in range(len(q)):
             columns[k].flat = pin.computeFrameJacobian(
@@ -173,9 +169,9 @@ class TaskMap(Summary, ABC):
         """Task Jacobian J (K, m, n) from the `twists` at K postures."""
         return np.moveaxis(self.rates(twists), 0, 1)
 
-    @abstractmethod
     def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """Velocity-dependent task acceleration Jdot qdot, (K, m), from the `twists` at K postures."""
+        """Velocity-dependent task acceleration Jdot qdot = V_q qdot, (K, m), from the `twists` at K postures."""
+        return np.einsum("kmn,kn->km", self.velocity_slopes(twists, qdot), qdot)
 
     @abstractmethod
     def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
@@ -186,3 +182,11 @@ class TaskMap(Summary, ABC):
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
         """V_q, A_q and A_v of K states from the `twists` at their postures; see `twists`."""
+
+    def _of_rows(self, tool: TaskDerivatives) -> TaskDerivatives:
+        """Take the rows of this map from derivatives of twists, (6, K, n) each."""
+        return TaskDerivatives(
+            self.jacobian(tool.velocity_q),
+            self.jacobian(tool.acceleration_q),
+            self.jacobian(tool.acceleration_qdot),
+        )

@@ -1,29 +1,21 @@
-"""The tool's pose.
+"""The tool as task space: its pose, rows of its position in the world frame, or two such rows and yaw in their plane.
 
-Rows of the tool's position in the world frame.
-
-Twists are in the world's axes: the tool frame turns with w_k for each joint k, and the classical acceleration of its
-origin is a_v + w x v. The formulas of `twists` hold in any axes that stand still while the derivative is taken, so all
-is computed in the world's directions at once.
-
-Two rows of the tool's position and the angle at which the tool stands in their plane.
-
-Velocity and acceleration of the tool frame and their derivatives, from the columns of its Jacobian.
-
-The columns J_i are twists (v, w) at the tool frame's origin. Joints after joint i carry its axis relative to the tool,
-so that in the tool frame's own axes
+Velocity and acceleration of the tool frame and their derivatives come from the columns of its Jacobian. The columns J_i
+are twists (v, w) at the tool frame's origin. Joints after joint i carry its axis relative to the tool, so that in the
+tool frame's own axes
 
     dJ_i/dq_k = [J_i, J_k] for i < k, else 0,        [X, Y] = (w_X x v_Y + v_X x w_Y, w_X x w_Y).
 
 With V = J qdot, S_k the part of it that comes from the joints before joint k, a = J qddot + Jdot qdot and s_k its part:
 
-    Jdot qdot = sum_k [S_k, J_k] qdot_k,             s_k = sum_{i<k} (J_i qddot_i + [S_i, J_i] qdot_i)
+    s_k = sum_{i<k} (J_i qddot_i + [S_i, J_i] qdot_i)
     dV/dq_k    = [S_k, J_k]
     da/dqdot_k = 2 [S_k, J_k] + [J_k, V]
     da/dq_k    = [s_k, J_k] + [[S_k, J_k], V - S_k]
 
 (R. M. Murray, Z. Li, S. S. Sastry, A Mathematical Introduction to Robotic Manipulation, 1994, chapter 3). They hold in
-any axes that stand still while the derivative is taken.
+any axes that stand still while the derivative is taken. Rows of the position use the world's axes: there the tool frame
+turns with w_k for each joint k, and the classical acceleration of its origin is a_v + w x v.
 """
 
 from __future__ import annotations
@@ -43,52 +35,23 @@ from brachis.task import ToolPose
 from brachis.task.points.units import rotation_by
 
 
-@dataclass(frozen=True)
-class ToolMotion:
-    """Motion of the tool frame in K states, and its derivatives.
-
-    Attributes
-    ----------
-    velocity, acceleration : (6, K, 1) ndarray
-        V and a.
-    velocity_q, acceleration_q, acceleration_qdot : (6, K, n) ndarray
-        dV/dq, da/dq and da/dqdot.
-    """
-
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    velocity_q: np.ndarray
-    acceleration_q: np.ndarray
-    acceleration_qdot: np.ndarray
-
-
-def tool_motion(twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> ToolMotion:
-    """Derive the motion of K states (K, n) from the `twists` (6, K, n) at their postures; see the module's formulas."""
+def _derive(
+    twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, TaskDerivatives]:
+    """V and a, (6, K, 1), of K states (K, n), and their derivatives, (6, K, n), from the `twists` at their postures."""
     before, velocity = _sums(twists * qdot)
     velocity_q = _bracket(before, twists)
     parts, acceleration = _sums(twists * qddot + velocity_q * qdot)
-    acceleration_q = _bracket(parts, twists) + _bracket(velocity_q, velocity - before)
-    acceleration_qdot = 2.0 * velocity_q + _bracket(twists, velocity)
-    return ToolMotion(
-        velocity, acceleration, velocity_q, acceleration_q, acceleration_qdot
+    derivatives = TaskDerivatives(
+        velocity_q=velocity_q,
+        acceleration_q=_bracket(parts, twists)
+        + _bracket(velocity_q, velocity - before),
+        acceleration_qdot=2.0 * velocity_q + _bracket(twists, velocity),
     )
+    return velocity, acceleration, derivatives
 
 
-def velocity_slopes(
-    twists: np.ndarray, qdot: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """V, (6, K, 1), and dV/dq, (6, K, n), from the `twists` (6, K, n) at K postures and speeds (K, n)."""
-    before, velocity = _sums(twists * qdot)
-    return velocity, _bracket(before, twists)
-
-
-def tool_bias(twists: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """V and Jdot qdot, both (6, K), from the `twists` (6, K, n) at K postures."""
-    before, velocity = _sums(twists * qdot)
-    return velocity[:, :, 0], (_bracket(before, twists) * qdot).sum(axis=2)
-
-
-def turned(turning: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def _turn(turning: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Rates (6, K, n) at which linear and angular parts (6, K, 1) change as their axes turn, at `turning` (3, K, n)."""
     return np.concatenate([cross(turning, vectors[:3]), cross(turning, vectors[3:])])
 
@@ -107,10 +70,6 @@ def _bracket(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     )
 
 
-_POSITIONS = 3
-_NEARLY_HALF_A_TURN = 3.0  # rad
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose(TaskMap):
     """The tool frame's pose.
@@ -125,69 +84,59 @@ class Pose(TaskMap):
     rows: tuple[str, ...] = POSE_ROWS
 
     def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
-        """See `TaskMap.read`."""
+        """Return the coordinates, (12,), of a pose that a task states."""
         if not isinstance(stated, ToolPose):
-            allowed = "a position with an orientation (ToolPose)"
             raise InputError(
-                "has no orientation", where=where, found=list(stated), allowed=allowed
+                "the orientation is missing",
+                where=where,
+                found=list(stated),
+                allowed="a position with an orientation (ToolPose)",
             )
         convention, values = stated.convention_and_numbers
         rotation = rotation_by(convention, np.array(values))
         return np.concatenate([stated.position, rotation.as_matrix().ravel()])
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """See `TaskMap.of_placements`."""
+        """Return positions and rotation matrices row by row, (K, 12)."""
         return np.concatenate([positions, rotations.reshape(-1, 9)], axis=1)
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """See `TaskMap.difference`: the translation and the rotation vector, in the frame of `second`."""
-        first, second = np.broadcast_arrays(
-            np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-        )
+        """Return the translation and the rotation vector, (..., 6), in the frame of `second`."""
+        first = np.asarray(first, dtype=float)
+        first, second = np.broadcast_arrays(first, np.asarray(second, dtype=float))
         shape = first.shape[:-1]
-        to = first[..., _POSITIONS:].reshape(*shape, 3, 3)
-        back = np.swapaxes(second[..., _POSITIONS:].reshape(*shape, 3, 3), -1, -2)
-        shift = np.einsum(
-            "...ij,...j->...i", back, first[..., :_POSITIONS] - second[..., :_POSITIONS]
-        )
+        to = first[..., 3:].reshape(*shape, 3, 3)
+        back = np.swapaxes(second[..., 3:].reshape(*shape, 3, 3), -1, -2)
+        shift = np.einsum("...ij,...j->...i", back, first[..., :3] - second[..., :3])
         turn = _rotation_vectors((back @ to).reshape(-1, 3, 3))
         return np.concatenate([shift, turn.reshape(*shape, 3)], axis=-1)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
-        """See `TaskMap.rates`."""
+        """Return the twists themselves."""
         return twists
 
-    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """See `TaskMap.bias`."""
-        return tool_bias(twists, qdot)[1].T
-
     def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """See `TaskMap.velocity_slopes`."""
-        return self.jacobian(velocity_slopes(twists, qdot)[1])
+        """Return dV/dq, (K, 6, n)."""
+        before, _ = _sums(twists * qdot)
+        return self.jacobian(_bracket(before, twists))
 
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
-        """See `TaskMap.derivatives`."""
-        tool = tool_motion(twists, qdot, qddot)
-        parts = (tool.velocity_q, tool.acceleration_q, tool.acceleration_qdot)
-        return TaskDerivatives(*(self.jacobian(part) for part in parts))
+        """Return dV/dq, da/dq and da/dqdot, each (K, 6, n)."""
+        return self._of_rows(_derive(twists, qdot, qddot)[2])
 
 
 def _rotation_vectors(rotations: np.ndarray) -> np.ndarray:
     """Rotation vectors (K, 3) of rotation matrices (K, 3, 3); of one near half a turn by SciPy, through quaternions."""
     twice = rotations - np.swapaxes(rotations, 1, 2)
     axes = 0.5 * np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1)
-    sine, cosine = (
-        np.linalg.norm(axes, axis=1),
-        0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0),
-    )
+    sine = np.linalg.norm(axes, axis=1)
+    cosine = 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
     angles = np.arctan2(sine, cosine)
-    vectors = (
-        axes
-        * np.divide(angles, sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
-    )
-    far = angles > _NEARLY_HALF_A_TURN
+    scale = np.divide(angles, sine, out=np.ones_like(sine), where=sine > 0.0)
+    vectors = axes * scale[:, None]
+    far = angles > 3.0
     if far.any():
         from scipy.spatial.transform import Rotation
 
@@ -202,48 +151,39 @@ class WorldRows(TaskMap):
     frame: ClassVar[pin.ReferenceFrame] = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """See `TaskMap.of_placements`."""
+        """Return the rows of the positions, (K, m)."""
         return positions[:, list(self.axes)]
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """See `TaskMap.difference`."""
+        """Return the displacement row by row."""
         return np.asarray(first - second, dtype=float)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
-        """See `TaskMap.rates`."""
+        """Return the rows of the linear velocity."""
         return twists[list(self.axes)]
 
-    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """See `TaskMap.bias`."""
-        velocity, acceleration = tool_bias(twists, qdot)
-        acceleration[:3] += cross(velocity[3:], velocity[:3])
-        return self.rates(acceleration).T
-
     def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """See `TaskMap.velocity_slopes`."""
-        velocity, slopes = velocity_slopes(twists, qdot)
-        return self.jacobian(slopes + turned(twists[3:], velocity))
+        """Return the slopes of the velocity in the world's axes, which stand still, (K, m, n)."""
+        before, velocity = _sums(twists * qdot)
+        return self.jacobian(_bracket(before, twists) + _turn(twists[3:], velocity))
 
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
-        """See `TaskMap.derivatives`."""
-        tool = tool_motion(twists, qdot, qddot)
-        turning, v, w = twists[3:], tool.velocity[:3], tool.velocity[3:]
-        acceleration_qdot, acceleration_q = tool.acceleration_qdot, tool.acceleration_q
-        acceleration_qdot[:3] += cross(turning, v) + cross(w, twists[:3])
-        acceleration_q[:3] += cross(tool.velocity_q[3:], v) + cross(
-            w, tool.velocity_q[:3]
-        )
-        classical = np.concatenate(
-            [tool.acceleration[:3] + cross(w, v), tool.acceleration[3:]]
-        )
-        acceleration_q += turned(turning, classical)
-        velocity_q = tool.velocity_q + turned(turning, tool.velocity)
-        return TaskDerivatives(
-            *(
-                self.jacobian(part)
-                for part in (velocity_q, acceleration_q, acceleration_qdot)
+        """Return the derivatives of velocity and classical acceleration in the world's axes, (K, m, n) each."""
+        velocity, classical, tool = _derive(twists, qdot, qddot)
+        v = velocity[:3]
+        w = velocity[3:]
+        turning = twists[3:]
+        velocity_q = tool.velocity_q
+        tool.acceleration_qdot[:3] += cross(turning, v) + cross(w, twists[:3])
+        tool.acceleration_q[:3] += cross(velocity_q[3:], v) + cross(w, velocity_q[:3])
+        classical[:3] += cross(w, v)
+        return self._of_rows(
+            TaskDerivatives(
+                velocity_q=velocity_q + _turn(turning, velocity),
+                acceleration_q=tool.acceleration_q + _turn(turning, classical),
+                acceleration_qdot=tool.acceleration_qdot,
             )
         )
 
@@ -275,7 +215,7 @@ class RowsAndYaw(WorldRows):
         return 3 - sum(self.axes)
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """See `TaskMap.of_placements`; yaw is in (-pi, pi]."""
+        """Return the rows of the positions, and yaw in (-pi, pi]."""
         first, second = self.axes
         yaw = np.arctan2(
             rotations[:, second, self.tool_axis], rotations[:, first, self.tool_axis]
@@ -283,13 +223,13 @@ class RowsAndYaw(WorldRows):
         return np.column_stack([super().of_placements(positions, rotations), yaw])
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """See `TaskMap.difference`; yaw is in [-pi, pi)."""
+        """Return the displacement row by row; yaw in [-pi, pi)."""
         delta = super().difference(first, second).copy()
         delta[..., -1] = principal(delta[..., -1])
         return delta
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
-        """See `TaskMap.rates`."""
+        """Return the rows of the linear velocity, and the angular one about the world axis of yaw."""
         return np.concatenate(
             [super().rates(twists), self.sign * twists[3 + self.world_axis, None]]
         )
