@@ -195,15 +195,15 @@ class _Progress:
         each = (time.monotonic() - self._began) / (done - self._before)
         text = f"{done} of {write_count(self._total, 'plan')}"
         text += f", {failed} failed" if failed else ""
-        self._listener(f"{text}; {in_words(each * (self._total - done))} left")
+        self._listener(f"{text}; {write_duration(each * (self._total - done))} left")
 
 
-def in_words(seconds: float) -> str:
+def write_duration(seconds: float) -> str:
     """Write a duration as people say it.
 
     Examples
     --------
-    >>> in_words(4.2), in_words(130.0), in_words(7500.0)
+    >>> write_duration(4.2), write_duration(130.0), write_duration(7500.0)
     ('5 s', '2 min 10 s', '2 h 05 min')
     """
     whole = math.ceil(seconds)
