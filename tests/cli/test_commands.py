@@ -320,7 +320,7 @@ def test_the_folder_of_a_motion_stands_for_it(run, planned, tmp_path):
     outcome = run("verify", tmp_path / "empty")
     assert outcome.code == 2
     assert (
-        "is a folder in which there is no motion; allowed: result.npz or unverified.npz"
+        "is a folder without a motion; allowed: result.npz or unverified.npz"
         in outcome.err
     )
 

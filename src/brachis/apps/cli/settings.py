@@ -31,7 +31,7 @@ def motion_file(result: Path) -> Path:
         if is_file(result / name):
             return result / name
     raise ResultFileError(
-        "the folder holds no motion",
+        "is a folder without a motion",
         where=str(result),
         allowed=" or ".join(_MOTIONS),
         hint="Run brachis plan --out",

@@ -52,7 +52,7 @@ def sweep(
     json: Json = False,
 ) -> None:
     """Plan a task many times, with its keys varied."""
-    from brachis.apps.sweeps.pools import VERIFIED
+    from brachis.apps.sweeps.plans import VERIFIED
 
     with end_cleanly(), _progress() as listener:
         result = brachis.sweep(
@@ -96,7 +96,7 @@ def _progress() -> Iterator[Callable[[str], None]]:
 
 def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
-    from brachis.apps.sweeps.pools import FAILED, UNVERIFIED, VERIFIED
+    from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
     from brachis.apps.sweeps.run import write_duration
 
     console = result_console()

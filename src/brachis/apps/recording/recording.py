@@ -135,7 +135,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
         if key not in columns and problem is None:
             problem = f"{_describe(*key)} is missing"
     if problem is not None:
-        names = [*header[:8], "..."] if len(header) > 8 else header
+        names = [*header[:8], "..."] if len(header) > 8 else [*header]
         raise TaskError(
             problem,
             found=", ".join(names),
