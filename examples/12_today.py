@@ -1,4 +1,4 @@
-"""A motion that runs today, out of its CSV file, beside the one that brachis plans along the same path.
+"""A recorded motion, from its CSV file, beside the motion that brachis plans along the same path.
 
 Usage: python examples/12_today.py [FIGURE]
 
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import brachis
-from brachis.apps.comparison import plot_today
+from brachis.apps.comparison import plot_comparison
 from brachis.apps.plots import save_figure
 
 ROOT = Path(__file__).parents[1]
@@ -24,7 +24,7 @@ def main(figure: str | None = None) -> brachis.Comparison:
     )
     print(found)
     if figure:
-        save_figure(plot_today(found), figure)
+        save_figure(plot_comparison(found), figure)
     return found
 
 

@@ -260,15 +260,15 @@ def main() -> None:
             }
             found = brachis.compare(file, task=task)
         took = processor_time() - began
-        miss = today.miss(found.today, given.dt)
+        miss = today.miss(found.recorded, given.dt)
         rows.append((found.saved, miss, found.result.verified))
         ratios = (
-            max(use.today for use in found.uses),
+            max(use.recorded for use in found.uses),
             found.result.verification.worst_ratio,
         )
         name = "scara3" if seed % 2 == 0 else "iiwa14"
         print(
-            f"{seed:4d}  {name} {found.today.t_end:8.4f} s {found.result.t_end:8.4f} s {100 * found.saved:7.2f} % "
+            f"{seed:4d}  {name} {found.recorded.t_end:8.4f} s {found.result.t_end:8.4f} s {100 * found.saved:7.2f} % "
             f"{1e6 * miss:8.3f} um {today.largest_ratio():12.4f} {ratios[0]:7.4f} {ratios[1]:9.4f} {took:9.1f} s",
             flush=True,
         )

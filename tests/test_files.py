@@ -188,7 +188,7 @@ def writer(size):
 out = Path(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 written = write_files(out, {"result.json": writer(500)}, {"overview.png": writer(5000), "candidates.png": writer(50)})
-print(*written.files, *written.failures, sep="\\n")
+print(*written[0], *written[1], sep="\\n")
 """
 
 

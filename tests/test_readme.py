@@ -301,7 +301,7 @@ def test_example_12(tmp_path):
     printed = re.search(
         r"# ([0-9.]+) % faster: ([0-9.]+) s instead of ([0-9.]+) s", page
     ).groups()
-    ours = [100 * found.saved, found.result.t_end, found.today.t_end]
+    ours = [100 * found.saved, found.result.t_end, found.recorded.t_end]
     assert [float(each) for each in printed] == pytest.approx(ours, abs=0.1)
     assert (tmp_path / "today.png").stat().st_size > 1000
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import csv
 import json
 import math
@@ -19,7 +18,7 @@ import yaml
 import brachis
 from brachis import __version__, planner
 from brachis.apps import plots
-from brachis.apps.cli import planning
+from brachis.apps.cli import folder, main
 from brachis.errors import InputError
 from brachis.optimise import candidate
 from brachis.search import candidates
@@ -161,7 +160,7 @@ def test_failure_while_writing_the_result_leaves_the_earlier_one(
     def full(_text, path):
         raise no_space(path)
 
-    monkeypatch.setattr(planning, "write_text", full)
+    monkeypatch.setattr(folder, "write_text", full)
     outcome = run("plan", write(task), "--out", out)
     assert outcome.code == 2
     assert (
@@ -275,13 +274,17 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     assert (tmp_path / "out/unverified.npz").exists()
     data = json.loads(outcome.out)
     assert data["interrupted"]
-    assert data["undone"][-1] == "what search.effort asks for was not tried to its end"
+    assert (
+        data["not_completed"][-1]
+        == "what search.effort asks for was not tried to its end"
+    )
     assert (
         "brachis: the search was ended early; this is the best motion so far\n"
         in outcome.err
     )
     assert all(
-        f"brachis: left undone: {undone}\n" in outcome.err for undone in data["undone"]
+        f"brachis: not completed: {each}\n" in outcome.err
+        for each in data["not_completed"]
     )
 
 
@@ -289,13 +292,10 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     "command", [("verify", "gone.npz"), ("plan", "gone.yaml"), ("inspect", "gone.urdf")]
 )
 def test_interrupt_while_importing(command, run, monkeypatch):
-    def interrupt(name, *_arguments):
-        if name == "brachis.apps.cli.settings":
-            raise KeyboardInterrupt
-        return honest(name, *_arguments)
+    def interrupt(_name):
+        raise KeyboardInterrupt
 
-    honest = builtins.__import__
-    monkeypatch.setattr(builtins, "__import__", interrupt)
+    monkeypatch.setattr(main, "import_module", interrupt)
     outcome = run(*command)
     assert outcome.code == 130
     assert outcome.err == "brachis: interrupted\n"
@@ -320,7 +320,7 @@ def test_the_folder_of_a_motion_stands_for_it(run, planned, tmp_path):
     outcome = run("verify", tmp_path / "empty")
     assert outcome.code == 2
     assert (
-        "is a folder in which there is no motion; allowed: result.npz or unverified.npz"
+        "is a folder without a motion; allowed: result.npz or unverified.npz"
         in outcome.err
     )
 

@@ -120,15 +120,17 @@ def test_no_figure_is_guessed(run, tmp_path, missing):
 
 
 WRONG = {
-    "zero axis": (("--axis", "0,0,0"), ["axis: has no direction"]),
+    "zero axis": (("--axis", "0,0,0"), ["axis: is not a direction"]),
     "range upside down": (
         ("--range", "2", "-2"),
-        ["range: is empty; found [2, -2] m; allowed: low < high"],
+        [
+            "range: is not a range; found (2.0, -2.0); allowed: [low, high] in m, both finite, low < high"
+        ],
     ),
-    "negative mass": (("--mass", "-1"), ["mass: is not positive; found -1.0 kg"]),
+    "negative mass": (("--mass", "-1"), ["mass: is not positive; found -1.0"]),
     "angle not a number": (
         ("--mount-rpy-deg", "nan", "0", "0"),
-        ["mount_rpy: is wrong"],
+        ["mount_rpy: is not a rotation"],
     ),
     "taken name": (
         ("--name", "j1"),

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.apps.cli.output import progress
+from brachis.apps.cli.output import show_progress
 from support.effort import QUICK
 
 from .conftest import SCARA
@@ -287,7 +287,7 @@ def test_inputs_that_the_system_refuses(name, run, saved, tmp_path, monkeypatch)
 def test_progress_takes_names_with_brackets(monkeypatch, capfd):
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
-    with progress() as listener:
+    with show_progress() as listener:
         listener("looking at [/red]:x:")
     assert "[/red]:x:" in capfd.readouterr().err
 

@@ -112,7 +112,7 @@ def test_compare(run, recorded, tmp_path):
         ),
         (("--tolerance", "0"), "no tolerance of a path; found 0.0"),
         (("--noise", "-1"), "noise"),
-        ((), 'Degrees? Say so: units={"angle": "deg"}, or --angle deg'),
+        ((), 'If these are degrees, say units={"angle": "deg"}, or --angle deg'),
     ],
 )
 def test_wrong_options(run, recorded, tmp_path, options, told):

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from brachis.apps.sweeps import run as sweeps_run
-from brachis.apps.sweeps.pools import Outcome
+from brachis.apps.sweeps.plans import Outcome
 
 
 @pytest.fixture

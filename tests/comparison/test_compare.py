@@ -11,7 +11,8 @@ import pytest
 
 import brachis
 from brachis.apps import comparison
-from brachis.apps.comparison import compare, plot_today
+from brachis.apps.comparison import compare, plot_comparison
+from brachis.apps.comparison.comparison import tasks_of
 from brachis.robot import bind
 from support.effort import QUICK
 
@@ -64,15 +65,15 @@ def found(file, task):
 
 
 def test_the_path_is_recovered_and_the_plan_is_faster(found, today):
-    assert today.miss(found.today, DT) < 1e-6
+    assert today.miss(found.recorded, DT) < 1e-6
     assert found.result.verified
     assert 0.05 < found.saved < 0.5
-    assert found.saved == 1.0 - found.result.t_end / found.today.t_end
+    assert found.saved == 1.0 - found.result.t_end / found.recorded.t_end
     assert found.verdict.startswith(f"{100 * found.saved:.1f} % faster: ")
 
 
 def test_both_begin_in_one_posture_and_end_in_one_place(found):
-    planned, given = found.result.trajectory, found.today
+    planned, given = found.result.trajectory, found.recorded
     np.testing.assert_allclose(planned.q[0], given.q[0], atol=1e-9)
     _, task_map = bind(given.robot, given.task.task_space)
     off = task_map.difference(
@@ -85,17 +86,17 @@ def test_both_begin_in_one_posture_and_end_in_one_place(found):
 def test_the_limits_are_the_same_and_what_todays_motion_exceeds_is_said(found, today):
     assert [use.limit for use in found.uses] == ["torque", "velocity", "acceleration"]
     assert all(use.planned <= 1.0 + 1e-4 for use in found.uses)
-    worst = max(use.today for use in found.uses)
+    worst = max(use.recorded for use in found.uses)
     assert worst == pytest.approx(
         today.largest_ratio(), abs=1e-3
     )  # what the rows prove
-    assert all(use.today <= use.today_up_to for use in found.uses)
+    assert all(use.recorded <= use.recorded_up_to for use in found.uses)
     *exceeded, jumps = found.remarks  # as toppra's accelerations do at both ends
     assert "the plan may do so as well" in jumps
     assert bool(found.exceeded) == (worst > 1.0 + 1e-4) == bool(exceeded)
-    assert all("today's motion exceeds the" in remark for remark in exceeded)
+    assert all("the recorded motion exceeds the" in remark for remark in exceeded)
     data = json.loads(json.dumps(found.to_dict()))
-    assert data["t_end_today"] == found.today.t_end
+    assert data["t_end_today"] == found.recorded.t_end
     assert data["today_within_limits"] is (not found.exceeded)
     assert found.verdict in str(found)
 
@@ -122,29 +123,32 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
         brachis.verify_trajectory(rough),
     )
     coarse = dataclasses.replace(
-        found, today=rough, proven=proven, verification=verification
+        found, recorded=rough, proven=proven, verification=verification
     )
     assert verification.worst_ratio > 1.02  # the overshoot of a smoothing spline
     assert not coarse.exceeded
     assert not any("exceeds" in remark for remark in coarse.remarks)
-    use = max(coarse.uses, key=lambda use: use.today_up_to)
-    assert use.today_up_to == verification.worst_ratio
-    words = f"{use.limit}: {100 * use.today:.1f} %, between the rows up to {100 * use.today_up_to:.1f} % used today"
+    use = max(coarse.uses, key=lambda use: use.recorded_up_to)
+    assert use.recorded_up_to == verification.worst_ratio
+    words = f"{use.limit}: {use.recorded_text} used by the recorded motion"
+    assert use.recorded_text.endswith(
+        f", between the rows up to {100 * use.recorded_up_to:.1f} %"
+    )
     assert words in str(coarse)
-    *_, ratio = plot_today(coarse).axes
+    *_, ratio = plot_comparison(coarse).axes
     (band,) = ratio.collections
     assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(
-        use.today_up_to, rel=0.02
+        use.recorded_up_to, rel=0.02
     )
     assert ratio.lines[0].get_ydata().max() <= 1.0 + 1e-4
 
 
 def test_the_figure_shows_both(found):
-    figure = plot_today(found)
+    figure = plot_comparison(found)
     progress, speed, ratio = figure.axes
     for ax in (progress, speed, ratio):
         ends = sorted(line.get_xdata()[-1] for line in ax.lines[:2])
-        assert ends == pytest.approx([found.result.t_end, found.today.t_end])
+        assert ends == pytest.approx([found.result.t_end, found.recorded.t_end])
     assert progress.get_title() == found.verdict
     t, speeds = speed.lines[1].get_data()
     trajectory = found.result.trajectory
@@ -156,9 +160,9 @@ def test_the_figure_shows_both(found):
 
 
 def test_the_end_posture_may_be_kept(found):
-    kept = compare(found.today, keep_end=True)
+    kept = compare(found.recorded, keep_end=True)
     np.testing.assert_allclose(
-        kept.result.trajectory.q[-1], found.today.q[-1], atol=1e-6
+        kept.result.trajectory.q[-1], found.recorded.q[-1], atol=1e-6
     )
     assert kept.saved <= found.saved + 1e-3
 
@@ -174,19 +178,17 @@ def test_where_the_first_plan_is_slower_others_are_made(found, monkeypatch):
     class Planned(Exception):  # noqa: N818
         pass
 
-    monkeypatch.setattr(sys.modules["brachis.apps.comparison.planned"], "plan", plan)
+    monkeypatch.setattr(sys.modules["brachis.apps.comparison.comparison"], "plan", plan)
     with pytest.raises(Planned):
-        compare(found.today)
+        compare(found.recorded)
     assert wanted == [(12, ("x", "y")), (36, ("x", "y")), (36, "joints")]
 
 
 def test_the_joint_path_of_today_is_timed(found):
-    from brachis.apps.comparison.planned import _tasks
-
-    *_, last = _tasks(found.today, keep_end=False)
-    result = brachis.plan(found.today.robot, last)
+    *_, last = tasks_of(found.recorded, keep_end=False)
+    result = brachis.plan(found.recorded.robot, last)
     assert result.verified
-    assert result.t_end < 1.02 * found.today.t_end
+    assert result.t_end < 1.02 * found.recorded.t_end
     assert brachis.compare is comparison.compare
 
 

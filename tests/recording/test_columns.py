@@ -20,7 +20,7 @@ def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
     )  # 3.5e-11 rad in the first millisecond
     found = read_recording(write("t,j1,j2,j3", t, way, -way, 0.5 * way), ROBOT, Units())
     assert found.t[-1] == 1.0
-    assert not any("stands still" in line for line in found.told)
+    assert not any("stands still" in line for line in found.notes)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_columns_in_any_order_and_others_beside_them(table, write):
     found = read_recording(path, ROBOT, Units())
     np.testing.assert_array_equal(found.q, q)
     np.testing.assert_array_equal(found.qdot, qdot)
-    assert "left out the columns j1_effort" in found.told
+    assert "left out the columns j1_effort" in found.notes
 
 
 def test_semicolons_and_decimal_commas(table, tmp_path):
@@ -109,11 +109,11 @@ def test_standing_still_before_and_after_does_not_count(table, write):
     assert len(found.t) == len(t)
     assert (
         "left out 0.036 s before the motion, in which the robot stands still (9 rows)"
-        in found.told
+        in found.notes
     )
     assert (
         "left out 0.02 s after the motion, in which the robot stands still (5 rows)"
-        in found.told
+        in found.notes
     )
 
 
@@ -126,7 +126,7 @@ def test_standing_still_before_and_after_does_not_count(table, write):
             r"line 1: the position of 'j3' is missing; found t, j1, j2, j4; allowed: t, then j1, j2, j3",
         ),
         ("x,j1,j2,j3", {}, "the time is missing"),
-        ("t,j1,j1,j3", {}, "the position of 'j1' stands there twice"),
+        ("t,j1,j1,j3", {}, "the position of 'j1' is given twice"),
         (
             "t,j1 [grad],j2,j3",
             {},
@@ -168,7 +168,7 @@ def test_rows_that_are_no_motion(table, write):
         read_recording(write("t,j1,j2,j3", t, 0.0 * q), ROBOT, Units())
     with pytest.raises(
         TaskError,
-        match=r"an angle is hardly meant; found [0-9.]+ rad at j1. Degrees\? Say so",
+        match=r"implausible angle \(degrees\?\); found [0-9.]+ rad at j1. If these are degrees, say",
     ):
         read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, Units())
     with pytest.raises(TaskError, match="there is no such file"):

@@ -84,10 +84,10 @@ def test_the_rows_of_a_file_of_schema_2_are_not_known(imported, tmp_path):
     found = comparison.Comparison(again, verify_trajectory(again), (), result)
     assert found.uses == ()
     assert found.to_dict()["today_within_limits"] is None
-    assert "the rows of today's motion are not known" in str(found)
+    assert "the rows of the recorded motion are not known" in str(found)
     assert "prove" not in str(found)
     assert "between its rows" not in str(
-        comparison.plot_today(found).axes[2].get_legend_handles_labels()[1]
+        comparison.plot_comparison(found).axes[2].get_legend_handles_labels()[1]
     )
 
 
@@ -221,13 +221,13 @@ def test_few_digits_of_a_rail_say_nothing_of_the_joints(write):
     nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
     assert (
         "positions in m, velocities and accelerations of a smoothing spline, 2.9e-05 m (rms) off"
-        in nodes.told
+        in nodes.notes
     )
-    assert not any("rad" in line for line in nodes.told)
+    assert not any("rad" in line for line in nodes.notes)
     exact = [joint for joint in range(robot.n) if joint != rail]
     assert set(nodes.q[:, exact].ravel()) >= set(recording.q[:, exact].ravel())
     again = nodes_of(recording, np.full(robot.n, 1e-4))
-    assert {line.split(",")[0] for line in again.told} == {
+    assert {line.split(",")[0] for line in again.notes} == {
         "positions in rad",
         "positions in m",
     }
@@ -283,7 +283,7 @@ def test_accelerations_that_jump_do_not_overshoot():
     fine = np.linspace(0.0, 2.0, 20001)
     assert np.abs(pieces(fine, nu=2)).max() < 1.005
     np.testing.assert_allclose(pieces(t), q, atol=1e-12)
-    assert "accelerations jump between 1 pair of rows" in nodes.told
+    assert "accelerations jump between 1 pair of rows" in nodes.notes
 
 
 def test_ends_in_motion(motion, table, write):

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 import brachis
-from brachis.apps.sweeps.pools import Outcome, as_completed, on_dask, pool_for
+from brachis.apps.sweeps.plans import Outcome
+from brachis.apps.sweeps.pools import as_completed, on_dask, pool_for
 from brachis.errors import ClusterError, InputError
 
 DASK = Path(sys.executable).with_name("dask")
@@ -67,7 +68,7 @@ def test_what_no_worker_can_run_ends_the_sweep():
     future.set_exception(ModuleNotFoundError("No module named 'brachis'"))
     with pytest.raises(
         ClusterError,
-        match="plans cannot be made there; found ModuleNotFoundError: No module",
+        match="workers failed to make plans; found ModuleNotFoundError: No module",
     ):
         next(as_completed([0], lambda _plan: future, lambda: 1))
 

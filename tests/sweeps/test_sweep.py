@@ -15,7 +15,7 @@ import yaml
 
 import brachis
 from brachis.apps.sweeps import run
-from brachis.apps.sweeps.pools import planned
+from brachis.apps.sweeps.plans import run_plan
 from brachis.errors import InputError, TaskError
 
 WAIT = 120.0
@@ -43,7 +43,7 @@ def here(monkeypatch):
     def pool(plans):
         for plan in plans:
             made.append(plan)
-            yield plan, planned(plan)
+            yield plan, run_plan(plan)
 
     monkeypatch.setattr(run, "pool_for", lambda *_settings: pool)
     return made
@@ -68,7 +68,7 @@ def test_workers_have_ended_when_an_outcome_cannot_be_stored(
     def pool(plans):
         try:
             for plan in plans:
-                yield plan, planned(plan)
+                yield plan, run_plan(plan)
         finally:
             ended.append(True)
 

@@ -1,21 +1,17 @@
-"""Making a first task: what to prescribe, where to begin and lead, and a plan that shows that it works.
+"""A first task for a robot: a posture far from limits and singularities, a straight line from it, and a plan of it.
 
-Where a first motion may begin and lead: a posture far from limits and singularities, and a straight line from it.
-
-Limits that a URDF leaves open and a plan needs: placeholders that the task file marks as such.
-
-What a robot's path can prescribe.
-
-The text of a first task, with comments that say what else there is.
+Limits that a plan needs and the URDF does not state get placeholders, which the task file marks as such.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -34,32 +30,21 @@ from brachis.robot.urdf import default_chain, read_chain, read_file
 from brachis.task import LimitSpec, load_task
 from brachis.task.yaml_reader import read_yaml
 
-_POSTURES = 400
-"""That are drawn at random."""
-_BEST = 4
-"""Of them that are looked at."""
 _INNER = 0.15
 """Part of a range, at each end, in which no motion begins."""
-_FARTHEST = 2.0
-"""From zero, rad or m, of a joint that may be nearer."""
-_DIGITS = 2
-"""Of a position in the task file."""
-_STEPS = 10
-"""Of a line that is followed."""
-_NEWTON = 6
-"""Corrections per step."""
-_ON_PATH = 1e-8
-_SHARE = 0.25
-"""Longest line, in lengths of the arm."""
 _LENGTHS = (1.0, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01)
-"""Of lines, m."""
+"""Lengths of lines, m."""
 _LEAST_DEXTERITY = 1e-3
-_KEPT = 0.4
-"""Of the dexterity of the first posture, everywhere on the line."""
-_CLEARANCE = 0.1
-"""Of the tool above the robot's base, in lengths of the arm, where the arm can."""
-_STRONGEST = 0.7
-"""Of a torque limit, that holding the arm may need."""
+"""Dexterity below which no motion begins."""
+_QUICK = {
+    "search.effort": "single",
+    "search.time_limit": 20.0,
+    "spline.intervals": 10,
+    "search.least_motion": False,
+}
+"""Keys of the plan by which a task is tried."""
+_LONGEST = 90.0
+"""Time after which no further task space is tried, s."""
 
 
 @dataclass(frozen=True)
@@ -86,34 +71,29 @@ def choices(task_map: TaskMap) -> Iterator[Choice]:
     seed.
     """
     robot = task_map.robot
-    postures = _drawn(robot)
-    reach = _reach(robot, postures)
-    for lowest in (_CLEARANCE * reach, -np.inf):
-        quality = _quality(task_map, postures, reach, lowest)
-        best = [
-            k for k in np.argsort(-quality)[:_BEST] if quality[k] > _LEAST_DEXTERITY
-        ]
-        for k in best:
-            line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
-            if line is not None:
-                yield Choice(postures[k], line)
-
-
-def _drawn(robot: Robot) -> np.ndarray:
-    """Draw postures in the inner part of all ranges, near zero where that is in it, with few digits."""
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    inner = _INNER * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
-    near = np.clip([[-_FARTHEST], [_FARTHEST]], lower + inner, upper - inner)
-    low, high = np.where(near[1] > near[0], near, [lower + inner, upper - inner])
-    drawn = np.random.default_rng(0).uniform(low, high, (_POSTURES, robot.n))
-    rounded = np.round(drawn, _DIGITS) + 0.0
-    return np.where((rounded > lower) & (rounded < upper), rounded, drawn)
-
-
-def _reach(robot: Robot, postures: np.ndarray) -> float:
-    """Return how far the tool gets about, m."""
+    postures = _draw_postures(robot)
     positions, _ = robot.tool_placements(postures)
-    return float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
+    reach = float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
+    for lowest in (0.1 * reach, -np.inf):
+        quality = _quality(task_map, postures, reach, lowest)
+        for k in np.argsort(-quality)[:4]:
+            if quality[k] > _LEAST_DEXTERITY:
+                line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
+                if line is not None:
+                    yield Choice(postures[k], line)
+
+
+def _draw_postures(robot: Robot) -> np.ndarray:
+    """Draw 400 postures in the inner part of all ranges, within 2 rad or m of zero if possible, with two digits."""
+    lower = robot.limits.position_lower
+    upper = robot.limits.position_upper
+    inner = _INNER * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    ends = np.array([lower + inner, upper - inner])
+    near = np.clip([[-2.0], [2.0]], *ends)
+    low, high = np.where(near[1] > near[0], near, ends)
+    drawn = np.random.default_rng(0).uniform(low, high, (400, robot.n))
+    rounded = np.round(drawn, 2) + 0.0
+    return np.where((rounded > lower) & (rounded < upper), rounded, drawn)
 
 
 def _quality(
@@ -128,117 +108,94 @@ def _quality(
     rows = np.where([unit == "m" for unit in task_map.units], 1.0 / reach, 1.0)
     columns = np.where(robot.revolute, 1.0, reach)
     jacobian = rows[:, None] * task_map.jacobian(task_map.twists(postures)) * columns
-    dexterity = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
+    quality = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
     rail = int(np.argmax(robot.revolute))  # slides before the first joint that turns
     if 0 < rail <= robot.n - task_map.m:
-        dexterity = np.minimum(
-            dexterity, np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1]
-        )
-    return (
-        dexterity
-        * (_holding(robot, postures) < _STRONGEST)
-        * (robot.heights(postures) >= lowest)
-    )
-
-
-def _holding(robot: Robot, postures: np.ndarray) -> np.ndarray:
-    """Return how much of its torque limits a robot needs to hold postures (K, n), at the joint that needs most."""
+        alone = np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1]
+        quality = np.minimum(quality, alone)
     still = np.zeros_like(postures)
     torque = rigid_torque(robot, postures, still, still)
-    return np.asarray(
-        np.max(
-            np.maximum(
-                torque / robot.limits.torque_upper, torque / robot.limits.torque_lower
-            ),
-            axis=1,
-        )
-    )
+    limits = robot.limits
+    shares = np.maximum(torque / limits.torque_upper, torque / limits.torque_lower)
+    quality[shares.max(axis=1) >= 0.7] = 0.0
+    quality[robot.heights(postures) < lowest] = 0.0
+    return quality
 
 
 def _line(
     task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, lowest: float
 ) -> np.ndarray | None:
-    """Find the longest line along an axis on which the arm stays about as dexterous; None where there is none."""
-    for length in (each for each in _LENGTHS if each <= _SHARE * reach):
-        rated = {}
-        for row in range(len(task_map.axes)):
-            for sign in (1.0, -1.0):
-                displacement = np.zeros(len(task_map.axes))
-                displacement[row] = sign * length
-                followed = _followed(task_map, posture, displacement)
-                if followed is not None:
-                    rated[row, sign] = (
-                        float(_quality(task_map, followed, reach, lowest).min()),
-                        displacement,
-                    )
-        worst, displacement = max(
-            rated.values(), key=lambda each: each[0], default=(0.0, np.zeros(0))
-        )
-        if worst > _KEPT * quality:
-            return displacement
+    """Find the longest line along an axis on which the arm keeps 0.4 of its dexterity; None if there is none."""
+    count = len(task_map.axes)
+    for length in _LENGTHS:
+        if length > 0.25 * reach:
+            continue
+        best = 0.4 * quality
+        line = None
+        for axis, sign in product(range(count), (1.0, -1.0)):
+            displacement = np.zeros(count)
+            displacement[axis] = sign * length
+            postures = _follow(task_map, posture, displacement)
+            if postures is not None:
+                worst = float(_quality(task_map, postures, reach, lowest).min())
+                if worst > best:
+                    best = worst
+                    line = displacement
+        if line is not None:
+            return line
     return None
 
 
-def _followed(
+def _follow(
     task_map: TaskMap, posture: np.ndarray, displacement: np.ndarray
 ) -> np.ndarray | None:
-    """Follow a line by small steps of least joint motion; None where a joint leaves its range or the line is lost."""
+    """Follow a line in 10 steps of least joint motion; None if a joint leaves its range or the line is lost."""
     robot = task_map.robot
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
     position, rotation = robot.tool_placements(posture[None])
     step = np.zeros(3)
-    step[list(task_map.axes)] = displacement / _STEPS
+    step[list(task_map.axes)] = displacement / 10
+    q = posture
     postures = [posture]
-    for k in range(1, _STEPS + 1):
-        target, q = (
-            task_map.of_placements(position + k * step, rotation)[0],
-            postures[-1],
-        )
-        for _ in range(_NEWTON):
+    for k in range(1, 11):
+        target = task_map.of_placements(position + k * step, rotation)[0]
+        for _ in range(6):
             error = task_map.difference(target, task_map.value(q))
-            if np.abs(error).max() < _ON_PATH:
+            if np.abs(error).max() < 1e-8:
                 break
-            q = (
-                q
-                + np.linalg.pinv(task_map.jacobian(task_map.twists(q[None]))[0]) @ error
-            )
+            jacobian = task_map.jacobian(task_map.twists(q[None]))[0]
+            q = q + np.linalg.pinv(jacobian) @ error
         else:
             return None
-        if np.any(q <= lower) or np.any(q >= upper):
+        is_low = q <= robot.limits.position_lower
+        is_high = q >= robot.limits.position_upper
+        if np.any(is_low | is_high):
             return None
         postures.append(q)
     return np.array(postures)
 
 
-_ACCELERATION = 1.0
-"""Placeholder, rad/s^2 or m/s^2: of a careful machine."""
-_RANGE = (-1.5, 1.5)
-"""Placeholder, rad or m."""
-
-
 def placeholders(names: Sequence[str], stated: Sequence[UrdfLimit]) -> LimitSpec:
     """Return limits for the joints of which a URDF states no usable ones; what it states stays.
 
-    Limits of zero, and a range from zero to zero, are what exporters write where there is none. Without a torque a
+    Limits of zero, and a range from zero to zero, are what exporters write for a missing limit. Without a torque a
     joint gets a limit of acceleration, since its time would go to zero otherwise.
     """
-    by_name = dict(zip(names, stated, strict=True))
-    weak = [name for name, limit in by_name.items() if not limit.effort]
-    slow = [name for name, limit in by_name.items() if not limit.velocity]
-    open_ended = [
-        name for name, limit in by_name.items() if limit.needs_range or _is_empty(limit)
-    ]
-    given: dict[str, dict[str, object]] = {
-        "torque": dict.fromkeys(weak),
-        "acceleration": dict.fromkeys(weak, _ACCELERATION),
-        "velocity": dict.fromkeys(slow),
-        "position": dict.fromkeys(open_ended, _RANGE),
+    given: dict[str, dict[str, Any]] = {
+        "torque": {},
+        "acceleration": {},
+        "velocity": {},
+        "position": {},
     }
+    for name, limit in zip(names, stated, strict=True):
+        if not limit.effort:
+            given["torque"][name] = None
+            given["acceleration"][name] = 1.0  # rad/s^2 or m/s^2: a careful machine
+        if not limit.velocity:
+            given["velocity"][name] = None
+        is_empty = limit.lower is not None and limit.lower == limit.upper
+        if limit.needs_range or is_empty:
+            given["position"][name] = (-1.5, 1.5)  # rad or m
     return LimitSpec(**{kind: values for kind, values in given.items() if values})  # type: ignore[arg-type]
-
-
-def _is_empty(limit: UrdfLimit) -> bool:
-    return limit.lower is not None and limit.lower == limit.upper
 
 
 def spaces(robot: Robot) -> Iterator[str | list[str]]:
@@ -305,85 +262,58 @@ def task_text(
     folder : Path
         Where the file will be.
     """
-    degree = robot.n - (6 if space == "pose" else len(space))
+    source = Path(robot.source)
+    redundant = robot.n - (6 if space == "pose" else len(space))
+    base = f"\n  base_frame: {_inline(robot.base_frame)}"
+    # Relative, if the URDF is in a folder near the task file.
+    urdf = os.path.relpath(source.absolute(), folder.absolute())
+    if urdf.startswith("../../.."):
+        urdf = str(source.absolute())
     return _TEXT.format(
-        name=Path(robot.source).parent.name
-        if Path(robot.source).name == "robot.urdf"
-        else Path(robot.source).name,
-        urdf=_inline(_near(Path(robot.source), folder)),
+        name=source.parent.name if source.name == "robot.urdf" else source.name,
+        urdf=_inline(urdf),
         tool=_inline(robot.tool_frame),
-        base=f"\n  base_frame: {_inline(robot.base_frame)}"
-        if robot.settings.base_frame
-        else "",
+        base=base if robot.settings.base_frame else "",
         limits=_limits(robot, limits),
         joints="\n".join(_joint(robot, i, choice.posture[i]) for i in range(robot.n)),
         space=_inline(space),
-        degree=f"{write_count(robot.n, 'joint')}: {degree or 'none is'} redundant",
-        by=_inline([float(each) for each in choice.displacement]),
+        degree=f"{write_count(robot.n, 'joint')}: {redundant or 'none is'} redundant",
+        by=_inline(choice.displacement.tolist()),
     )
 
 
 def _inline(value: object) -> str:
     """Write a value as YAML on one line, with quotes where it needs them."""
-    return (
-        yaml.safe_dump(value, default_flow_style=True, width=10_000)
-        .removesuffix("...\n")
-        .strip()
-    )
-
-
-def _near(urdf: Path, folder: Path) -> str:
-    """Return the URDF's path as the task file names it: relative where it is in a folder beside, absolute else."""
-    relative = os.path.relpath(urdf.absolute(), folder.absolute())
-    return str(urdf.absolute()) if relative.startswith("../../..") else relative
+    text = yaml.safe_dump(value, default_flow_style=True, width=10_000)
+    return text.removesuffix("...\n").strip()
 
 
 def _joint(robot: Robot, i: int, position: float) -> str:
-    low, high = robot.limits.position_lower[i], robot.limits.position_upper[i]
+    low = robot.limits.position_lower[i]
+    high = robot.limits.position_upper[i]
     unit = robot.position_units[i]
     allowed = f", {low:.4g} to {high:.4g}" if np.isfinite([low, high]).any() else ""
     return f"    {_inline(robot.joint_names[i])}: {_inline(float(position))}    # {unit}{allowed}"
 
 
 def _limits(robot: Robot, limits: LimitSpec) -> str:
-    """Write the placeholders, or how to change limits where none are needed."""
-    given = {each.name: getattr(limits, each.name) for each in fields(limits)}
-    needed = {
-        kind: values for kind, values in given.items() if isinstance(values, dict)
-    }
-    if not needed:
-        return _OWN_LIMITS.format(
-            joint=_inline(robot.joint_names[0]),
-            torque=_inline(float(f"{robot.limits.torque_upper[0]:.4g}")),
-            unit=UNITS["torque"][robot.position_units[0]],
-        )
-    return "\n".join(
-        (
-            _PLACEHOLDERS,
-            *(
-                f"    {kind}: {_inline(_lists(values))}"
-                for kind, values in needed.items()
-            ),
-        )
+    """Write the placeholders, or how to change limits if none are needed."""
+    lines = []
+    for each in fields(limits):
+        values = getattr(limits, each.name)
+        if isinstance(values, dict):
+            plain = {
+                name: list(value) if isinstance(value, tuple) else value
+                for name, value in values.items()
+            }
+            lines.append(f"    {each.name}: {_inline(plain)}")
+    if lines:
+        return "\n".join([_PLACEHOLDERS, *lines])
+    return _OWN_LIMITS.format(
+        joint=_inline(robot.joint_names[0]),
+        torque=_inline(float(f"{robot.limits.torque_upper[0]:.4g}")),
+        unit=UNITS["torque"][robot.position_units[0]],
     )
-
-
-def _lists(values: dict[str, object]) -> dict[str, object]:
-    return {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in values.items()
-    }
-
-
-_SOON = {
-    "search.effort": "single",
-    "search.time_limit": 20.0,
-    "spline.intervals": 10,
-    "search.least_motion": False,
-}
-"""Keys of the plan by which a task is tried."""
-_LONGEST = 90.0
-"""Time after which no further space is tried, s."""
 
 
 @dataclass(frozen=True)
@@ -420,14 +350,14 @@ def starter_task(
     folder : path, optional
         Where the task file will be; the URDF's path in it is relative to it where that is near.
     tool_frame, base_frame : str, optional
-        As in a task. By default the ends of the chain of most joints; see `default_chain`.
+        As in a task. By default the ends of the chain of most joints, as `default_chain` finds them.
     listener : callable, optional
-        Is told what is done.
+        Called with a text about each step.
 
     Raises
     ------
     UrdfError, UnknownNameError
-        See `Robot.from_urdf`.
+        As `Robot.from_urdf`.
     PlanningError
         No posture and line were found from which a plan was verified.
 
@@ -443,40 +373,34 @@ def starter_task(
     tell = listener or (lambda _text: None)
     path = Path(urdf)
     text = read_file(path)
-    base, tool = base_frame, tool_frame
-    if tool is None:
+    if tool_frame is None:
         limb = default_chain(text, str(path))
-        base, tool = base or limb.base, limb.tool
+        base_frame = base_frame or limb.base
+        tool_frame = limb.tool
     chain = read_chain(
-        text, str(path), tool_frame=tool, base_frame=base, locked_joints={}
+        text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints={}
     )
     limits = placeholders(chain.joint_names, chain.limits)
-    robot = Robot.from_urdf(path, tool_frame=tool, base_frame=base, limits=limits)
+    robot = Robot.from_urdf(
+        path, tool_frame=tool_frame, base_frame=base_frame, limits=limits
+    )
     deadline = Deadline.after(_LONGEST)
+    changes = {**_QUICK, "robot.urdf": str(path.absolute())}
     for space in spaces(robot):
-        tell(
-            f"looking for a first motion that prescribes {space if isinstance(space, str) else ', '.join(space)}"
-        )
+        words = space if isinstance(space, str) else ", ".join(space)
+        tell(f"looking for a first motion that prescribes {words}")
         bound, task_map = bind(robot, space)
         for choice in () if deadline.passed else choices(task_map):
             written = task_text(bound, space, choice, limits, Path(folder))
-            result = _tried(written, path, tell)
-            if result is not None and result.verified:
-                return Starter(written, bound, result)
+            content: Any = read_yaml(written, "starter task")
+            task = load_task(content, changes=changes)
+            with suppress(PlanningError):
+                result = planner.plan(task, listener=tell, check_advice=False)
+                if result.verified:
+                    return Starter(written, bound, result)
     raise PlanningError(
         "no first motion was found",
         where=str(path),
         found=f"chain {robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}",
         hint="Name another tool frame; brachis inspect shows limits and closed forms",
     )
-
-
-def _tried(text: str, urdf: Path, listener: Callable[[str], None]) -> Result | None:
-    """Plan a task quickly; None where there is no plan."""
-    content = read_yaml(text, "starter task")
-    assert isinstance(content, dict)
-    task = load_task(content, changes={**_SOON, "robot.urdf": str(urdf.absolute())})
-    try:
-        return planner.plan(task, listener=listener, check_advice=False)
-    except PlanningError:
-        return None

@@ -1,7 +1,4 @@
-"""The application: help, exit codes, and options that all or several commands have.
-
-`brachis.apps.cli.main` adds the commands.
-"""
+"""The Typer application: help, exit codes, and the options that several commands share."""
 
 from __future__ import annotations
 
@@ -67,23 +64,23 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "brachis sweep lines.yaml --retry  # goes on where it was ended",
     ),
 }
-"""By command; those of the whole program under no name. They work in this order, given a sweep file ``lines.yaml``."""
+"""Examples in the help, by command; those of the whole program under "". They work in this order, with a sweep file."""
 
 
 class Verbosity(IntEnum):
-    """How much is said besides errors, and besides the JSON or file that was asked for."""
+    """How much a command prints besides errors and what was asked for."""
 
     QUIET = 0
     NORMAL = 1
     VERBOSE = 2
 
 
-_CHOSEN = ContextVar("verbosity", default=Verbosity.NORMAL)
+_VERBOSITY = ContextVar("verbosity", default=Verbosity.NORMAL)
 
 
-def chosen() -> Verbosity:
+def get_verbosity() -> Verbosity:
     """Return what the command line asks for."""
-    return _CHOSEN.get()
+    return _VERBOSITY.get()
 
 
 class InterruptedByUserError(BrachisError):
@@ -96,7 +93,7 @@ class _Commands(TyperGroup):
     """Commands that the user may interrupt, with examples in their help, and the options of all commands."""
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
-        """Run a command, its imports included; however it ends, a press that nobody heard ends it."""
+        """Run a command, its imports included; Ctrl-C that nothing else handled ends it as an error."""
         try:
             with interrupts.interruptible():
                 return super().invoke(ctx)
@@ -105,7 +102,7 @@ class _Commands(TyperGroup):
             raise InterruptedByUserError(message) from interrupt
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]
-        """Find a command, and give it what all of them have."""
+        """Find a command; add its examples, and the options that all commands have."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and command.epilog is None:
             command.epilog = _paragraphs("Examples", EXAMPLES.get(cmd_name, ()))
@@ -115,7 +112,7 @@ class _Commands(TyperGroup):
         return command
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]
-        """Find a command by its name; a file in its place gets a hint."""
+        """Find a command by its name; where a file stands in its place, name the command that is missing."""
         if self.get_command(ctx, args[0]) is None and is_file(args[0]):
             command = "inspect" if Path(args[0]).suffix == ".urdf" else "plan"
             ctx.fail(f"A command comes before a file: brachis {command} {args[0]}")
@@ -123,7 +120,7 @@ class _Commands(TyperGroup):
 
 
 def _paragraphs(title: str, lines: tuple[str, ...]) -> str:
-    """Write lines that help leaves as they are: what stands in one can be copied."""
+    """Write lines that the help must not wrap, so that each can be copied."""
     return "\n  ".join((f"\b\n{title}:", *lines))
 
 
@@ -149,14 +146,10 @@ def _print_version(asked: bool) -> None:
         raise typer.Exit
 
 
-def _be_quiet(asked: bool) -> None:
+def _set_verbosity(option: typer.CallbackParam, asked: bool) -> None:
+    """Remember ``--quiet`` or ``--verbose``."""
     if asked:
-        _CHOSEN.set(Verbosity.QUIET)
-
-
-def _be_verbose(asked: bool) -> None:
-    if asked:
-        _CHOSEN.set(Verbosity.VERBOSE)
+        _VERBOSITY.set(Verbosity[str(option.name).upper()])
 
 
 @app.callback()
@@ -175,7 +168,7 @@ def options(
         typer.Option(
             "--quiet",
             "-q",
-            callback=_be_quiet,
+            callback=_set_verbosity,
             expose_value=False,
             help="Print errors only, and JSON if asked for.",
         ),
@@ -185,7 +178,7 @@ def options(
         typer.Option(
             "--verbose",
             "-v",
-            callback=_be_verbose,
+            callback=_set_verbosity,
             expose_value=False,
             help="Say on standard error what is done and when; tracebacks.",
         ),
@@ -195,11 +188,20 @@ def options(
     del version, quiet, verbose
 
 
+Json = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on standard output.")
+]
+Degrees = Annotated[
+    bool,
+    typer.Option(
+        "--degrees", help="Show angles in degrees; files and JSON stay in rad."
+    ),
+]
 Strict = Annotated[
     bool | None,
     typer.Option(
         "--strict/--no-strict",
-        help="Refuse all implausible figures, such as degrees for rad, or warn of them all; otherwise only a start "
+        help="Refuse all implausible figures, such as degrees for rad, or only warn of them. Default: only a start "
         "posture that looks like degrees is refused.",
     ),
 ]
@@ -212,9 +214,8 @@ Changes = Annotated[
         "Repeatable.",
     ),
 ]
-Degrees = Annotated[
-    bool,
-    typer.Option(
-        "--degrees", help="Show angles in degrees; files and JSON stay in rad."
-    ),
+Urdf = Annotated[
+    Path | None, typer.Option(help="URDF file to use instead of the task's.")
 ]
+ToolFrame = Annotated[str | None, typer.Option(help="Link at the end of the chain.")]
+BaseFrame = Annotated[str | None, typer.Option(help="Link at the start of the chain.")]

@@ -1,4 +1,7 @@
-"""Writing files: the results all or none, figures beside them where they can be, and nothing over other files."""
+"""Writing files: results all or none, figures if they can be written, and nothing over files of others.
+
+Then how a command ends that makes a motion: its files, its answer, what was not completed, its exit code.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,18 @@ import shutil
 import signal
 import stat
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING, Any
 
+from brachis.apps.cli.output import (
+    json_text,
+    print_error,
+    print_json,
+    result_console,
+)
 from brachis.common.files import (
     atomic_write,
     is_folder,
@@ -20,6 +29,9 @@ from brachis.common.files import (
     writing_errors,
 )
 from brachis.errors import InputError
+
+if TYPE_CHECKING:
+    from brachis.result import Result
 
 Writer = Callable[[Path], object]
 """Writes one file to a path."""
@@ -41,37 +53,20 @@ BEGINNINGS = {
     ".urdf": (b"<?xml", b"<robot"),
     ".yaml": (b"# trajectory_msgs/msg/JointTrajectory",),
 }
-"""How files of our own begin, by suffix; what begins otherwise is somebody else's and is not written over."""
-
-
-@dataclass(frozen=True)
-class Written:
-    """What became of files.
-
-    Attributes
-    ----------
-    files : tuple of str
-        Paths of those that were written.
-    failures : tuple of InputError
-        One for each figure that could not be written.
-    """
-
-    files: tuple[str, ...]
-    failures: tuple[InputError, ...]
+"""How files that brachis wrote begin, by suffix; a file that begins otherwise is never written over."""
 
 
 def check_output(
     out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]
 ) -> None:
-    """Refuse to write over one of the command's inputs, or over a file that is not of the kind that it writes.
+    """Refuse to write over an input of the command, or over a file that brachis did not write.
 
     Parameters
     ----------
     out : Path
-        What will be written. A new file may have any name, and what is no regular file (``/dev/stdout``) is not looked
-        at.
+        What will be written. A new file may have any name; devices such as ``/dev/stdout`` are not checked.
     suffixes : iterable of str
-        Those of the format, of `BEGINNINGS`.
+        Suffixes of the format, keys of `BEGINNINGS`.
     inputs : iterable of Path or None
         Files that the command reads.
 
@@ -84,13 +79,14 @@ def check_output(
     if status is None or not stat.S_ISREG(status.st_mode):
         return
     for path in inputs:
-        if path is not None and _same(out, path):
-            raise InputError(
-                "would be written over an input",
-                where=str(out),
-                found="the same file",
-                allowed="another file name",
-            )
+        with suppress(OSError):  # an input that cannot be read is another file
+            if path is not None and out.samefile(path):
+                raise InputError(
+                    "would be written over an input",
+                    where=str(out),
+                    found="the same file",
+                    allowed="another file name",
+                )
     suffix, allowed = out.suffix.lower(), tuple(suffixes)
     if suffix not in allowed:
         raise InputError(
@@ -110,45 +106,17 @@ def check_output(
         )
 
 
-def _same(out: Path, path: Path) -> bool:
-    """Tell whether two names are of one file; one that cannot be looked at is not the one that we can write."""
-    try:
-        return out.samefile(path)
-    except OSError:
-        return False
-
-
-def make_folder(out: Path, names: Iterable[str], inputs: Iterable[Path | None]) -> None:
-    """Make a folder where there is none, and refuse what `check_output` refuses for files of these names.
-
-    Raises
-    ------
-    InputError
-        It cannot be made, or one of the files is not ours to write.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or str(error)
-        raise InputError(
-            "the folder cannot be made", where=str(out), found=found
-        ) from error
-    inputs = tuple(inputs)
-    for name in names:
-        check_output(out / name, (Path(name).suffix,), inputs)
-
-
 def write_files(
     out: Path,
     results: Mapping[str, Writer],
     figures: Mapping[str, Writer],
     *,
     stale: Iterable[str] = (),
-) -> Written:
+) -> tuple[list[str], list[InputError]]:
     """Write results, all or none, and then the figures that can be written.
 
-    The results are written into a temporary folder and then moved, so that a failure leaves the folder as it was. Then
-    all older figures are removed before new ones are written: they belong to another result.
+    The results are written into a temporary folder and then moved, so that a failure leaves the folder as it was. Older
+    figures are removed before new ones are written, because they show another result.
 
     Parameters
     ----------
@@ -157,11 +125,14 @@ def write_files(
     results, figures : mapping of str to callable
         Names, and what writes each.
     stale : iterable of str, optional
-        Files that are removed: the new ones take their place.
+        Older files to remove.
 
     Returns
     -------
-    Written
+    list of str
+        Paths of the files that were written.
+    list of InputError
+        One for each figure that could not be written.
 
     Raises
     ------
@@ -175,23 +146,23 @@ def write_files(
                 where=str(out / name),
                 found="a folder of this name",
             )
-    with ended_cleanly():
+    written = [str(out / name) for name in results]
+    failures = []
+    with end_cleanly():
         _write_results(out, results, (*stale, *figures))
-        failures = []
         for name, write in figures.items():
             try:
                 write(out / name)
+                written.append(str(out / name))
             except InputError as error:
                 failures.append(error)
-    failed = {error.where for error in failures}
-    paths = (str(out / name) for name in (*results, *figures))
-    return Written(tuple(path for path in paths if path not in failed), tuple(failures))
+    return written, failures
 
 
 def _write_results(
     out: Path, results: Mapping[str, Writer], others: Iterable[str]
 ) -> None:
-    """Write files aside, remove `others`, and move the new files to their places."""
+    """Write results into a temporary folder, remove `others`, and move the results to their places."""
     temporary = temporary_in(out)
     with writing_errors(out):
         temporary.mkdir()
@@ -221,7 +192,7 @@ def write_one(
 ) -> None:
     """Write one file, unless it would take the place of what `check_output` protects."""
     check_output(out, suffixes, inputs)
-    with ended_cleanly():
+    with end_cleanly():
         write(out)
 
 
@@ -232,7 +203,7 @@ def write_text(text: str, path: Path) -> None:
 
 
 @contextmanager
-def ended_cleanly() -> Iterator[None]:
+def end_cleanly() -> Iterator[None]:
     """Let SIGTERM leave the block as an exception does, so that temporary files are removed."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -246,3 +217,115 @@ def ended_cleanly() -> Iterator[None]:
 
 def _leave(number: int, _frame: FrameType | None) -> None:
     raise SystemExit(128 + number)
+
+
+_UNVERIFIED = {
+    "result.npz": "unverified.npz",
+    "result.json": "unverified.json",
+    "overview.png": "unverified.png",
+    "today.npz": "today.npz",
+}
+"""Names of files of a motion that is not verified; all others get the prefix ``unverified_``."""
+
+
+def _name_files(names: Iterable[str], *, verified: bool) -> list[str]:
+    """Return the names of files of a motion."""
+    if verified:
+        return list(names)
+    return [_UNVERIFIED.get(name, f"unverified_{name}") for name in names]
+
+
+def make_folder(
+    out: Path | None, names: Sequence[str], inputs: Iterable[Path | None]
+) -> None:
+    """Make the folder for a motion's files, and refuse what `check_output` refuses; without a folder do nothing.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be made, or holds a file of others under one of these names.
+    """
+    if out is None:
+        return
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        found = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            "the folder cannot be made", where=str(out), found=found
+        ) from error
+    inputs = tuple(inputs)
+    for verified in (True, False):
+        for name in _name_files(names, verified=verified):
+            check_output(out / name, (Path(name).suffix,), inputs)
+
+
+def finish(
+    data: dict[str, Any],
+    writers: Mapping[str, Writer],
+    *,
+    out: Path | None,
+    names: Sequence[str],
+    verified: bool,
+    show: Callable[[], None] | None,
+    result: Result | None,
+    complaint: str,
+) -> int:
+    """Write a motion's files, print the answer and what was not completed, and return the exit code.
+
+    Parameters
+    ----------
+    data : dict
+        The answer: content of the JSON file, and of ``--json``, which also lists the files.
+    writers : mapping of str to callable
+        What writes the files, by name.
+    out : Path or None
+        Folder; None: no files.
+    names : sequence of str
+        Files that the command may write; older ones are removed. Figures end in ``.png``.
+    verified : bool
+    show : callable or None
+        Prints the answer for a person; None: it is printed as JSON.
+    result : Result or None
+        Result of a search.
+    complaint : str
+        Message for a motion that is not verified.
+    """
+    failures: list[InputError] = []
+    if out is not None:
+        results: dict[str, Writer] = {}
+        figures: dict[str, Writer] = {}
+        stale = set(_name_files(names, verified=not verified))
+        for name, own in zip(names, _name_files(names, verified=verified), strict=True):
+            if name in writers:
+                kind = figures if name.endswith(".png") else results
+                kind[own] = writers[name]
+            elif name.endswith(".json"):
+                results[own] = lambda path: write_text(json_text(data), path)
+            else:
+                stale.add(own)
+        data["files"], failures = write_files(
+            out, results, figures, stale=stale - {*results}
+        )
+    if show is None:
+        print_json(data)
+    else:
+        show()
+        for name in data.get("files", ()):
+            result_console().print(f"wrote {name}")
+    if result is not None and result.interrupted:
+        print_error("the search was ended early; this is the best motion so far")
+    for each in result.not_completed if result is not None else ():
+        print_error(f"not completed: {each}")
+    if not verified:
+        print_error(complaint)
+    return exit_code(verified, failures)
+
+
+def exit_code(verified: bool, failures: Iterable[InputError]) -> int:
+    """Print which figures could not be written, and return the exit code of a motion."""
+    code = 0
+    for failure in failures:
+        print_error(f"the result is written, this figure is not: {failure}")
+        code = 3
+    return code if verified else 1

@@ -10,33 +10,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from brachis.apps.cli.app import Changes, Degrees
-from brachis.apps.cli.output import (
-    Column,
-    Json,
-    print_json,
-    print_table,
-    result_console,
-)
-from brachis.common import interrupts
+import brachis
+from brachis.apps.cli.app import BaseFrame, Changes, Degrees, Json, ToolFrame
+from brachis.apps.cli.output import print_json, print_table, result_console
+from brachis.apps.cli.settings import changed_task, task_space_of, urdf_of
+from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
 from brachis.errors import InputError, write_count
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from brachis import ik
     from brachis.robot import Robot
     from brachis.task import FitReport, Task
 
 _NONE = "none"
-"""What a table shows where there is no limit and no friction."""
+"""What a table shows if there is no limit or no friction."""
+_MOST_REFUSED = 12
+"""Choices without a closed form that are listed on the screen."""
 _OTHER_TASKS = (
     "a whole pose is prescribed",
     "no whole pose is prescribed",
     "only for poses",
     "only for the position: x, y and z",
 )
-"""Reasons of families for other task spaces; they are left out where there are others."""
+"""Reasons of families for other task spaces; they are shown only if there are no others."""
 
 
 def inspect(
@@ -55,12 +51,8 @@ def inspect(
             "Default: the task's, or all that the robot can."
         ),
     ] = None,
-    tool_frame: Annotated[
-        str | None, typer.Option(help="Link at the chain's end.")
-    ] = None,
-    base_frame: Annotated[
-        str | None, typer.Option(help="Link at the chain's beginning.")
-    ] = None,
+    tool_frame: ToolFrame = None,
+    base_frame: BaseFrame = None,
     posture: Annotated[
         str | None,
         typer.Option(
@@ -79,19 +71,28 @@ def inspect(
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
-    with interrupts.defer():
-        from brachis import ik
-        from brachis.apps.cli.settings import task_space_of, urdf_of
-        from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
-        from brachis.problem.plausibility import of_robot
-        from brachis.robot import bind
-        from brachis.robot.from_task import in_use, robot_from_settings
+    from brachis.problem.plausibility import of_robot
+    from brachis.robot import bind
+    from brachis.robot.from_task import in_use, robot_from_settings
+
+    ik = brachis.ik
     remarks: list[str] = []
     task = None
-    space: str | Sequence[str] | None = task_space and task_space_of(task_space)
+    space: str | Sequence[str] | None = task_space_of(task_space)
     if source.suffix in TASK_SUFFIXES or kind_of(source) is Kind.TASK:
-        given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
-        task = _read_task(source, changes, given)
+        given = {
+            "--tool-frame": (tool_frame, "set robot.tool_frame in the task"),
+            "--base-frame": (base_frame, "set robot.base_frame in the task"),
+            "--lock": (lock, "set robot.locked_joints in the task"),
+        }
+        for option, (value, hint) in given.items():
+            if value:
+                raise InputError(
+                    "not allowed with a task file",
+                    where=option,
+                    hint=f"Leave the option away, and {hint}; or inspect the URDF",
+                )
+        task = changed_task(source, changes)
         robot = robot_from_settings(task.robot)
         space = space or task.task_space
     else:
@@ -129,20 +130,6 @@ def inspect(
         _print_robot(robot, task, data, degrees=degrees)
 
 
-def _read_task(path: Path, changes: list[str] | None, options: dict[str, Any]) -> Task:
-    """Load a task file; options that change the robot are refused."""
-    from brachis.apps.cli.settings import changed_task
-
-    for option, value in options.items():
-        if value:
-            raise InputError(
-                "not allowed with a task file",
-                where=option,
-                hint="Leave the option away, or inspect the URDF",
-            )
-    return changed_task(path, changes)
-
-
 def _print_robot(
     robot: Robot, task: Task | None, data: dict[str, Any], *, degrees: bool
 ) -> None:
@@ -154,14 +141,14 @@ def _print_robot(
         console.print(remark)
     rows = _joint_rows(robot, degrees=degrees)
     shown = [key for key in rows[0] if any(row[key] != _NONE for row in rows)]
-    columns = [Column(key, number=key not in {"joint", "type"}) for key in shown]
-    print_table(
-        console, "joints", columns, [[row[key] for key in shown] for row in rows]
-    )
+    cells = [[row[key] for key in shown] for row in rows]
+    print_table("joints", shown, cells, numbers={*shown} - {"joint", "type"})
     for name, text in data["in_use"].items():
         console.print(f"{name}: {text}")
-    if task is not None:
-        _print_points(task)
+    if task is not None and not task.fits:
+        console.print("no part of the path comes from points")
+    for fit in task.fits if task is not None else ():
+        _print_fit(fit)
     redundancy = data["degree_of_redundancy"]
     space = ", ".join(data["task_space"])
     console.print(f"task space [{space}]: degree of redundancy {redundancy}")
@@ -178,11 +165,10 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
 
     The mass is that of the links that the joint carries up to the next one, with the payload at the last one.
     """
-    from brachis import ik
-    from brachis.robot.joints import UNITS
+    from brachis.robot.joints import UNITS, shown_unit
     from brachis.robot.limits import MAGNITUDES
 
-    geometry = ik.ChainGeometry.of(robot)
+    geometry = brachis.ik.ChainGeometry.of(robot)
     limits = robot.limits
     rows = []
     for i, (name, unit) in enumerate(
@@ -193,17 +179,18 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
             "joint": name,
             "type": "revolute" if geometry.revolute[i] else "prismatic",
             "axis at zero": " ".join(axis),
-            "range": _range(
-                (limits.position_lower[i], limits.position_upper[i]),
-                unit,
-                degrees=degrees,
-            ),
         }
+        pairs = {"range": (limits.position_lower[i], limits.position_upper[i], unit)}
         for kind in MAGNITUDES:
-            pair = limits.both_ways(kind)[:, i]
-            row[kind.replace("_", " ")] = _limit(
-                pair, UNITS[kind][unit], degrees=degrees
-            )
+            lower, upper = limits.both_ways(kind)[:, i]
+            pairs[kind.replace("_", " ")] = (lower, upper, UNITS[kind][unit])
+        for key, (lower, upper, si_unit) in pairs.items():
+            shown, factor = shown_unit(si_unit, degrees=degrees)
+            row[key] = f"{factor * lower:.4g} to {factor * upper:.4g} {shown}"
+            if lower == -upper and key != "range":
+                row[key] = f"{factor * upper:.4g} {shown}"
+            if (lower, upper) == (-float("inf"), float("inf")):
+                row[key] = _NONE
         row["mass"] = f"{robot.model.inertias[i + 1].mass:.4g} kg"
         for key in ("viscous", "coulomb", "armature"):
             value = getattr(robot.friction, key)[i]
@@ -212,66 +199,21 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     return rows
 
 
-def _range(pair: Sequence[float] | np.ndarray, unit: str, *, degrees: bool) -> str:
-    """Write two ends."""
-    import numpy as np
-
-    from brachis.robot.joints import shown_unit
-
-    if np.isinf(pair).all():
-        return _NONE
-    shown, factor = shown_unit(unit, degrees=degrees)
-    lower, upper = factor * np.asarray(pair)
-    return f"{lower:.4g} to {upper:.4g} {shown}"
-
-
-def _limit(pair: np.ndarray, unit: str, *, degrees: bool) -> str:
-    """Write a limit, or two if they differ in both directions."""
-    from brachis.robot.joints import shown_unit
-
-    shown, factor = shown_unit(unit, degrees=degrees)
-    lower, upper = factor * pair
-    if upper == float("inf"):
-        return _NONE
-    if -lower == upper:
-        return f"{upper:.4g} {shown}"
-    return f"{lower:.4g} to {upper:.4g} {shown}"
-
-
-def _print_points(task: Task) -> None:
-    """Print what was read from a task's files, and how near the fitted path is to it."""
-    console = result_console()
-    if not task.fits:
-        console.print("no part of the path comes from points")
-    for fit in task.fits:
-        print_table(console, fit.source, ("", ""), _fit_rows(fit), header=False)
-        if fit.corners:
-            _print_corners(fit)
-
-
-def _fit_rows(fit: FitReport) -> list[tuple[str, str]]:
-    passes = [] if fit.profile else [("path", "passes all points")]
-    position = f"(allowed {1e3 * fit.position_tolerance:.4g} mm), rms {1e3 * fit.position_rms:.3g} mm"
-    orientation = f"(allowed {in_degrees(fit.orientation_tolerance):.4g} deg)"
-    return [
-        ("points", f"{fit.points} along {1e3 * fit.length:.6g} mm"),
-        ("knot intervals", str(fit.intervals)),
-        *passes,
-        ("position error", f"at most {1e3 * fit.position_error:.4g} mm {position}"),
-        (
-            "orientation error",
-            f"at most {in_degrees(fit.orientation_error):.3g} deg {orientation}",
-        ),
-        *(("found", note) for note in (*fit.told, fit.doubt) if note),
-    ]
-
-
-def _print_corners(fit: FitReport) -> None:
-    columns = [
-        Column(name, number=True)
-        for name in ("row", "angle [deg]", "at [mm]", "blend [mm]")
-    ]
-    rows = [
+def _print_fit(fit: FitReport) -> None:
+    """Print what was read from a file of points, and how near the fitted path is to it."""
+    rows = {
+        "points": f"{fit.points} along {1e3 * fit.length:.6g} mm",
+        "knot intervals": str(fit.intervals),
+        "position error": f"at most {1e3 * fit.position_error:.4g} mm (allowed {1e3 * fit.position_tolerance:.4g} mm), "
+        f"rms {1e3 * fit.position_rms:.3g} mm",
+        "orientation error": f"at most {in_degrees(fit.orientation_error):.3g} deg "
+        f"(allowed {in_degrees(fit.orientation_tolerance):.4g} deg)",
+    }
+    if not fit.profile:
+        rows["path"] = "passes all points"
+    notes = [("found", note) for note in (*fit.told, fit.doubt) if note]
+    print_table(fit.source, ("", ""), [*rows.items(), *notes])
+    corners = [
         (
             corner.row,
             f"{in_degrees(corner.angle):.4g}",
@@ -280,48 +222,54 @@ def _print_corners(fit: FitReport) -> None:
         )
         for corner in fit.corners
     ]
-    print_table(
-        result_console(), "corners, blended within the tolerance", columns, rows
-    )
+    if corners:
+        columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
+        print_table(
+            "corners, blended within the tolerance", columns, corners, numbers=columns
+        )
 
 
 def _robot_of_urdf(
-    path: Path, tool_frame: str, base_frame: str | None, lock: list[str]
+    path: Path, tool_frame: str, base_frame: str | None, lock: Sequence[str]
 ) -> Robot:
-    """Make the robot of a URDF with the limits that the file states, which need not be usable ones."""
+    """Make the robot of a URDF with the limits that the file states; a plan refuses missing ones, inspect does not."""
     import numpy as np
 
-    from brachis.robot import Robot
-    from brachis.task import LimitSpec
-
-    # Which limits are missing is for the plan to say; here any robot is shown.
-    unlimited = LimitSpec(torque=None, velocity=None, acceleration=1.0)
-    robot = Robot.from_urdf(
+    locked = {}
+    for text in lock:
+        name, _, value = text.partition("=")
+        try:
+            locked[name] = float(value)
+        except ValueError as error:
+            raise InputError(
+                "is not understood",
+                where="--lock",
+                found=text,
+                allowed="name=value, rad or m",
+            ) from error
+    robot = brachis.Robot.from_urdf(
         path,
         tool_frame=tool_frame,
         base_frame=base_frame,
-        locked_joints=_locks(lock),
-        limits=unlimited,
+        locked_joints=locked,
+        limits=brachis.LimitSpec(torque=None, velocity=None, acceleration=1.0),
     )
-    stated = {
-        kind: np.array([np.inf if value is None else value for value in values])
-        for kind, values in (
-            ("velocity", [limit.velocity for limit in robot.urdf_limits]),
-            ("torque", [limit.effort for limit in robot.urdf_limits]),
-        )
-    }
-    return replace(
-        robot,
-        limits=robot.limits.with_magnitudes(
-            acceleration=np.full(robot.n, np.inf), **stated
-        ),
+
+    def magnitudes(values: Sequence[float | None]) -> np.ndarray:
+        return np.array([np.inf if value is None else value for value in values])
+
+    limits = robot.limits.with_magnitudes(
+        acceleration=np.full(robot.n, np.inf),
+        velocity=magnitudes([limit.velocity for limit in robot.urdf_limits]),
+        torque=magnitudes([limit.effort for limit in robot.urdf_limits]),
     )
+    return replace(robot, limits=limits)
 
 
 def _frames(
     urdf: Path, base: str | None, tool: str | None, remarks: list[str]
 ) -> tuple[str | None, str]:
-    """Take the first limb of the URDF where base and tool frame are not given, and say so where there is a choice."""
+    """Take the ends of the URDF's first limb if no tool frame is given, and say which other choices there are."""
     from brachis.robot.urdf import default_chain, read_file
 
     if tool is not None:
@@ -339,26 +287,8 @@ def _frames(
     return base or limb.base, limb.tool
 
 
-def _locks(lock: list[str]) -> dict[str, float]:
-    """Read ``name=value`` options."""
-    locked = {}
-    for text in lock:
-        name, _, value = text.partition("=")
-        try:
-            locked[name] = float(value)
-        except ValueError as error:
-            raise InputError(
-                "is not understood",
-                where="--lock",
-                found=text,
-                allowed="name=value, rad or m",
-            ) from error
-    return locked
-
-
 def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
-    """Describe one choice of redundant joints: its solver, or the reasons why there is none."""
-    solver = candidate.solver
+    """Describe one choice of redundant joints: its solver, or why it has none."""
     row: dict[str, Any] = {
         "redundant joints": ", ".join(candidate.redundant_joints) or "none",
         "solver": "-",
@@ -367,16 +297,15 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
         "why not": "",
         "remark": candidate.remark,
     }
+    solver = candidate.solver
     if solver is None:
-        reasons = {
-            family: reason
+        reasons = [
+            f"{family}: {reason}"
             for family, reason in candidate.reasons.items()
             if reason not in _OTHER_TASKS
-        }
-        row["why not"] = "; ".join(
-            f"{family}: {reason}"
-            for family, reason in (reasons or candidate.reasons).items()
-        )
+            or {*candidate.reasons.values()} <= {*_OTHER_TASKS}
+        ]
+        row["why not"] = "; ".join(reasons)
         return row
     several = f" (up to {solver.alternatives})" if solver.alternatives > 1 else ""
     row["solver"] = candidate.family
@@ -385,34 +314,35 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
     return row
 
 
-def _print_decompositions(rows: list[dict[str, Any]]) -> None:
+def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     """Print the choices that have a solver as a table, their branches, and the reasons against the others."""
     console = result_console()
     solved = [row for row in rows if row["solver"] != "-"]
+    refused = [row for row in rows if row["solver"] == "-"]
     columns = ["redundant joints", "solver", "branches"]
     if any(row["remark"] for row in solved):
         columns.append("remark")
     if solved:
         cells = [[row[name] for name in columns] for row in solved]
-        print_table(console, "choices of redundant joints", columns, cells)
-    for labels in dict.fromkeys(row["labels"] for row in solved):
-        choices = "; ".join(
-            row["redundant joints"] for row in solved if row["labels"] == labels
-        )
-        console.print(f"branches with {choices} redundant: {labels}")
-    refused = [row for row in rows if row["solver"] == "-"]
+        print_table("choices of redundant joints", columns, cells)
+    choices: dict[str, list[str]] = {}
+    for row in solved:
+        choices.setdefault(row["labels"], []).append(row["redundant joints"])
+    for labels, joints in choices.items():
+        console.print(f"branches with {'; '.join(joints)} redundant: {labels}")
     if refused:
         console.print(
             f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
         )
-    for row in refused[:12]:
+    for row in refused[:_MOST_REFUSED]:
         console.print(f"  {row['redundant joints']}: {row['why not']}")
-    if len(refused) > 12:
-        console.print(f"  ... and {len(refused) - 12} more, which --json lists")
+    if len(refused) > _MOST_REFUSED:
+        more = len(refused) - _MOST_REFUSED
+        console.print(f"  ... and {more} more, which --json lists")
 
 
 def _tool_pose(robot: Robot, text: str) -> str:
-    """Say where the tool is at a posture given as numbers, as ``path_start`` of a task of poses takes it."""
+    """Say where the tool is at a posture given as numbers, in the form of ``path_start`` in a task of poses."""
     import pinocchio as pin
 
     try:

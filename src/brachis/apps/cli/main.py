@@ -11,7 +11,8 @@ import traceback
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from contextvars import copy_context
-from functools import partial
+from functools import partial, wraps
+from importlib import import_module
 from typing import TextIO, cast
 
 import typer
@@ -24,17 +25,18 @@ from brachis.apps.cli import (
     starting,
     sweeps,
 )
-from brachis.apps.cli.app import Verbosity, app, chosen
+from brachis.apps.cli.app import Verbosity, app, get_verbosity
 from brachis.apps.cli.output import (
     StandardOutput,
     open_streams,
     print_failure,
     print_usage_error,
 )
+from brachis.common import interrupts
 from brachis.errors import BrachisError
 
 _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
-"""What Typer raises for wrong options; it names it nowhere else."""
+"""Base class of Typer's errors for wrong options; Typer does not export it."""
 
 _COMMANDS: dict[str, Callable[..., None]] = {
     "robots": starting.list_robots,
@@ -53,12 +55,24 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "sweep": sweeps.sweep,
     "schema": motions.schema,
 }
-"""By name, in the order of the help."""
+"""Commands by name, in the order of the help."""
+
+
+def _with_imports(command: Callable[..., None]) -> Callable[..., None]:
+    """Import the planner before a command runs; Ctrl-C waits meanwhile, because compiled libraries may swallow it."""
+
+    @wraps(command)
+    def run(**options: object) -> None:
+        with interrupts.defer():
+            import_module("brachis.planner")
+        command(**options)
+
+    return run
+
 
 for _name, _command in _COMMANDS.items():
-    app.command(_name, cls=starting.VectorCommand if _name == "compose" else None)(
-        _command
-    )
+    _class = starting.VectorCommand if _name == "compose" else None
+    app.command(_name, cls=_class)(_with_imports(_command))
 
 
 def main() -> None:
@@ -82,10 +96,10 @@ def _run(output: StandardOutput, *, as_json: bool) -> int | str | None:
         return print_failure(str(error), error.exit_code, as_json=as_json)
     except _UsageError as error:
         return print_usage_error(error, as_json=as_json)
-    except Exception as error:  # noqa: BLE001  (whatever it is, it is told and not raised)
+    except Exception as error:  # noqa: BLE001  (reported, not raised)
         if error is output.failure:
             return 1
-        if chosen() is Verbosity.VERBOSE:
+        if get_verbosity() is Verbosity.VERBOSE:
             traceback.print_exc()
         message = (
             f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "

@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from brachis.apps.cli.app import Degrees, Verbosity, chosen
+import brachis
+from brachis.apps.cli.app import Degrees, Json, Verbosity, get_verbosity
 from brachis.apps.cli.folder import write_one, write_text
 from brachis.apps.cli.output import (
-    Json,
     json_text,
     print_error,
     print_json,
     print_verification,
     result_console,
-    shown_warnings,
+    show_warnings,
 )
+from brachis.apps.cli.settings import motion_file
 from brachis.common import interrupts
 from brachis.common.files import read_file
 from brachis.errors import UnknownNameError
@@ -49,20 +50,17 @@ def verify(
     json: Json = False,
 ) -> None:
     """Check a saved motion again: path, limits, ends."""
-    with interrupts.defer():
-        from brachis.apps.cli.settings import motion_file
-        from brachis.robot.from_task import robot_from_settings
-        from brachis.trajectory import Trajectory
-        from brachis.verify import verify_trajectory
-    trajectory = Trajectory.load(motion_file(result))
-    robot = (
-        None if urdf is None else robot_from_settings(trajectory.task.robot, urdf=urdf)
-    )
-    verification = verify_trajectory(trajectory, robot=robot)
+    from brachis.robot.from_task import robot_from_settings
+
+    _, trajectory = _load(result)
+    robot = None
+    if urdf is not None:
+        robot = robot_from_settings(trajectory.task.robot, urdf=urdf)
+    verification = brachis.verify_trajectory(trajectory, robot=robot)
     if json:
         print_json(verification.to_dict())
     else:
-        print_verification(result_console(), verification, degrees=degrees)
+        print_verification(verification, degrees=degrees)
     raise typer.Exit(0 if verification.passed else 1)
 
 
@@ -110,8 +108,7 @@ def export(
     ] = 1.0,
 ) -> None:
     """Sample a saved motion for a controller, or animate it."""
-    with interrupts.defer():
-        from brachis.apps import export as formats
+    formats = brachis.export
     result, trajectory = _load(result)
     settings = formats.format_of(out, form)
     names = None if joints is None else [name.strip() for name in joints.split(",")]
@@ -121,7 +118,7 @@ def export(
             trajectory, path, form=form, dt=dt, last=last, joints=names, slower=slower
         )
 
-    with shown_warnings():
+    with show_warnings():
         _write_motion(out, write, (settings.suffix,), result, trajectory)
     period = settings.dt if dt is None else dt
     if period > trajectory.t_end:
@@ -142,17 +139,18 @@ def plot(
     ] = "overview",
 ) -> None:
     """Draw a saved motion."""
-    with interrupts.defer():
-        from brachis.apps.plots import PLOTS, SUFFIXES, check_suffix, save_figure
-    if kind not in PLOTS:
-        raise UnknownNameError("figure", kind, PLOTS, where="--kind")
+    from brachis.apps.plots import SUFFIXES, check_suffix
+
+    plots = brachis.plots
+    if kind not in plots.PLOTS:
+        raise UnknownNameError("figure", kind, plots.PLOTS, where="--kind")
     check_suffix(out)
     result, trajectory = _load(result)
-    suffixes = [f".{suffix}" for suffix in SUFFIXES]
 
     def write(path: Path) -> None:
-        save_figure(PLOTS[kind](trajectory), path)
+        plots.save_figure(plots.PLOTS[kind](trajectory), path)
 
+    suffixes = [f".{suffix}" for suffix in SUFFIXES]
     _write_motion(out, write, suffixes, result, trajectory)
     result_console().print(f"wrote {out}")
 
@@ -174,13 +172,11 @@ def report(
     degrees: Degrees = False,
 ) -> None:
     """Write a saved motion as one HTML page to judge it by."""
-    with interrupts.defer():
-        from brachis.apps.report import make_report
     result, trajectory = _load(result)
     out = result.with_suffix(".html") if out is None else out
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
-    page = make_report(trajectory, title=title, degrees=degrees)
+    page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
     _write_motion(out, page.save, (".html",), result, trajectory)
     result_console().print(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
@@ -192,11 +188,8 @@ def report(
 
 def _load(result: Path) -> tuple[Path, Trajectory]:
     """Load a motion from its file or folder; returns the file too."""
-    with interrupts.defer():
-        from brachis.apps.cli.settings import motion_file
-        from brachis.trajectory import Trajectory
     result = motion_file(result)
-    return result, Trajectory.load(result)
+    return result, brachis.Trajectory.load(result)
 
 
 def _write_motion(
@@ -246,13 +239,11 @@ def view(
 
     Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
     """
-    with interrupts.defer():
-        from brachis.verify import verify_trajectory
     path, trajectory = _load(result)
     show(
         trajectory,
         _read_candidates(path, trajectory),
-        verified=verify_trajectory(trajectory).passed,
+        verified=brachis.verify_trajectory(trajectory).passed,
         degrees=degrees,
         browser=browser,
         host=host,
@@ -281,7 +272,7 @@ def show(
             print_error(
                 f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone"
             )
-        if chosen() is not Verbosity.QUIET:
+        if get_verbosity() is not Verbosity.QUIET:
             print_error("Ctrl-C stops the viewer")
         print(f"look at {viewer.url}", flush=True)  # noqa: T201  (what the command is for, however quiet)
         has_screen = sys.platform == "darwin" or any(
@@ -311,9 +302,9 @@ def schema(
     ] = "task",
 ) -> None:
     """Print the JSON schema of tasks, or of exported JSON."""
-    with interrupts.defer():
-        from brachis.apps.export import samples_schema
-        from brachis.task import json_schema
+    from brachis.apps.export import samples_schema
+    from brachis.task import json_schema
+
     schemas = {"task": json_schema, "trajectory": samples_schema}
     if of not in schemas:
         raise UnknownNameError("schema", of, schemas, where="--of")

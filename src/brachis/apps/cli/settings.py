@@ -1,18 +1,20 @@
-"""What a command takes: a motion or its folder, a task file with what ``--set`` changes, a URDF, names of robots."""
+"""What a command takes: a motion or its folder, a task file with what ``--set`` changes, a URDF or a robot's name."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from brachis import robots
+import brachis
 from brachis.common.files import is_file, is_folder
 from brachis.errors import ResultFileError, TaskError, UnknownNameError
-from brachis.robot.task_map.protocol import AXES, YAW
-from brachis.task import Task, load_task, read_assignment
+
+if TYPE_CHECKING:
+    from brachis.task import Task
 
 _MOTIONS = ("result.npz", "unverified.npz")
-"""What ``brachis plan --out`` calls a motion in its folder."""
+"""Names of a motion in the folder of ``brachis plan --out``."""
 
 
 def motion_file(result: Path) -> Path:
@@ -21,21 +23,27 @@ def motion_file(result: Path) -> Path:
     Raises
     ------
     ResultFileError
-        There is none in the folder.
+        The folder holds no motion.
     """
     if not is_folder(result):
         return result
     for name in _MOTIONS:
         if is_file(result / name):
             return result / name
-    problem, hint = "is a folder in which there is no motion", "Run brachis plan --out"
     raise ResultFileError(
-        problem, where=str(result), allowed=" or ".join(_MOTIONS), hint=hint
+        "is a folder without a motion",
+        where=str(result),
+        allowed=" or ".join(_MOTIONS),
+        hint="Run brachis plan --out",
     )
 
 
-def task_space_of(text: str) -> str | list[str]:
-    """Read a word or a list of rows, as ``--task-space`` has them."""
+def task_space_of(text: str | None) -> str | list[str] | None:
+    """Read ``--task-space``: a word, or a list of rows."""
+    from brachis.robot.task_map.protocol import AXES, YAW
+
+    if text is None:
+        return None
     rows = [row.strip() for row in text.split(",") if row.strip()]
     return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
@@ -43,30 +51,38 @@ def task_space_of(text: str) -> str | list[str]:
 def changed_task(
     path: Path, changes: Sequence[str] | None, *, strict: bool | None = None
 ) -> Task:
-    """Load a task file, with keys set as ``spline.intervals=40``, and ``strict`` where it is given.
+    """Load a task file with keys set as in ``spline.intervals=40``, and with ``strict`` if it is given.
 
-    Of a key that is set twice the last value counts.
+    If a key is set twice, the last value counts.
     """
+    from brachis.task import read_assignment
+
+    robots = brachis.robots
     if robots.is_robot(str(path)) and path.suffix == "":
         name = robots.path_of(str(path)).parent.name
-        hint = f"brachis new {name} writes a first task for it"
-        raise TaskError("is a robot", where=name, allowed="a task file", hint=hint)
+        raise TaskError(
+            "is a robot",
+            where=name,
+            allowed="a task file",
+            hint=f"brachis new {name} writes a first task for it",
+        )
     keys = dict(read_assignment(text) for text in changes or ())
     if strict is not None:
         keys["strict"] = strict
-    return load_task(path, changes=keys)
+    return brachis.load_task(path, changes=keys)
 
 
 def urdf_of(given: Path) -> Path:
-    """Return the URDF file, where a name is given that of the robot that comes with brachis.
+    """Return the URDF file; of a robot that comes with brachis, given by its name, its file.
 
     Raises
     ------
     UnknownNameError
-        It is neither a file nor such a name.
+        There is neither a file nor a robot of this name.
     """
     if is_file(given) or is_folder(given) or given.suffix or len(given.parts) > 1:
         return given
+    robots = brachis.robots
     if str(given) not in robots.names():
-        raise UnknownNameError("URDF file, and no robot,", str(given), robots.names())
+        raise UnknownNameError("URDF file or robot", str(given), robots.names())
     return robots.path_of(str(given))

@@ -11,29 +11,28 @@ from typing import Annotated
 import typer
 from typer.core import TyperCommand
 
+import brachis
+from brachis.apps.cli.app import BaseFrame, Json, ToolFrame
 from brachis.apps.cli.folder import write_one, write_text
 from brachis.apps.cli.output import (
-    Column,
-    Json,
     print_json,
     print_table,
-    progress,
     result_console,
-    shown_warnings,
+    show_progress,
+    show_warnings,
 )
-from brachis.common import interrupts
+from brachis.apps.cli.settings import urdf_of
 from brachis.common.files import status_of, writing_errors
 from brachis.errors import InputError
 
 
 def list_robots(json: Json = False) -> None:
     """List the robots that come with brachis."""
-    with interrupts.defer():
-        from brachis import robots
+    robots = brachis.robots
     listed = [
         {
             "name": name,
-            "what": _what(robots.path_of(name)),
+            "what": _describe_robot(robots.path_of(name)),
             "joints": list(getattr(robots, name).joint_names),
             "urdf": str(robots.path_of(name)),
         }
@@ -43,12 +42,12 @@ def list_robots(json: Json = False) -> None:
         print_json({"robots": listed})
         return
     console = result_console()
-    columns = ("name", "what it is", Column("joints", number=True), "their names")
+    columns = ("name", "what it is", "joints", "their names")
     rows = [
         (each["name"], each["what"], len(each["joints"]), ", ".join(each["joints"]))
         for each in listed
     ]
-    print_table(console, "robots that come with brachis", columns, rows)
+    print_table("robots that come with brachis", columns, rows, numbers=("joints",))
     for each in listed:
         console.print(f"{each['name']}: {each['urdf']}")
     console.print(
@@ -56,7 +55,7 @@ def list_robots(json: Json = False) -> None:
     )
 
 
-def _what(urdf: Path) -> str:
+def _describe_robot(urdf: Path) -> str:
     """Read what a robot is from the heading of its page, ``# name: what it is``."""
     heading = urdf.with_name("README.md").read_text(encoding="utf-8").partition("\n")[0]
     return heading.partition(": ")[2]
@@ -72,12 +71,8 @@ def new(
     out: Annotated[Path, typer.Option(help="Task file to write, a new one.")] = Path(
         "task.yaml"
     ),
-    tool_frame: Annotated[
-        str | None, typer.Option(help="Link at the chain's end.")
-    ] = None,
-    base_frame: Annotated[
-        str | None, typer.Option(help="Link at the chain's beginning.")
-    ] = None,
+    tool_frame: ToolFrame = None,
+    base_frame: BaseFrame = None,
     json: Json = False,
 ) -> None:
     """Write a first task for a robot, with comments.
@@ -85,19 +80,17 @@ def new(
     It has a posture away from limits and singularities and a short line that can be reached from it, and it has been
     planned and verified.
     """
-    with interrupts.defer():
-        from brachis.apps.cli.settings import urdf_of
-        from brachis.apps.starter import starter_task
+    from brachis.apps.starter import starter_task
+
     with writing_errors(out):
-        exists = status_of(out) is not None
-    if exists:
-        raise InputError(
-            "the file exists; it may be somebody's work",
-            where=str(out),
-            allowed="a new file",
-            hint="Name one by --out",
-        )
-    with shown_warnings(), progress() as listener:
+        if status_of(out) is not None:
+            raise InputError(
+                "the file exists",
+                where=str(out),
+                allowed="a new file",
+                hint="Choose another name with --out",
+            )
+    with show_warnings(), show_progress() as listener:
         starter = starter_task(
             urdf_of(urdf),
             folder=out.parent,
@@ -128,10 +121,11 @@ def new(
 
 
 Triple = tuple[float, float, float]
+_ZERO = (0.0, 0.0, 0.0)
 
 
 class VectorCommand(TyperCommand):
-    """A command whose options of several numbers also take them as one word: ``0 1 0``, ``0,1,0`` or ``"0 1 0"``."""
+    """A command whose options of several numbers also take one word: ``0 1 0``, ``0,1,0`` or ``"0 1 0"``."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
         """Split such words before the options are read."""
@@ -145,21 +139,19 @@ class VectorCommand(TyperCommand):
 
 
 def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
-    """Split the word that follows one of `options`, or is joined to it by ``=``, at commas and spaces."""
+    """Split the word after one of `options`, or joined to it by ``=``, at commas and spaces."""
     words: list[str] = []
     for argument in args:
-        option, equals, joined = argument.partition("=")
+        option, equals, value = argument.partition("=")
         if equals and option in options:
-            words += [option, *_split(joined)]
+            words.append(option)
         elif words and words[-1] in options:
-            words += _split(argument)
+            value = argument
         else:
             words.append(argument)
+            continue
+        words += [part for part in re.split(r"[,\s]+", value) if part] or [value]
     return words
-
-
-def _split(word: str) -> list[str]:
-    return [part for part in re.split(r"[,\s]+", word) if part] or [word]
 
 
 def compose(
@@ -180,24 +172,16 @@ def compose(
     axis: Annotated[
         Triple,
         typer.Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0."),
-    ] = (
-        0.0,
-        1.0,
-        0.0,
-    ),
+    ] = (0.0, 1.0, 0.0),
     mount_xyz: Annotated[
-        Triple, typer.Option(help="Where the arm's root link lies on the carriage, m.")
-    ] = (
-        0.0,
-        0.0,
-        0.0,
-    ),
+        Triple, typer.Option(help="Position of the arm's root link on the carriage, m.")
+    ] = _ZERO,
     mount_rpy_deg: Annotated[
         Triple,
         typer.Option(
             help="Its roll, pitch and yaw, degrees; 180 0 0 hangs the arm upside down."
         ),
-    ] = (0.0, 0.0, 0.0),
+    ] = _ZERO,
     name: Annotated[str, typer.Option(help="Name of the rail's joint.")] = "rail",
     root: Annotated[
         str, typer.Option(help="Name of the root link, the world frame.")
@@ -211,10 +195,7 @@ def compose(
 
     No figure of the axis is guessed.
     """
-    with interrupts.defer():
-        from brachis.apps.cli.settings import urdf_of
-        from brachis.apps.compose import Rail, on_rail
-    rail = Rail(
+    rail = brachis.compose.Rail(
         axis=axis,
         range=travel,
         velocity=velocity,
@@ -228,7 +209,7 @@ def compose(
     arm = urdf_of(arm)
     write_one(
         out,
-        lambda path: on_rail(arm, rail, meshes=meshes, output=path),
+        lambda path: brachis.compose.on_rail(arm, rail, meshes=meshes, output=path),
         (".urdf",),
         (arm,),
     )

@@ -11,21 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from brachis.apps.cli.app import Verbosity, chosen
-from brachis.apps.cli.folder import ended_cleanly
+import brachis
+from brachis.apps.cli.app import Json, Verbosity, get_verbosity
+from brachis.apps.cli.folder import Writer, end_cleanly, exit_code, write_files
 from brachis.apps.cli.output import (
-    Column,
-    Json,
-    exit_code,
     print_error,
     print_json,
     print_table,
-    progress,
     result_console,
+    show_progress,
 )
-from brachis.common import interrupts
-from brachis.common.files import writing_errors
-from brachis.errors import InputError, write_count
+from brachis.errors import write_count
 
 if TYPE_CHECKING:
     from brachis.apps.sweeps import SweepResult
@@ -36,15 +32,13 @@ def sweep(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for plans, table.parquet, table.csv and sweep.png; by default one in the current folder, "
-            "named as the file. A sweep that was ended goes on where it was."
+            help="Folder for plans, table.parquet, table.csv and sweep.png. Default: one in the current folder, named "
+            "as the file. A sweep that was ended continues with what is missing there."
         ),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(
-            help="Processes; by default, and at most, as many as there are processors."
-        ),
+        typer.Option(help="Processes. Default and largest: the number of processors."),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -58,26 +52,20 @@ def sweep(
     json: Json = False,
 ) -> None:
     """Plan a task many times, with its keys varied."""
-    with interrupts.defer():
-        from brachis.apps import sweeps
-        from brachis.apps.plots import save_figure
-        from brachis.apps.sweeps.pools import VERIFIED
-    with ended_cleanly(), _progress() as listener:
-        result = sweeps.sweep(
+    from brachis.apps.sweeps.plans import VERIFIED
+
+    with end_cleanly(), _progress() as listener:
+        result = brachis.sweep(
             source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
         )
-    files = [str(path) for path in result.files]
-    failures = []
-    figure = result.folder / "sweep.png"
-    with writing_errors(figure):
-        figure.unlink(missing_ok=True)
     verified = result.count(VERIFIED) > 0
+    figures: dict[str, Writer] = {}
     if result.varied and verified:
-        try:
-            save_figure(result.plot(), figure)
-            files.append(str(figure))
-        except InputError as error:
-            failures.append(error)
+        figures["sweep.png"] = lambda path: brachis.plots.save_figure(
+            result.plot(), path
+        )
+    drawn, failures = write_files(result.folder, {}, figures, stale=("sweep.png",))
+    files = [*map(str, result.files), *drawn]
     if json:
         print_json({**result.summary(), "keys": list(result.keys), "files": files})
     else:
@@ -87,9 +75,9 @@ def sweep(
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str], None]]:
-    """Show how far the sweep is: in place on a terminal, else in 20 lines on standard error, for the logs of jobs."""
-    with progress() as status:
-        if sys.stderr.isatty() or chosen() is not Verbosity.NORMAL:
+    """Show how far the sweep is: in place on a terminal, otherwise one line on standard error for every 5 %."""
+    with show_progress() as status:
+        if sys.stderr.isatty() or get_verbosity() is not Verbosity.NORMAL:
             yield status
             return
         last_step = -1
@@ -108,8 +96,8 @@ def _progress() -> Iterator[Callable[[str], None]]:
 
 def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
-    from brachis.apps.sweeps.pools import FAILED, UNVERIFIED, VERIFIED
-    from brachis.apps.sweeps.run import in_words
+    from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
+    from brachis.apps.sweeps.run import write_duration
 
     console = result_console()
     found = result.summary()
@@ -123,8 +111,7 @@ def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
         for key in ("t_end_s", "plan", *result.keys):
             heading = "t_end [s]" if key == "t_end_s" else key
             rows.append((heading, *(_write_value(found[name][key]) for name in shown)))
-        columns = [Column(""), *(Column(name, number=True) for name in shown)]
-        print_table(console, title, columns, rows)
+        print_table(title, ("", *shown), rows, numbers=shown)
     else:
         console.print(title)
     for error, cause in found["failures"].items():
@@ -132,7 +119,7 @@ def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
             f"{cause['plans']} failed with {error}, for example: {cause['message']}"
         )
     console.print(
-        f"planning took {in_words(found['wall_time_s'])} in all processes together"
+        f"planning took {write_duration(found['wall_time_s'])} in all processes together"
     )
     for name in files:
         console.print(f"wrote {name}")

@@ -1,175 +1,33 @@
-"""Two motions along one path, side by side.
-
-What the rows of a recorded motion prove of its limits, whatever it does between them.
-
-A joint that moves by dq within a period h has a velocity of dq / h at some time of it, and an acceleration equal to the
-second difference over h^2 within two periods, a jerk equal to the third over h^3 within three (mean value theorem of
-divided differences). So a limit on one of these is exceeded for certain where the differences exceed it. A limit on
-another quantity (a torque, the tool's speed) is compared with the quantity's value for these means, at the posture in
-the middle of the periods: what is left out is how posture and velocity change within them. What the errors of the rows
-may add to a ratio is subtracted. It is less over more periods, so that some are taken together, too.
-"""
+"""Plan the path of a recorded motion, and show both motions side by side."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import factorial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis.apps.bottleneck import limit_ratios
+from brachis.apps.bottleneck.saturation import dense_samples
+from brachis.apps.comparison.rows import RatioBounds, bound_ratios
+from brachis.apps.plots import style
+from brachis.apps.recording import import_motion, joint_path_of
+from brachis.common.arguments import check_callable, check_keywords, file_name
+from brachis.common.progress import Listener
 from brachis.common.summary import Summary
-from brachis.limits import Limit, Moments, Role, limits_of
+from brachis.errors import PathError, PlanningError
+from brachis.planner import plan
 from brachis.result import Result
-from brachis.robot import bind
+from brachis.robot import Robot
+from brachis.robot.task_map import JOINTS
+from brachis.task import SplineSettings, Task
 from brachis.trajectory import Trajectory
-from brachis.verify import Verification
+from brachis.verify import Verification, verify_trajectory
 
-_STRIDES = (1, 2, 4)
-"""Periods that are taken as one, for limits of joints; those of the tool may change along the path."""
-
-
-@dataclass(frozen=True, eq=False)
-class RatioBounds:
-    """What rows prove of one limit.
-
-    Attributes
-    ----------
-    limit : str
-        Its kind in words.
-    subjects : tuple of str
-        Of its c values: joints, or the tool.
-    t : (K,) ndarray
-        Times of the rows, s.
-    ratios : (K, c) ndarray
-        Sizes of the ratios that are reached for certain; 0 where nothing is proven.
-    """
-
-    limit: str
-    subjects: tuple[str, ...]
-    t: np.ndarray
-    ratios: np.ndarray
-
-    @property
-    def worst(self) -> tuple[float, str, float]:
-        """Largest ratio, of what, and when, s."""
-        row, column = np.unravel_index(np.argmax(self.ratios), self.ratios.shape)
-        return (
-            float(self.ratios[row, column]),
-            self.subjects[column],
-            float(self.t[row]),
-        )
-
-
-def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
-    """Compare the rows of an imported motion with every limit of its task; nothing where the rows are not known."""
-    assert trajectory.recovered is not None
-    t = trajectory.recovered.rows[:, 0]
-    if not len(t):
-        return ()
-    robot, _ = bind(trajectory.robot, trajectory.task.task_space)
-    return tuple(
-        RatioBounds(
-            limit.name,
-            tuple(label.subject for label in limit.labels),
-            t,
-            _bound_limit(trajectory, limit),
-        )
-        for limit in limits_of(robot, trajectory.task)
-    )
-
-
-def _bound_limit(trajectory: Trajectory, limit: Limit) -> np.ndarray:
-    """Return the sizes of the ratios to one limit, (K, c)."""
-    assert trajectory.recovered is not None
-    t = trajectory.recovered.rows[:, 0]
-    count = len(t)
-    found = np.zeros((count, len(limit.labels)))
-    order = _order(limit, _means(trajectory, np.arange(1)[:, None])[0])
-    towards = np.where(
-        np.isfinite(limit.centre),
-        limit.centre,
-        np.where(np.isfinite(limit.upper), -np.inf, np.inf),
-    )
-    alone = limit.role is not Role.ROBOT or limit.guarantee.is_mean
-    for stride in _STRIDES[:1] if alone else _STRIDES:
-        windows = np.arange(max(count - order * stride, 0))[
-            :, None
-        ] + stride * np.arange(order + 1)
-        windows = windows[~_across(trajectory, windows, limit.breaks)]
-        if not len(windows):
-            continue
-        moments, errors = _means(trajectory, windows)
-        partials = limit.partials(moments)
-        slopes = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
-        products = [
-            np.abs(slope) @ error
-            for slope, error in zip(slopes, errors, strict=True)
-            if slope is not None
-        ]
-        off = np.sum(products, axis=0)[:, :, 0]
-        values = limit.values(moments)
-        values = values - np.clip(values - towards, -off, off)
-        if limit.guarantee.is_mean:
-            return (
-                np.abs(
-                    limit.ratio(
-                        np.trapezoid(values, t[windows[:, order // 2]], axis=0) / t[-1]
-                    )
-                )[None]
-                + found
-            )
-        np.maximum.at(found, windows[:, order // 2], np.abs(limit.ratio(values)))
-    return found
-
-
-def _order(limit: Limit, moments: Moments) -> int:
-    """Return the highest time derivative of the joints' positions that a limit asks for."""
-    partials = limit.partials(moments)
-    asked = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
-    return max(order for order, part in enumerate(asked) if part is not None)
-
-
-def _across(
-    trajectory: Trajectory, windows: np.ndarray, breaks: np.ndarray
-) -> np.ndarray:
-    """Tell for windows of rows, (W, m + 1), whether the limit changes abruptly within them, (W,)."""
-    t = trajectory.recovered.rows[:, 0]  # type: ignore[union-attr]
-    first, last = (
-        trajectory.path_spline(t[windows[:, end]])[:, None] for end in (0, -1)
-    )
-    return np.asarray(((first < breaks) & (breaks < last)).any(axis=1))
-
-
-def _means(
-    trajectory: Trajectory, windows: np.ndarray
-) -> tuple[Moments, list[np.ndarray]]:
-    """Differentiate the polynomials through m + 1 rows each, in the middle of windows of rows, (W, m + 1).
-
-    Returns
-    -------
-    Moments
-        The m-th derivative is m! times the divided difference; higher ones are 0.
-    list of (W, n, 1) ndarray
-        What the errors of the rows add to q and each derivative at most.
-    """
-    recovered = trajectory.recovered
-    assert recovered is not None
-    t, q = recovered.rows[windows, 0], recovered.rows[windows, 1:]
-    order = windows.shape[1] - 1
-    middle = 0.5 * (t[:, order // 2] + t[:, (order + 1) // 2])
-    unit = np.max(t[:, -1] - t[:, 0], initial=0.0) or 1.0
-    powers = ((t - middle[:, None]) / unit)[:, :, None] ** np.arange(order + 1)
-    weights = np.linalg.inv(powers) * [
-        [factorial(power) / unit**power] for power in range(order + 1)
-    ]
-    weights = np.concatenate(
-        [weights, np.zeros((len(windows), 3 - order, order + 1))], axis=1
-    )
-    errors = np.abs(weights).sum(axis=2)[:, :, None] * recovered.error
-    found, qdot, qddot, qdddot = np.moveaxis(weights @ q, 1, 0)
-    moments = Moments(found, qdot, qddot, qdddot, trajectory.path_spline(middle))
-    return moments, [error[:, :, None] for error in np.moveaxis(errors, 1, 0)]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -179,52 +37,51 @@ class Use:
     Attributes
     ----------
     limit : str
-        Its kind.
-    today : float
-        Largest ratio that the rows of today's motion prove; 1 is all of it. See `brachis.apps.comparison.RatioBounds`.
-    today_at : str
-        What comes nearest to it: a joint, or the tool.
-    today_time : float
-        When, s.
-    today_up_to : float
-        Largest ratio of the motion that was made of the rows. What lies between the rows is not known.
+        Name of the limit.
+    recorded : float
+        Largest ratio that the rows of the recorded motion prove; 1 is the limit. See `RatioBounds`.
+    recorded_at : str
+        Joint that has this ratio, or the tool.
+    recorded_time : float
+        Time of this ratio, s.
+    recorded_up_to : float
+        Largest ratio of the motion interpolated from the rows. What lies between the rows is not known.
     planned : float
         Largest ratio of the plan.
     planned_at : str
+        Joint that has this ratio, or the tool.
     """
 
     limit: str
-    today: float
-    today_at: str
-    today_time: float
-    today_up_to: float
+    recorded: float
+    recorded_at: str
+    recorded_time: float
+    recorded_up_to: float
     planned: float
     planned_at: str
 
     @property
-    def today_in_words(self) -> str:
-        """Say how much today's motion uses for certain, and how much it may."""
-        proven = f"{100.0 * self.today:.1f} %"
-        possible = f"{100.0 * self.today_up_to:.1f} %"
-        return (
-            proven
-            if proven == possible
-            else f"{proven}, between the rows up to {possible}"
-        )
+    def recorded_text(self) -> str:
+        """How much the recorded motion uses for certain, and how much it may use."""
+        proven = f"{100.0 * self.recorded:.1f} %"
+        possible = f"{100.0 * self.recorded_up_to:.1f} %"
+        if proven == possible:
+            return proven
+        return f"{proven}, between the rows up to {possible}"
 
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Summary):
-    """A motion of today and the one planned in its place.
+    """A recorded motion and the motion planned in its place.
 
     Attributes
     ----------
-    today : Trajectory
-        With the path recovered from it.
+    recorded : Trajectory
+        The recorded motion, with the path recovered from it.
     verification : Verification
-        Of today's motion, as it was made of its rows.
+        Of the recorded motion, as interpolated from its rows.
     proven : tuple of RatioBounds
-        What its rows alone prove, limit by limit; empty where they are not known.
+        What its rows alone prove, limit by limit; empty if they are not known.
     result : Result
         Of the plan along the same path, within the same limits.
 
@@ -234,72 +91,77 @@ class Comparison(Summary):
     >>> import brachis
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     brachis.export.write(result.trajectory, f"{folder}/today.csv", dt=0.004)
-    ...     found = brachis.compare(f"{folder}/today.csv", task=result.task)
+    ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
+    ...     found = brachis.compare(f"{folder}/recorded.csv", task=result.task)
     >>> [use.limit for use in found.uses], isinstance(found, brachis.Comparison)
     (['torque'], True)
     """
 
-    today: Trajectory
+    recorded: Trajectory
     verification: Verification
     proven: tuple[RatioBounds, ...]
     result: Result
 
     @property
     def saved(self) -> float:
-        """Part of today's time that the plan saves; negative where it takes longer."""
-        return 1.0 - self.result.t_end / self.today.t_end
+        """Part of the recorded time that the plan saves; negative if the plan takes longer."""
+        return 1.0 - self.result.t_end / self.recorded.t_end
 
     @property
     def uses(self) -> tuple[Use, ...]:
         """How much of every limit both motions use."""
-        today = {proven.limit: proven.worst for proven in self.proven}
-        found = {check.name: check for check in self.verification.checks}
+        proven = {bounds.limit: bounds.worst for bounds in self.proven}
+        interpolated = {check.name: check.value for check in self.verification.checks}
         uses = []
         for check in self.result.verification.checks:
             limit = check.name.removesuffix(" ratio")
-            if check.of_limit and limit in today and check.name in found:
-                up_to = max(today[limit][0], found[check.name].value)
+            if check.of_limit and limit in proven and check.name in interpolated:
+                ratio, subject, time = proven[limit]
+                up_to = max(ratio, interpolated[check.name])
+                planned_at = check.subject or ""
                 uses.append(
-                    Use(limit, *today[limit], up_to, check.value, check.subject or "")
+                    Use(limit, ratio, subject, time, up_to, check.value, planned_at)
                 )
         return tuple(uses)
 
     @property
     def exceeded(self) -> tuple[Use, ...]:
-        """Limits that today's motion exceeds for certain, beyond the task's tolerance."""
-        tolerance = self.today.task.refinement.tolerance
-        return tuple(use for use in self.uses if use.today > 1.0 + tolerance)
+        """Limits that the recorded motion exceeds for certain, beyond the task's tolerance."""
+        tolerance = self.recorded.task.refinement.tolerance
+        return tuple(use for use in self.uses if use.recorded > 1.0 + tolerance)
 
     @property
     def verdict(self) -> str:
-        """Say in one line what is gained."""
-        times = f"{self.result.t_end:.4f} s instead of {self.today.t_end:.4f} s"
+        """What is gained, in one line."""
+        times = f"{self.result.t_end:.4f} s instead of {self.recorded.t_end:.4f} s"
         if not self.result.verified:
-            return f"no verified motion was found along the path of today's ({times})"
-        return f"{100.0 * abs(self.saved):.1f} % {'faster' if self.saved >= 0.0 else 'slower'}: {times}"
+            return f"no verified motion was found along the recorded path ({times})"
+        word = "faster" if self.saved >= 0.0 else "slower"
+        return f"{100.0 * abs(self.saved):.1f} % {word}: {times}"
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Say what of today's motion has to be known beside the times."""
-        jumps = "today's rows begin or end with an acceleration, so the plan may do so as well (rest: velocity)"
-        exceeded = (
-            f"today's motion exceeds the {use.limit} limit of {use.today_at} by {100.0 * (use.today - 1.0):.2g} % at "
-            f"{use.today_time:.4f} s, as its rows prove; between them it may be by up to "
-            f"{100.0 * (use.today_up_to - 1.0):.2g} %"
+        """What has to be known of the recorded motion besides the times."""
+        remarks = [
+            f"the recorded motion exceeds the {use.limit} limit of {use.recorded_at} by "
+            f"{100.0 * (use.recorded - 1.0):.2g} % at {use.recorded_time:.4f} s, as its rows prove; between them it "
+            f"may be by up to {100.0 * (use.recorded_up_to - 1.0):.2g} %"
             for use in self.exceeded
-        )
-        unknown = "the rows of today's motion are not known: import its CSV file again to compare it with the limits"
-        remarks = {
-            jumps: self.today.task.spline.rest != "full",
-            unknown: not self.proven,
-        }
-        return (*exceeded, *(remark for remark, holds in remarks.items() if holds))
+        ]
+        if self.recorded.task.spline.rest != "full":
+            remarks.append(
+                "the recorded rows begin or end with an acceleration, so the plan may do so as well (rest: velocity)"
+            )
+        if not self.proven:
+            remarks.append(
+                "the rows of the recorded motion are not known: import its CSV file again to compare it with the limits"
+            )
+        return tuple(remarks)
 
     def summary(self) -> dict[str, object]:
         """Return what is shown."""
         uses = (
-            f"{use.limit} {use.today_in_words} today, {100.0 * use.planned:.1f} % planned"
+            f"{use.limit} {use.recorded_text} recorded, {100.0 * use.planned:.1f} % planned"
             for use in self.uses
         )
         return {
@@ -309,29 +171,195 @@ class Comparison(Summary):
         }
 
     def __str__(self) -> str:
-        """Say all in plain words."""
-        lines = [self.verdict, *self.remarks]
-        lines += [
-            f"{use.limit}: {use.today_in_words} used today ({use.today_at}), "
+        """Return all in plain words."""
+        assert self.recorded.recovered is not None
+        uses = [
+            f"{use.limit}: {use.recorded_text} used by the recorded motion ({use.recorded_at}), "
             f"{100.0 * use.planned:.1f} % in the plan ({use.planned_at})"
             for use in self.uses
         ]
-        assert self.today.recovered is not None
-        return "\n".join([*lines, *self.today.recovered.told])
+        notes = self.recorded.recovered.told
+        return "\n".join([self.verdict, *self.remarks, *uses, *notes])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures as plain data for JSON."""
-        assert self.today.recovered is not None
+        """Return the figures as plain data for JSON, in which the recorded motion is called ``today``."""
+        assert self.recorded.recovered is not None
+        uses = [
+            {
+                key.replace("recorded", "today"): value
+                for key, value in vars(use).items()
+            }
+            for use in self.uses
+        ]
         return {
             "t_end": self.result.t_end,
-            "t_end_today": self.today.t_end,
+            "t_end_today": self.recorded.t_end,
             "saved": self.saved,
             "verdict": self.verdict,
             "verified": self.result.verified,
             "today_within_limits": not self.exceeded if self.proven else None,
             "remarks": list(self.remarks),
-            "limits": [vars(use) for use in self.uses],
-            "recovered": self.today.recovered.to_dict(),
+            "limits": uses,
+            "recovered": self.recorded.recovered.to_dict(),
             "verification_today": self.verification.to_dict(),
             "plan": self.result.to_dict(),
         }
+
+
+@check_keywords
+def compare(
+    recorded: str | os.PathLike[str] | Trajectory,
+    robot: str | os.PathLike[str] | Robot | Task | None = None,
+    *,
+    task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
+    task_space: str | Sequence[str] | None = None,
+    units: Mapping[str, str] | None = None,
+    tolerance: float | None = None,
+    noise: float | Sequence[float] | None = None,
+    keep_end: bool = False,
+    listener: Listener | None = None,
+) -> Comparison:
+    """Plan the path of a recorded motion within the same limits, from the same start posture, and compare.
+
+    If the first plan is slower, a finer one is made; then the recorded joint path is timed anew. The fastest verified
+    motion counts.
+
+    Parameters
+    ----------
+    recorded : path or Trajectory
+        CSV file, or the trajectory that `brachis.import_motion` made of it.
+    robot, task, task_space, units, tolerance, noise : optional
+        As in `brachis.import_motion`; for files alone.
+    keep_end : bool, optional
+        Whether the plan also ends in the recorded end posture, not in any posture with the tool there.
+    listener : callable, optional
+        Called with a text about each step.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        As `brachis.import_motion` and `brachis.plan`.
+    PlanningError
+        No plan could be made.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/recorded.csv", dt=0.004)
+    ...     found = brachis.compare(f"{folder}/recorded.csv", task=result.task)
+    >>> found.result.verified, found.saved > -1e-3
+    (True, True)
+    """
+    check_callable(listener, "listener")
+    if not isinstance(recorded, Trajectory):
+        recorded = import_motion(
+            file_name(recorded, "recorded"),
+            robot,
+            task=task,
+            task_space=task_space,
+            units=units,
+            tolerance=tolerance,
+            noise=noise,
+        )
+    results: list[Result] = []
+    failures: list[PlanningError] = []
+    for asked in tasks_of(recorded, keep_end=keep_end):
+        try:
+            result = plan(recorded.robot, asked, listener=listener, check_advice=False)
+        except PlanningError as error:
+            failures.append(error)
+            continue
+        results.append(result)
+        if result.verified and result.t_end <= recorded.t_end:
+            break
+    if not results:
+        raise failures[0]
+    best = max(results, key=lambda each: (each.verified, -each.t_end))
+    verification = verify_trajectory(recorded)
+    return Comparison(recorded, verification, bound_ratios(recorded), best)
+
+
+def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
+    """Yield tasks of a recorded path, each for the case that those before it gave no faster motion."""
+    task = recorded.task
+    if not keep_end:
+        task = task.model_copy(update={"end": "free"})
+    yield task
+    if task.spline.intervals != "auto":
+        finer = min(10_000, 3 * task.spline.intervals)
+        settings = {**task.spline.model_dump(), "intervals": finer}
+        spline = SplineSettings.model_validate(settings)
+        task = task.model_copy(update={"spline": spline})
+        yield task
+    if task.task_space != JOINTS:
+        try:
+            path = joint_path_of(recorded)
+        except PathError:  # the plans before it count
+            return
+        yield task.model_copy(update={"task_space": JOINTS, "path": path})
+
+
+def plot_comparison(comparison: Comparison) -> Figure:
+    """Plot path coordinate, tool speed, and the largest ratio to any limit over time, of both motions.
+
+    The line of the recorded motion is the ratio that its rows prove; the band above it is the ratio between the rows,
+    of the motion interpolated from them.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    Figure
+        One column wide.
+    """
+    figure = style.new_figure(style.COLUMN_WIDTH, 130.0)
+    progress, speed, ratio = figure.subplots(3, 1, sharex=True)
+    motions = (
+        ("recorded", comparison.recorded, style.COLOURS[1], "--"),
+        ("planned", comparison.result.trajectory, style.COLOURS[0], "-"),
+    )
+    for name, motion, colour, line in motions:
+        look = {"color": colour, "linestyle": line, "linewidth": style.LINE_WIDTH}
+        samples = dense_samples(motion)
+        progress.plot(
+            samples.t, samples.s, label=f"{name}: {motion.t_end:.4f} s", **look
+        )
+        speed.plot(samples.t, samples.tool_speed, **look)
+        ratios = limit_ratios(motion)
+        t = ratios.t
+        largest = np.abs(ratios.values).max(axis=1, initial=0.0)
+        if name == "recorded" and comparison.proven:
+            t = comparison.proven[0].t
+            proven = [bounds.ratios.max(axis=1) for bounds in comparison.proven]
+            least = np.interp(ratios.t, t, np.max(proven, axis=0))
+            ratio.fill_between(
+                ratios.t,
+                least,
+                np.maximum(least, largest),
+                color=colour,
+                alpha=0.25,
+                linewidth=0.0,
+                label="recorded, between its rows: up to",
+            )
+            largest = np.max(proven, axis=0)
+        ratio.plot(t, largest, **look)
+    ratio.axhline(1.0, color=style.GREY, linewidth=0.8)
+    style.dress(progress, "", "$s$")
+    style.dress(speed, "", "tool speed (m/s)")
+    style.dress(ratio, r"$t$ (s)", "largest ratio to a limit")
+    for ax in (progress, speed, ratio):
+        ax.set_ylim(bottom=0.0)
+    progress.set_xlim(0.0, max(motion.t_end for _, motion, _, _ in motions))
+    style.legend_above(ratio, style.COLUMN_WIDTH - 15.0)
+    style.legend_above(progress, style.COLUMN_WIDTH - 15.0)
+    progress.set_title(comparison.verdict, fontsize=style.LABEL_SIZE, pad=16.0)
+    return figure

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
+import numpy as np
 from lxml import etree
 
 Element: TypeAlias = Any  # lxml comes without types
@@ -14,9 +15,19 @@ ZERO = (0.0, 0.0, 0.0)
 GREY = (0.35, 0.38, 0.42, 1.0)
 
 
-def numbers(values: Iterable[float]) -> str:
-    """Shortest text from which the same numbers are read again."""
-    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
+def make(
+    tag: str, *children: Element, **attributes: str | float | Sequence[float]
+) -> Element:
+    """Make an element; numbers are written as the shortest text from which the same numbers are read again."""
+    element = etree.Element(tag)
+    for name, value in attributes.items():
+        text = value
+        if not isinstance(text, str):
+            figures = np.array(value, dtype=float, ndmin=1) + 0.0
+            text = " ".join(repr(float(each)).removesuffix(".0") for each in figures)
+        element.set(name, text)
+    element.extend(children)
+    return element
 
 
 def box_inertia(mass: float, size: Sequence[float]) -> tuple[float, ...]:
@@ -27,9 +38,7 @@ def box_inertia(mass: float, size: Sequence[float]) -> tuple[float, ...]:
 
 def link(name: str, *parts: Element) -> Element:
     """Make a link of `inertial` and `visual` elements."""
-    element = etree.Element("link", name=name)
-    element.extend(parts)
-    return element
+    return make("link", *parts, name=name)
 
 
 def inertial(
@@ -42,16 +51,13 @@ def inertial(
 
     `rpy` turns the axes of the inertia against the link frame.
     """
-    element = etree.Element("inertial")
-    _origin(element, com, rpy)
-    etree.SubElement(element, "mass", value=numbers([mass]))
     keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    etree.SubElement(
-        element,
-        "inertia",
-        {key: numbers([value]) for key, value in zip(keys, inertia, strict=True)},
+    return make(
+        "inertial",
+        *_origin(com, rpy),
+        make("mass", value=mass),
+        make("inertia", **dict(zip(keys, inertia, strict=True))),
     )
-    return element
 
 
 def visual(
@@ -75,18 +81,13 @@ def visual(
     xyz, rpy : (3,) sequence of float
         Placement of its centre in the link frame, m and rad.
     """
-    element = etree.Element("visual")
-    _origin(element, xyz, rpy)
-    attributes = {
-        key: numbers([each] if isinstance(each, (int, float)) else each)
-        for key, each in size.items()
-    }
-    etree.SubElement(etree.SubElement(element, "geometry"), shape, attributes)
     name, rgba = colour
-    etree.SubElement(
-        etree.SubElement(element, "material", name=name), "color", rgba=numbers(rgba)
+    return make(
+        "visual",
+        *_origin(xyz, rpy),
+        make("geometry", make(shape, **size)),
+        make("material", make("color", rgba=rgba), name=name),
     )
-    return element
 
 
 def joint(
@@ -101,16 +102,18 @@ def joint(
     limit: Mapping[str, float] | None = None,
 ) -> Element:
     """Make a joint of type `kind`; a moving one has an `axis` and a `limit` (lower, upper, velocity, effort)."""
-    element = etree.Element("joint", name=name, type=kind)
-    etree.SubElement(element, "parent", link=parent)
-    etree.SubElement(element, "child", link=child)
-    _origin(element, xyz, rpy)
+    element = make(
+        "joint",
+        make("parent", link=parent),
+        make("child", link=child),
+        *_origin(xyz, rpy),
+        name=name,
+        type=kind,
+    )
     if axis is not None:
-        etree.SubElement(element, "axis", xyz=numbers(axis))
+        element.append(make("axis", xyz=axis))
     if limit is not None:
-        etree.SubElement(
-            element, "limit", {key: numbers([value]) for key, value in limit.items()}
-        )
+        element.append(make("limit", **limit))
     return element
 
 
@@ -126,10 +129,8 @@ def robot_text(robot: Element) -> str:
     return "\n".join(['<?xml version="1.0"?>', *parts, ""])
 
 
-def _origin(element: Element, xyz: Sequence[float], rpy: Sequence[float]) -> None:
-    """Add ``<origin>``, unless it would say nothing."""
-    parts = {"xyz": xyz, "rpy": rpy} if any(rpy) else {"xyz": xyz}
-    if any(xyz) or any(rpy):
-        etree.SubElement(
-            element, "origin", {key: numbers(value) for key, value in parts.items()}
-        )
+def _origin(xyz: Sequence[float], rpy: Sequence[float]) -> list[Element]:
+    """Make an ``<origin>``, or nothing for the identity."""
+    if any(rpy):
+        return [make("origin", xyz=xyz, rpy=rpy)]
+    return [make("origin", xyz=xyz)] if any(xyz) else []

@@ -1,63 +1,50 @@
-"""An arm on a linear axis.
-
-Reading the URDF of an arm that is to be mounted elsewhere, and what changes in it there.
-"""
+"""An arm on a linear axis: its URDF is kept as XML, so that elements that brachis does not know stay as written."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from lxml import etree
 
-from brachis.apps.compose import checks, elements
+from brachis.apps.compose import elements
 from brachis.apps.compose.elements import Element
 from brachis.common import files
 from brachis.common.files import atomic_write, status_of, writing_errors
 from brachis.errors import InputError
 from brachis.robot.urdf import check_inertias, read_file
-from brachis.robot.urdf_bodies import read_dynamics
-from brachis.robot.urdf_elements import read_tree
+from brachis.robot.urdf_elements import UrdfTree, read_tree
+
+_NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
 
 
-@dataclass(frozen=True)
-class Arm:
-    """A URDF as XML, so that whatever yourdfpy does not know is kept as written.
-
-    Attributes
-    ----------
-    robot : lxml element
-        The ``<robot>`` element.
-    root_link : str
-        The only link that no joint moves or holds.
-    link_names, joint_names : tuple of str
-        All links and joints, in the order of the file.
-    source : Path
-        The file.
-    """
-
-    robot: Element
-    root_link: str
-    link_names: tuple[str, ...]
-    joint_names: tuple[str, ...]
-    source: Path
+def _is_positive(value: np.ndarray) -> np.ndarray:
+    return value > 0.0
 
 
-def read_arm(source: Path) -> Arm:
-    """Read a URDF whose links form one tree.
-
-    Raises
-    ------
-    UrdfError
-        See `read_file` and `read_tree`.
-    """
-    tree = read_tree(read_file(source), str(source))
-    return Arm(tree.robot, tree.root, tuple(tree.links), tuple(tree.joints), source)
+_FIGURES: dict[str, tuple[str, str, tuple[int, ...], Callable[[np.ndarray], Any]]] = {
+    "range": (
+        "is not a range",
+        "[low, high] in m, both finite, low < high",
+        (2,),
+        lambda ends: ends[0] < ends[1],
+    ),
+    "velocity": ("is not positive", "a finite number > 0 m/s", (), _is_positive),
+    "force": ("is not positive", "a finite number > 0 N", (), _is_positive),
+    "mass": ("is not positive", "a finite number > 0 kg", (), _is_positive),
+    "axis": ("is not a direction", "[x, y, z], not all zero", (3,), np.any),
+    "mount_xyz": ("is not a position", "[x, y, z] in m", (3,), np.isfinite),
+    "mount_rpy": ("is not a rotation", "[roll, pitch, yaw] in rad", (3,), np.isfinite),
+    "carriage_size": ("is not a size", "three lengths > 0 m", (3,), _is_positive),
+}
+"""Figures of a rail: what is said of a wrong one, what is allowed, the shape, and a test of finite values."""
 
 
 def rename_link(robot: Element, old: str, new: str) -> None:
@@ -85,7 +72,6 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
     are nowhere.
     """
     old = source.parent.resolve()
-    new = None if target is None else target.parent.resolve()
     for element in robot.iter("mesh", "texture"):
         name = element.get("filename")
         if not name or Path(name).is_absolute():
@@ -95,26 +81,10 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
         if within:
             by_ros = any(files.is_file(place) for place in files.ros_files(within))
             path = None if by_ros or scheme != "package" else files.mesh_file(name, old)
-        if path is None:
-            continue
-        element.set(
-            "filename",
-            os.path.normpath(path) if new is None else os.path.relpath(path, new),
-        )
-
-
-def check_composed(text: str, joint: str, where: str) -> None:
-    """Refuse numbers that are none, and bodies below `joint` that cannot be.
-
-    On a moving axis even the inertia of the arm's root link counts, which no joint moved before.
-
-    Raises
-    ------
-    UrdfError
-    """
-    tree = read_tree(text, where)
-    carried = read_dynamics(tree, (joint,), {}, tree.root)
-    check_inertias(tree, carried.bodies, where)
+        if path is not None and target is not None:
+            element.set("filename", os.path.relpath(path, target.parent.resolve()))
+        elif path is not None:
+            element.set("filename", os.path.normpath(path))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +118,7 @@ class Rail:
     Raises
     ------
     InputError
-        A figure cannot be.
+        A figure is out of its range.
     """
 
     range: Sequence[float]
@@ -164,57 +134,65 @@ class Rail:
 
     def __post_init__(self) -> None:
         """Check the figures."""
-        checked = {
-            "range": checks.interval(self.range, "range", "m"),
-            "name": checks.identifier(self.name, "name"),
-            "root": checks.identifier(self.root, "root"),
-            "axis": checks.direction(self.axis, "axis"),
-            "velocity": checks.positive(self.velocity, "velocity", "m/s"),
-            "force": checks.positive(self.force, "force", "N"),
-            "mass": checks.positive(self.mass, "mass", "kg"),
-            "mount_xyz": checks.vector(self.mount_xyz, "mount_xyz", "[x, y, z] in m"),
-            "mount_rpy": checks.vector(
-                self.mount_rpy, "mount_rpy", "[roll, pitch, yaw] in rad"
-            ),
-            "carriage_size": checks.vector(
-                self.carriage_size, "carriage_size", "three lengths > 0 m", above=0.0
-            ),
-        }
-        for figure, value in checked.items():
-            object.__setattr__(self, figure, value)
+        for figure, (problem, allowed, shape, test) in _FIGURES.items():
+            given = getattr(self, figure)
+            try:
+                value = np.array(given, dtype=float)
+            except (TypeError, ValueError):
+                value = np.array(np.nan)
+            is_finite = value.shape == shape and np.isfinite(value).all()
+            if not is_finite or not np.all(test(value)):
+                raise InputError(
+                    problem, where=figure, found=str(given), allowed=allowed
+                )
+            if figure == "axis":
+                value /= np.abs(value).max()  # squares of its size may overflow
+                value /= np.linalg.norm(value)
+            plain = value.tolist()
+            plain = tuple(plain) if shape else plain
+            object.__setattr__(self, figure, plain)
+        for figure in ("name", "root"):
+            given = getattr(self, figure)
+            if not (isinstance(given, str) and _NAME.fullmatch(given)):
+                raise InputError(
+                    "is not a name",
+                    where=figure,
+                    found=repr(given),
+                    allowed="a letter or underscore, then letters, digits, underscores, dots and hyphens",
+                )
 
-    def mount(self, arm: Arm, target: Path | None, *, meshes: bool) -> str:
+    def mount(
+        self, arm: UrdfTree, source: Path, target: Path | None, *, meshes: bool
+    ) -> str:
         """Put the arm, whose XML is changed, on the carriage, and return the URDF's text."""
-        arm_root = f"{self.name}_base" if arm.root_link == self.root else arm.root_link
-        self._check_names(arm, arm_root)
-        rename_link(arm.robot, arm.root_link, arm_root)
+        root = f"{self.name}_base" if arm.root == self.root else arm.root
+        self._check_names(arm, source, root)
+        rename_link(arm.robot, arm.root, root)
         if not meshes:
             drop_meshes(arm.robot)
-        relocate_meshes(arm.robot, arm.source, target)
-        arm.robot.set("name", f"{arm.robot.get('name') or arm.source.stem}_{self.name}")
-        for place, element in enumerate(self._elements(arm_root)):
+        relocate_meshes(arm.robot, source, target)
+        arm.robot.set("name", f"{arm.robot.get('name') or source.stem}_{self.name}")
+        for place, element in enumerate(self._elements(root)):
             arm.robot.insert(place, element)
         return elements.robot_text(arm.robot)
 
-    def _check_names(self, arm: Arm, arm_root: str) -> None:
+    def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:
         """Refuse new names that the arm has already, be it for links or joints: frames are looked up by name."""
-        taken = dict.fromkeys(arm.joint_names, "joint") | dict.fromkeys(
-            arm.link_names, "link"
-        )
-        taken.pop(arm.root_link)
+        taken = dict.fromkeys(arm.joints, "joint") | dict.fromkeys(arm.links, "link")
+        taken.pop(arm.root)
         new = {
             self.root: "root",
-            arm_root: "name" if arm_root != arm.root_link else "root",
+            arm_root: "name" if arm_root != arm.root else "root",
+            self.name: "name",
+            f"{self.name}_carriage": "name",
+            f"{self.name}_mount": "name",
         }
-        new |= dict.fromkeys(
-            (self.name, f"{self.name}_carriage", f"{self.name}_mount"), "name"
-        )
         for candidate, parameter in new.items():
             if candidate in taken:
                 raise InputError(
                     f"the name {candidate!r} is taken",
                     where=parameter,
-                    found=f"{taken[candidate]} {candidate!r} in {arm.source}",
+                    found=f"{taken[candidate]} {candidate!r} in {source}",
                     hint=f"Choose another {parameter}",
                 )
         if len(new) < 5:
@@ -229,55 +207,41 @@ class Rail:
         """World, rail, carriage and mount."""
         carriage = f"{self.name}_carriage"
         low, high = self.range
+        x, y, z = self.axis
         height = self.carriage_size[2]
-        down = (
-            pin.rpy.rpyToMatrix(*self.mount_rpy) @ np.array([0.0, 0.0, -1.0])
-        ).round(15)  # cos(pi / 2) is not 0
+        turn = pin.rpy.rpyToMatrix(*self.mount_rpy)
+        down = (turn @ np.array([0.0, 0.0, -1.0])).round(15)  # cos(pi / 2) is not 0
         centre = np.array(self.mount_xyz) + 0.5 * height * down
-        beam = (
-            centre + height * down + 0.5 * (low + high) * np.array(self.axis)
-        ).round(12)
+        beam = centre + height * down + 0.5 * (low + high) * np.array(self.axis)
         length = high - low + max(self.carriage_size[:2])
-        heading = (
-            0.0,
-            -math.atan2(self.axis[2], math.hypot(*self.axis[:2])),
-            math.atan2(self.axis[1], self.axis[0]),
-        )
         limit = {
             "lower": low,
             "upper": high,
             "velocity": self.velocity,
             "effort": self.force,
         }
-        colour = (
-            f"{self.name}_grey",
-            elements.GREY,
-        )  # a name of its own: the arm may have another grey
+        # A name of its own: the arm may have another grey.
+        colour = (f"{self.name}_grey", elements.GREY)
         inertia = elements.box_inertia(self.mass, self.carriage_size)
+        rail_box = elements.visual(
+            "box",
+            {"size": (length, height, height)},
+            colour,
+            xyz=beam.round(12),
+            rpy=(0.0, -math.atan2(z, math.hypot(x, y)), math.atan2(y, x)),
+        )
+        carriage_box = elements.visual(
+            "box", {"size": self.carriage_size}, colour, xyz=centre, rpy=self.mount_rpy
+        )
         return [
-            elements.link(
-                self.root,
-                elements.visual(
-                    "box",
-                    {"size": (length, height, height)},
-                    colour,
-                    xyz=beam,
-                    rpy=heading,
-                ),
-            ),
+            elements.link(self.root, rail_box),
             elements.joint(
                 self.name, "prismatic", self.root, carriage, axis=self.axis, limit=limit
             ),
             elements.link(
                 carriage,
                 elements.inertial(self.mass, centre, inertia, self.mount_rpy),
-                elements.visual(
-                    "box",
-                    {"size": self.carriage_size},
-                    colour,
-                    xyz=centre,
-                    rpy=self.mount_rpy,
-                ),
+                carriage_box,
             ),
             elements.joint(
                 f"{self.name}_mount",
@@ -325,7 +289,7 @@ def on_rail(
     InputError
         A name is taken, or `output` cannot be written or is the arm's own file.
     UrdfError
-        The arm's URDF is missing, broken, not one tree, or has bodies that cannot be.
+        The arm's URDF is missing, broken, not one tree, or has bodies that are not physical.
 
     Examples
     --------
@@ -335,16 +299,23 @@ def on_rail(
     >>> brachis.Robot.from_urdf("iiwa14 on a rail", urdf_text=text).joint_names[:2]
     ('rail', 'joint_1')
     """
-    source, target = Path(arm_urdf), None if output is None else Path(output)
-    arm = read_arm(source)
-    with writing_errors(target or ""):
-        known = None if target is None else status_of(target)
-    if known is not None and os.path.samestat(known, source.stat()):
-        raise InputError(
-            "is the arm's own file", where=f"output {target}", allowed="another file"
-        )
-    text = rail.mount(arm, target, meshes=meshes)
-    check_composed(text, rail.name, str(source))
+    source = Path(arm_urdf)
+    target = None if output is None else Path(output)
+    arm = read_tree(read_file(source), str(source))
+    if target is not None:
+        with writing_errors(target):
+            known = status_of(target)
+        if known is not None and os.path.samestat(known, source.stat()):
+            raise InputError(
+                "is the arm's own file",
+                where=f"output {target}",
+                allowed="another file",
+            )
+    text = rail.mount(arm, source, target, meshes=meshes)
+    # On a moving axis even the inertia of the arm's root link counts, which no joint moved before.
+    composed = read_tree(text, str(source))
+    carried = read_dynamics(composed, (rail.name,), {}, composed.root)
+    check_inertias(composed, carried.bodies, str(source))
     if target is not None:
         with atomic_write(target) as stream:
             stream.write(text.encode())

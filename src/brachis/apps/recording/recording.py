@@ -1,7 +1,4 @@
-"""A joint trajectory that was made elsewhere, as it stands in its file.
-
-What the columns of a recorded motion are: ``t``, ``time_ms``, ``j1``, ``q_j1``, ``j1_pos [deg]``, ``qd_j1``, ...
-"""
+"""A recorded motion: time and joint positions from a CSV file, whose header names the columns and their units."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Literal, NoReturn
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,43 +19,54 @@ from brachis.task.points.tables import Table, read_table
 from brachis.task.points.units import ANGLES, LENGTHS
 
 TIMES: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_TIME = ("t", "time", "timestamp")
-_POSITION = ("{}", "q_{}", "pos_{}", "position_{}", "{}_pos", "{}_position")
-_VELOCITY = ("qd_{}", "dq_{}", "v_{}", "vel_{}", "velocity_{}", "{}_vel", "{}_velocity")
-_ACCELERATION = (
-    "qdd_{}",
-    "ddq_{}",
-    "a_{}",
-    "acc_{}",
-    "acceleration_{}",
-    "{}_acc",
-    "{}_acceleration",
-)
-_UNITS = "|".join({**TIMES, **ANGLES, **LENGTHS})
-_STATED = re.compile(
-    rf"^(.+?)\s*(?:[\[(]\s*([a-z0-9/^]+)\s*[\])]|_((?:{_UNITS})(?:(?:/|_|_per_)s(?:\^?2)?)?))$"
-)
-_DIGITS = 12
-_LISTED = 8
-
-Kind = Literal["t", "q", "qdot", "qddot"]
-_WORDS: Final = {
-    "t": "time",
-    "q": "position",
-    "qdot": "velocity",
-    "qddot": "acceleration",
+_UNITS: Final = {
+    "s": ("time", TIMES),
+    "rad": ("angle", ANGLES),
+    "m": ("length", LENGTHS),
 }
-_PER: Final = {"t": "", "q": "", "qdot": "/s", "qddot": "/s^2"}
+"""What each SI unit measures, and the units of a file with their factors."""
+_TIME_COLUMNS = ("t", "time", "timestamp")
+_JOINT_COLUMNS: Final = {
+    "qddot": "qdd_{0} ddq_{0} a_{0} acc_{0} acceleration_{0} {0}_acc {0}_acceleration",
+    "qdot": "qd_{0} dq_{0} v_{0} vel_{0} velocity_{0} {0}_vel {0}_velocity",
+    "q": "{0} q_{0} pos_{0} position_{0} {0}_pos {0}_position",
+}
+"""Names of the columns of joint ``{0}``; a name that stands in several rows has the meaning of the last one."""
+_QUANTITIES: Final = {
+    "t": ("time", ""),
+    "q": ("position", ""),
+    "qdot": ("velocity", "/s"),
+    "qddot": ("acceleration", "/s^2"),
+}
+"""Each quantity in words, and what follows its unit of time, angle or length."""
+_UNIT_WORDS = "|".join({**TIMES, **ANGLES, **LENGTHS})
+_NAME_AND_UNIT = re.compile(
+    rf"^(.+?)\s*(?:[\[(]\s*([a-z0-9/^]+)\s*[\])]|_((?:{_UNIT_WORDS})(?:(?:/|_|_per_)s(?:\^?2)?)?))$"
+)
+_EXACT_DIGITS = 12
+"""Decimals from which on rounding does not matter."""
+FEWEST_ROWS = 5
+"""Rows of the shortest motion: a polynomial through five rows gives the derivatives."""
+_LARGEST_FILE = 64_000_000
+"""Bytes."""
+_STILL = 1e-12
+"""A joint that moves less between rows with all digits stands still, rad or m."""
+_CHANGED_DIGITS = 2.2
+"""Change of a position, in roundings, from which on the joint moves; a last digit that flickers changes by 2."""
+_CLEAR_DIGITS = 24.0
+"""Change of a position, in roundings, after a dozen changes of the last digit."""
+_MOST_TURNS = 6.0 * np.pi
+"""Largest plausible angle of a joint without a range, rad."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """Units of the numbers in a file; None: as the header says, else s, rad and m.
+    """Units of the numbers in a file; None: as the header says, otherwise s, rad and m.
 
     Attributes
     ----------
     angle, length, time : str or None
-        Out of ``rad``, ``deg``, ...; ``m``, ``mm``, ...; ``s``, ``ms``, ...
+        One of ``rad``, ``deg``, ...; ``m``, ``mm``, ...; ``s``, ``ms``, ...
     """
 
     angle: str | None = None
@@ -72,7 +80,7 @@ class Units:
         ------
         TaskError
         """
-        for name, known in (("angle", ANGLES), ("length", LENGTHS), ("time", TIMES)):
+        for name, known in _UNITS.values():
             unit = getattr(self, name)
             if unit is not None and unit not in known:
                 raise TaskError(
@@ -83,116 +91,84 @@ class Units:
                 )
 
 
-@dataclass(frozen=True)
-class _Column:
-    """A column that is understood: what it is, of which joint, and the unit that the header states."""
-
-    kind: Kind
-    joint: str
-    unit: str | None
+Columns = dict[tuple[str, str], tuple[int, str | None]]
+"""By quantity and joint (the empty string for time): index of the column, and the unit that its header states."""
 
 
-def allowed_columns(joints: Sequence[str]) -> str:
+def _allowed_columns(joints: Sequence[str]) -> str:
     """Say which columns a file has, for messages."""
     first = joints[0]
     rates = f"qd_{first}, ..., qdd_{first}, ... where rates are known"
     return f"t, then {', '.join(joints)} (or q_{first}, ...), and {rates}"
 
 
-def understood(
-    header: Sequence[str], joints: Sequence[str], where: str
-) -> dict[int, _Column]:
-    """Return what the columns are, by their index; those of other quantities are left out.
+def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> Columns:
+    """Find the columns of time and joints; other columns are left out.
 
     Raises
     ------
     TaskError
-        Time or a joint's position is missing or stands there twice, or only some joints have velocities or
-        accelerations.
+        Time or a joint's position is missing or given twice, or only some joints have velocities or accelerations.
     """
-    known: dict[str, tuple[Kind, str]] = dict.fromkeys(_TIME, ("t", ""))
-    for joint in joints:
-        known |= {
-            form.format(joint.lower()): ("qddot", joint) for form in _ACCELERATION
-        }
-        known |= {form.format(joint.lower()): ("qdot", joint) for form in _VELOCITY}
-        known |= {form.format(joint.lower()): ("q", joint) for form in _POSITION}
-    found: dict[int, _Column] = {}
+    meanings = dict.fromkeys(_TIME_COLUMNS, ("t", ""))
+    for kind, forms in _JOINT_COLUMNS.items():
+        for joint in joints:
+            names = forms.format(joint.lower()).split(" ")
+            meanings |= dict.fromkeys(names, (kind, joint))
+    columns: Columns = {}
+    problem = None
     for i, text in enumerate(header):
-        name, unit = text.strip().lower(), None
-        match = None if name in known else _STATED.match(name)
-        if match is not None:
-            name, unit = (
-                match[1],
-                (match[2] or match[3])
-                .replace("_per_", "/")
-                .replace("_", "/")
-                .replace("s2", "s^2"),
-            )
-        if name in known:
-            found[i] = _Column(*known[name], unit)
-    listed = [(column.kind, column.joint) for column in found.values()]
-    wanted: list[tuple[Kind, str]] = [("t", ""), *(("q", joint) for joint in joints)]
-    rates: tuple[Kind, ...] = ("qdot", "qddot")
-    wanted += [
-        (kind, joint)
-        for kind in rates
-        if any(kind == one for one, _ in listed)
-        for joint in joints
-    ]
-    for kind, joint in wanted:
-        if listed.count((kind, joint)) != 1:
-            what = f"the {_WORDS[kind]} of {joint!r}" if joint else "the time"
-            problem = f"{what} {'is missing' if (kind, joint) not in listed else 'stands there twice'}"
-            names = ", ".join(header[:_LISTED]) + (
-                ", ..." if len(header) > _LISTED else ""
-            )
-            raise TaskError(
-                problem, found=names, allowed=allowed_columns(joints), where=where
-            )
-    return found
+        name = text.strip().lower()
+        unit = None
+        if name not in meanings and (match := _NAME_AND_UNIT.match(name)):
+            name = match[1]
+            unit = (match[2] or match[3]).replace("_per_", "/").replace("_", "/")
+            unit = unit.replace("s2", "s^2")
+        if name not in meanings:
+            continue
+        if meanings[name] in columns:
+            problem = f"{_describe(*meanings[name])} is given twice"
+        columns[meanings[name]] = (i, unit)
+    kinds = dict.fromkeys(["q", *(kind for kind, joint in columns if joint)])
+    wanted = [("t", ""), *((kind, joint) for kind in kinds for joint in joints)]
+    for key in wanted:
+        if key not in columns and problem is None:
+            problem = f"{_describe(*key)} is missing"
+    if problem is not None:
+        names = [*header[:8], "..."] if len(header) > 8 else [*header]
+        raise TaskError(
+            problem,
+            found=", ".join(names),
+            allowed=_allowed_columns(joints),
+            where=where,
+        )
+    return columns
 
 
-@dataclass(frozen=True, eq=False)
-class Quantity:
-    """A column in SI units.
-
-    Attributes
-    ----------
-    values : (K,) ndarray
-    unit : str
-        In which the file has it.
-    rounding : float
-        Half of the last digit that it has there, in SI units; 0 where it has a dozen decimals.
-    """
-
-    values: np.ndarray
-    unit: str
-    rounding: float
+def _describe(kind: str, joint: str) -> str:
+    return f"the {_QUANTITIES[kind][0]} of {joint!r}" if joint else "the time"
 
 
-def in_si(
+def _read_column(
     table: Table,
-    columns: dict[int, _Column],
-    kind: Kind,
-    joint: str,
+    columns: Columns,
+    key: tuple[str, str],
     base: str,
     units: Units,
     where: str,
-) -> Quantity:
-    """Return a column in SI units.
+) -> tuple[np.ndarray, str, float]:
+    """Return a column in SI units, (K,), its unit in the file, and half of its last digit in SI units.
 
     Parameters
     ----------
     table : Table
     columns : dict
-        Of `understood`.
-    kind : {"t", "q", "qdot", "qddot"}
-    joint : str
+    key : (str, str)
+        Quantity and joint.
     base : {"s", "rad", "m"}
-        SI unit of the joint's position, or of time.
+        SI unit of time, or of the joint's position.
     units : Units
-        As the user states them.
+        Units that the user states.
     where : str
         Line of the header, for messages.
 
@@ -201,51 +177,32 @@ def in_si(
     TaskError
         A unit is unknown, or the header and the user contradict each other.
     """
-    i = next(
-        i
-        for i, column in columns.items()
-        if (column.kind, column.joint) == (kind, joint)
-    )
-    factors, asked = {
-        "s": (TIMES, units.time),
-        "rad": (ANGLES, units.angle),
-        "m": (LENGTHS, units.length),
-    }[base]
-    per = _PER[kind]
-    stated, values = columns[i].unit, table.values[:, i]
+    i, stated = columns[key]
+    name, factors = _UNITS[base]
+    asked = getattr(units, name)
+    per = _QUANTITIES[key[0]][1]
+    values = table.values[:, i]
     unit = (asked or base) if stated is None else stated.removesuffix(per)
     if unit not in factors or (stated is not None and not stated.endswith(per)):
-        allowed = ", ".join(f"{name}{per}" for name in factors)
         raise TaskError(
             f"unknown unit of column {table.header[i]}",
             found=stated,
-            allowed=allowed,
+            allowed=", ".join(f"{known}{per}" for known in factors),
             where=where,
         )
     if asked is not None and factors[asked] != factors[unit]:
-        problem = "the header contradicts the units asked for"
         raise TaskError(
-            problem, found=f"{unit} for {table.header[i]}", allowed=asked, where=where
+            "the header contradicts the units asked for",
+            found=f"{unit} for {table.header[i]}",
+            allowed=asked,
+            where=where,
         )
-    decimals = next(
-        (d for d in range(_DIGITS) if np.array_equal(np.round(values, d), values)), None
-    )
-    rounding = (
-        0.0
-        if decimals is None or not np.ptp(values)
-        else 0.5 * 10.0**-decimals * factors[unit]
-    )
-    return Quantity(values * factors[unit], f"{unit}{per}", rounding)
-
-
-FEWEST = 5
-"""Rows; a polynomial through so many gives the derivatives."""
-_LARGEST_FILE = 64_000_000
-_STILL = 1e-12
-"""rad or m: what moves less between rows with all digits stands still."""
-_SHOWS, _CLEAR = 2.2, 24.0
-"""Of the rounding: a digit has changed, which flicker does not; and the digit moves through a dozen."""
-_MANY_TURNS = 6.0 * np.pi
+    rounding = 0.0
+    for decimals in range(_EXACT_DIGITS):
+        if np.ptp(values) and np.array_equal(np.round(values, decimals), values):
+            rounding = 0.5 * 10.0**-decimals * factors[unit]
+            break
+    return values * factors[unit], f"{unit}{per}", rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,18 +212,18 @@ class Recording:
     Attributes
     ----------
     t : (K,) ndarray
-        From 0 on, s.
+        Times from 0, s.
     q : (K, n) ndarray
         rad or m.
     qdot, qddot : (K, n) ndarray or None
-        Where the file says them; rad/s or m/s, rad/s^2 or m/s^2.
+        If the file has them; rad/s or m/s, rad/s^2 or m/s^2.
     rounding : (n,) ndarray
-        Half of the last digit of every joint's positions, rad or m, where the file has few digits; else 0.
+        Half of the last digit of every joint's positions, rad or m; 0 if the file has all digits.
     units : tuple of str
         Of every joint's positions: rad or m.
     source : str
         The file.
-    told : tuple of str
+    notes : tuple of str
         What was found out about it.
     """
 
@@ -277,7 +234,7 @@ class Recording:
     rounding: np.ndarray
     units: tuple[str, ...]
     source: str
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
@@ -288,7 +245,7 @@ class Recording:
 def read_recording(
     path: str | os.PathLike[str], robot: Robot, units: Units
 ) -> Recording:
-    """Read a CSV file of time and joint positions, and of velocities where it has them.
+    """Read a CSV file of time and joint positions, and of velocities and accelerations if it has them.
 
     Rows in which the robot stands still before and after the motion are left out.
 
@@ -304,151 +261,136 @@ def read_recording(
     TaskError
         The file cannot be read, columns are missing, times do not ascend, or nothing moves.
     """
-    source, joints = Path(path), robot.joint_names
+    source = Path(path)
+    joints = robot.joint_names
     check_kind(source, "a CSV file", TaskError)
     text = read_text(
         source, where=str(source), folder=Path.cwd(), largest=_LARGEST_FILE
     )
-    allowed = allowed_columns(joints)
     table = read_table(
         text,
         str(source),
-        allowed,
-        lambda header, where: understood(header, joints, where),
+        _allowed_columns(joints),
+        lambda header, where: _find_columns(header, joints, where),
     )
     where = f"{source}: line {table.header_line}"
-    columns = understood(table.header, joints, where)
-    time = in_si(table, columns, "t", "", "s", units, where)
-    bases = tuple(zip(joints, robot.position_units, strict=True))
-    parts = [
-        in_si(table, columns, "q", name, unit, units, where) for name, unit in bases
-    ]
-    t, q = time.values, np.column_stack([part.values for part in parts])
-
-    def rates(kind: Kind) -> np.ndarray | None:
-        if not any(column.kind == kind for column in columns.values()):
-            return None
-        return np.column_stack(
-            [
-                in_si(table, columns, kind, name, unit, units, where).values
-                for name, unit in bases
+    columns = _find_columns(table.header, joints, where)
+    t, time_unit, _ = _read_column(table, columns, ("t", ""), "s", units, where)
+    parts: dict[str, np.ndarray] = {}
+    for kind in ("q", "qdot", "qddot"):
+        if (kind, joints[0]) in columns:
+            read = [
+                _read_column(table, columns, (kind, joint), base, units, where)
+                for joint, base in zip(joints, robot.position_units, strict=True)
             ]
-        )
-
+            parts[kind] = np.column_stack([values for values, _, _ in read])
+            if kind == "q":
+                position_units = [unit for _, unit, _ in read]
+                rounding = np.array([digit for _, _, digit in read])
     _check_times(t, table, source)
-    _check_angles(q, robot, units, source)
-    told = [
+    _check_angles(parts["q"], robot, units, source)
+    notes = [
         *table.told,
-        f"units: {', '.join(dict.fromkeys(part.unit for part in (time, *parts)))}",
+        f"units: {', '.join(dict.fromkeys((time_unit, *position_units)))}",
     ]
-    ignored = [name for i, name in enumerate(table.header) if i not in columns]
-    told += [f"left out the columns {', '.join(ignored)}"] if ignored else []
-    rounding = np.array([part.rounding for part in parts])
-    read = Recording(
-        t,
-        q,
-        rates("qdot"),
-        rates("qddot"),
-        rounding,
-        robot.position_units,
-        str(source),
-        tuple(told),
+    known = {i for i, _ in columns.values()}
+    ignored = [name for i, name in enumerate(table.header) if i not in known]
+    if ignored:
+        notes.append(f"left out the columns {', '.join(ignored)}")
+    return _trim(
+        Recording(
+            t,
+            parts["q"],
+            parts.get("qdot"),
+            parts.get("qddot"),
+            rounding,
+            robot.position_units,
+            str(source),
+            tuple(notes),
+        )
     )
-    return _trimmed(read)
 
 
 def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
-    if len(t) < FEWEST:
+    if len(t) < FEWEST_ROWS:
         raise TaskError(
             "too few rows for a motion",
             found=len(t),
-            allowed=f"{FEWEST} or more",
+            allowed=f"{FEWEST_ROWS} or more",
             where=str(source),
         )
-    back = np.flatnonzero(np.diff(t) <= 0.0)
-    if back.size:
-        i = int(back[0]) + 1
-        where = f"{source}: line {table.lines[i]}"
+    for i in np.flatnonzero(np.diff(t) <= 0.0):
         raise TaskError(
-            "times do not ascend", found=f"{t[i]:g} s after {t[i - 1]:g} s", where=where
+            "times do not ascend",
+            found=f"{t[i + 1]:g} s after {t[i]:g} s",
+            where=f"{source}: line {table.lines[i + 1]}",
         )
 
 
 def _check_angles(q: np.ndarray, robot: Robot, units: Units, source: Path) -> None:
-    """Refuse degrees that were taken for radians: no joint turns so often."""
-    far = np.abs(q).max(axis=0) > np.maximum(_MANY_TURNS, 1.5 * _reach(robot))
-    bad = np.flatnonzero(far & robot.revolute)
-    if bad.size and units.angle is None:
-        joint = int(bad[0])
-        found = f"{np.abs(q[:, joint]).max():.4g} rad at {robot.joint_names[joint]}"
-        hint = 'Degrees? Say so: units={"angle": "deg"}, or --angle deg; rad where it is meant so'
+    """Refuse degrees that were taken for radians: no joint turns so far."""
+    ends = np.abs([robot.limits.position_lower, robot.limits.position_upper]).max(
+        axis=0
+    )
+    reach = 1.5 * np.where(np.isfinite(ends), ends, 0.0)
+    largest = np.abs(q).max(axis=0)
+    is_far = robot.revolute & (largest > np.maximum(_MOST_TURNS, reach))
+    if is_far.any() and units.angle is None:
+        joint = int(np.argmax(is_far))
         raise TaskError(
-            "an angle is hardly meant", found=found, where=str(source), hint=hint
+            "implausible angle (degrees?)",
+            found=f"{largest[joint]:.4g} rad at {robot.joint_names[joint]}",
+            where=str(source),
+            hint='If these are degrees, say units={"angle": "deg"}, or --angle deg; if they are rad, say rad',
         )
 
 
-def _reach(robot: Robot) -> np.ndarray:
-    """Return the farther end of every joint's range, (n,); 0 where it has none."""
-    ends = np.maximum(
-        np.abs(robot.limits.position_lower), np.abs(robot.limits.position_upper)
-    )
-    return np.asarray(np.where(np.isfinite(ends), ends, 0.0))
-
-
-def _trimmed(recording: Recording) -> Recording:
+def _trim(recording: Recording) -> Recording:
     """Leave out rows in which nothing moves before the motion begins and after it has ended."""
-    t, q = recording.t, recording.q
-    first, last = (
-        _beginning(t, q, recording),
-        len(t) - 1 - _beginning(-t[::-1], q[::-1], recording),
-    )
-    if last - first + 1 < FEWEST:
-        _refuse(f"the robot moves in fewer than {FEWEST} rows", recording)
-    told = recording.told
+    t = recording.t
+    q = recording.q
+    first = _first_row(t, q, recording)
+    last = len(t) - 1 - _first_row(-t[::-1], q[::-1], recording)
+    if last - first + 1 < FEWEST_ROWS:
+        raise _no_motion(f"the robot moves in fewer than {FEWEST_ROWS} rows", recording)
+    notes = list(recording.notes)
     for rows, time, when in (
         (first, t[first] - t[0], "before"),
         (len(t) - 1 - last, t[-1] - t[last], "after"),
     ):
         if rows:
-            many = f"{rows} row{'s' * (rows > 1)}"
-            told = (
-                *told,
-                f"left out {time:.6g} s {when} the motion, in which the robot stands still ({many})",
+            notes.append(
+                f"left out {time:.6g} s {when} the motion, in which the robot stands still ({write_count(rows, 'row')})"
             )
     kept = slice(first, last + 1)
-    rates = {
-        name: part[kept]
-        for name in ("qdot", "qddot")
-        if (part := getattr(recording, name)) is not None
-    }
-    return replace(recording, t=t[kept] - t[first], q=q[kept], **rates, told=told)
+    rates: dict[str, Any] = {}
+    for name in ("qdot", "qddot"):
+        part = getattr(recording, name)
+        rates[name] = None if part is None else part[kept]
+    return replace(
+        recording, t=t[kept] - t[first], q=q[kept], notes=tuple(notes), **rates
+    )
 
 
-def _beginning(t: np.ndarray, q: np.ndarray, recording: Recording) -> int:
-    """Return the row at which motion sets in.
+def _first_row(t: np.ndarray, q: np.ndarray, recording: Recording) -> int:
+    """Return the row at which motion begins.
 
-    Where digits are few, a gentle motion has been going on for a while when the last digit shows it: it goes as the
-    cube of time, and is so far after twice the time where it is eight times as large.
+    If the file has few digits, a gentle motion has been going on for a while when the last digit shows it. It grows as
+    the cube of time, so that it is eight times as large after twice the time.
     """
     away = np.abs(q - q[0])
-    shown = np.flatnonzero(
-        (away > np.maximum(_STILL, _SHOWS * recording.rounding)).any(axis=1)
-    )
-    if not shown.size:
-        _refuse("the robot does not move", recording)
-    clear = np.flatnonzero(
-        (away > np.maximum(_STILL, _CLEAR * recording.rounding)).any(axis=1)
-    )
-    lead = t[clear[0]] - t[shown[0]] if clear.size else 0.0
-    return int(
-        np.clip(
-            np.searchsorted(t, t[shown[0]] - lead, side="right") - 1, 0, shown[0] - 1
-        )
-    )
+    changed = away > np.maximum(_STILL, _CHANGED_DIGITS * recording.rounding)
+    clear = away > np.maximum(_STILL, _CLEAR_DIGITS * recording.rounding)
+    if not changed.any():
+        raise _no_motion("the robot does not move", recording)
+    row = int(np.argmax(changed.any(axis=1)))
+    lead = t[np.argmax(clear.any(axis=1))] - t[row] if clear.any() else 0.0
+    before = np.searchsorted(t, t[row] - lead, side="right") - 1
+    return int(np.clip(before, 0, row - 1))
 
 
-def _refuse(problem: str, recording: Recording) -> NoReturn:
-    raise TaskError(
+def _no_motion(problem: str, recording: Recording) -> TaskError:
+    return TaskError(
         problem,
         found=write_count(len(recording.t), "row"),
         allowed="a motion",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.apps.plots import style
-from brachis.apps.sweeps.pools import VERIFIED
+from brachis.apps.sweeps.plans import VERIFIED
 from brachis.errors import InputError
 from brachis.task.schema import unit_of
 
@@ -18,17 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _HEIGHT = 62.0
-_CELL_MM = 8.0
-_HIGHEST = 180.0
+"""Height of a line plot, and lowest height of a heat map, mm."""
 _MOST_TICKS = 12
-_MOST_WRITTEN = 12
-_FILLED = 0.5
-"""Part of all combinations of two keys that have to be there for a heat map; draws at random are points."""
-_ALIKE, _MOST_DECIMALS = 1e-5, 5
-"""Of the longest time: plans that differ by less are as good as the same."""
+"""Names along one axis, and cells of a heat map along one axis that have their times written in them."""
 _COLOURS = "viridis"
-_LABEL = r"$t_\mathrm{E}$ (s)"
-_Cells = Mapping[tuple[Any, ...], float]
+_END_TIME = r"$t_\mathrm{E}$ (s)"
 
 
 def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure:
@@ -39,8 +33,8 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     rows : sequence of mapping
         With the keys, ``status`` and ``t_end_s`` (s). Of plans that agree in the keys the fastest is shown.
     keys : sequence of str
-        One or two. Where few of the combinations of two are there, as with random draws, points take the place of the
-        heat map.
+        One or two. Of two keys with less than half of their combinations, as of random draws, points are shown instead
+        of a heat map.
 
     Returns
     -------
@@ -50,7 +44,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     Raises
     ------
     InputError
-        There is no key or more than two, or no plan is verified.
+        There are no keys or more than two, or no plan is verified.
     """
     if len(keys) not in (1, 2):
         raise InputError(
@@ -59,25 +53,85 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
             found=len(keys),
             allowed="1 or 2 keys that vary",
         )
-    cells: dict[tuple[Any, ...], float] = {}
-    for row in rows:
-        place = tuple(row[key] for key in keys)
-        t_end = row["t_end_s"] if row["status"] == VERIFIED else math.inf
-        cells[place] = min(t_end, cells.get(place, math.inf))
-    if not any(map(math.isfinite, cells.values())):
+    cells = _find_fastest(rows, keys)
+    times = np.array([*cells.values()])
+    is_verified = np.isfinite(times)
+    if not is_verified.any():
         raise InputError(
             "there is nothing to draw", where="plans", found="none that is verified"
         )
-    axes = [_values([place[axis] for place in cells]) for axis in range(len(keys))]
+    columns = list(zip(*cells, strict=True))
+    values = [_sort_values(column) for column in columns]
+    is_heat_map = len(keys) == 2 and 2 * len(cells) >= math.prod(map(len, values))
+    places = [
+        _places(column, distinct, is_heat_map)
+        for column, distinct in zip(columns, values, strict=True)
+    ]
+    height = _HEIGHT if len(keys) == 1 else 1.4 * _HEIGHT
+    if is_heat_map:
+        height = min(180.0, max(_HEIGHT, 24.0 + 8.0 * len(values[1])))
+    width = style.COLUMN_WIDTH if len(keys) == 1 else style.PAGE_WIDTH
+    figure = style.new_figure(width, height)
+    ax = figure.add_subplot()
+    x = places[0]
     if len(keys) == 1:
-        return _line(cells, axes[0], keys[0])
-    if len(cells) >= _FILLED * len(axes[0]) * len(axes[1]):
-        return _heat_map(cells, axes, keys)
-    return _points(cells, axes, keys)
+        y = np.full(len(x), times[is_verified].max())
+        order = np.argsort(x)
+        shown = np.where(is_verified, times, np.nan)
+        look = style.joint_style(0)
+        look["linestyle"] = "-" if _are_numbers(values[0]) else "none"
+        ax.plot(x[order], shown[order], marker="o", markersize=3.0, **look)
+        style.dress(ax, _title(keys[0]), _END_TIME)
+    else:
+        y = places[1]
+        draw = _draw_heat_map if is_heat_map else _draw_points
+        image = draw(ax, x[is_verified], y[is_verified], times[is_verified])
+        style.dress(ax, _title(keys[0]), _title(keys[1]))
+        style.dress(figure.colorbar(image, ax=ax).ax, "", _END_TIME)
+    if not is_verified.all():
+        ax.scatter(
+            x[~is_verified],
+            y[~is_verified],
+            marker="x",
+            color=style.COLOURS[1],
+            s=18.0,
+            linewidths=0.8,
+            label="no verified plan",
+            zorder=3.0,
+        )
+        style.legend_above(ax, style.COLUMN_WIDTH)
+    for axis, distinct in zip("xy"[: len(keys)], values, strict=True):
+        if is_heat_map or not _are_numbers(distinct):
+            ticks = range(0, len(distinct), math.ceil(len(distinct) / _MOST_TICKS))
+            names = [_write_value(distinct[tick]) for tick in ticks]
+            ax.set(**{f"{axis}ticks": list(ticks), f"{axis}ticklabels": names})
+    return figure
 
 
-def _values(found: Sequence[Any]) -> list[Any]:
-    """List the values of a key: numbers sorted, others as they come."""
+def _find_fastest(
+    rows: Sequence[Mapping[str, Any]], keys: Sequence[str]
+) -> dict[tuple[Any, ...], float]:
+    """Return the shortest end time by the values of the keys; infinity where no plan is verified."""
+    cells: dict[tuple[Any, ...], float] = {}
+    for row in rows:
+        cell = tuple(row[key] for key in keys)
+        t_end = row["t_end_s"] if row["status"] == VERIFIED else math.inf
+        cells[cell] = min(t_end, cells.get(cell, math.inf))
+    return cells
+
+
+def _places(
+    column: Sequence[Any], distinct: Sequence[Any], side_by_side: bool
+) -> np.ndarray:
+    """Return where values lie on an axis: numbers at themselves, others, and all of a heat map, side by side."""
+    if _are_numbers(distinct) and not side_by_side:
+        return np.array(column, float)
+    place = {value: i for i, value in enumerate(distinct)}
+    return np.array([place[value] for value in column], float)
+
+
+def _sort_values(found: Sequence[Any]) -> list[Any]:
+    """List the values of a key: numbers sorted, others in their order."""
     values = list(dict.fromkeys(found))
     return sorted(values) if _are_numbers(values) else values
 
@@ -89,80 +143,34 @@ def _are_numbers(values: Sequence[Any]) -> bool:
     )
 
 
-def _line(cells: _Cells, values: list[Any], key: str) -> Figure:
-    figure = style.new_figure(style.COLUMN_WIDTH, _HEIGHT)
-    ax = figure.add_subplot()
-    times = np.array([cells[(value,)] for value in values])
-    found = np.isfinite(times)
-    places = _places(values)
-    line = "-" if _are_numbers(values) else "none"
-    ax.plot(
-        places,
-        np.where(found, times, np.nan),
-        marker="o",
-        markersize=3.0,
-        **{**style.joint_style(0), "linestyle": line},
-    )
-    _cross(ax, places[~found], np.full((~found).sum(), times[found].max()))
-    style.dress(ax, _title(key), _LABEL)
-    _name(ax, "x", values)
-    return figure
+def _draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
+    return ax.scatter(x, y, c=times, cmap=_COLOURS, s=14.0)
 
 
-def _heat_map(cells: _Cells, axes: Sequence[list[Any]], keys: Sequence[str]) -> Figure:
-    columns, rows = axes
-    times = np.array(
-        [[cells.get((column, row), math.nan) for column in columns] for row in rows]
-    )
-    figure = style.new_figure(
-        style.PAGE_WIDTH, min(_HIGHEST, max(_HEIGHT, 24.0 + _CELL_MM * len(rows)))
-    )
-    ax = figure.add_subplot()
-    shown = np.where(np.isfinite(times), times, np.nan)
-    image = ax.imshow(shown, cmap=_COLOURS, aspect="auto", origin="lower")
-    failed = np.argwhere(np.isinf(times))
-    _cross(ax, failed[:, 1], failed[:, 0])
-    if max(times.shape) <= _MOST_WRITTEN:
-        middle, decimals = 0.5 * (np.nanmin(shown) + np.nanmax(shown)), _decimals(shown)
-        for (row, column), time in np.ndenumerate(shown):
-            if math.isfinite(time):
-                colour = "white" if time < middle else "black"
-                ax.text(
-                    column,
-                    row,
-                    f"{time:.{decimals}f}",
-                    color=colour,
-                    ha="center",
-                    va="center",
-                    fontsize=style.TICK_SIZE,
-                )
-    _finish(figure, ax, image, keys)
-    _name(ax, "x", columns, always=True)
-    _name(ax, "y", rows, always=True)
-    return figure
-
-
-def _points(cells: _Cells, axes: Sequence[list[Any]], keys: Sequence[str]) -> Figure:
-    figure = style.new_figure(style.PAGE_WIDTH, 1.4 * _HEIGHT)
-    ax = figure.add_subplot()
-    where = [dict(zip(values, _places(values), strict=True)) for values in axes]
-    at = np.array([[where[0][first], where[1][second]] for first, second in cells])
-    times = np.array(list(cells.values()))
-    found = np.isfinite(times)
-    image = ax.scatter(
-        at[found, 0], at[found, 1], c=times[found], cmap=_COLOURS, s=14.0
-    )
-    _cross(ax, at[~found, 0], at[~found, 1])
-    _finish(figure, ax, image, keys)
-    _name(ax, "x", axes[0])
-    _name(ax, "y", axes[1])
-    return figure
-
-
-def _finish(figure: Figure, ax: Axes, image: Any, keys: Sequence[str]) -> None:
-    style.dress(ax, _title(keys[0]), _title(keys[1]))
-    bar = figure.colorbar(image, ax=ax)
-    style.dress(bar.ax, "", _LABEL)
+def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
+    """Draw cells at whole numbers x and y; small maps have the times written in them."""
+    grid = np.full((int(y.max()) + 1, int(x.max()) + 1), np.nan)
+    grid[y.astype(int), x.astype(int)] = times
+    image = ax.imshow(grid, cmap=_COLOURS, aspect="auto", origin="lower")
+    if max(grid.shape) > _MOST_TICKS:
+        return image
+    differences = np.diff(np.unique(times))
+    differences = differences[differences > 1e-5 * times.max()]
+    decimals = 2
+    if len(differences):  # as many as show them, five at most
+        decimals = int(np.clip(np.ceil(-np.log10(differences.min()) - 1e-6), 2, 5))
+    middle = 0.5 * (times.min() + times.max())
+    for column, row, time in zip(x, y, times, strict=True):
+        ax.text(
+            column,
+            row,
+            f"{time:.{decimals}f}",
+            color="white" if time < middle else "black",
+            ha="center",
+            va="center",
+            fontsize=style.TICK_SIZE,
+        )
+    return image
 
 
 def _title(key: str) -> str:
@@ -171,52 +179,7 @@ def _title(key: str) -> str:
     return style.plain(f"{key} ({unit})" if unit else key)
 
 
-def _decimals(times: np.ndarray) -> int:
-    """Return how many decimals tell the times, s, apart that differ by more than `_ALIKE`, two at least."""
-    apart = np.diff(np.unique(times[np.isfinite(times)]))
-    apart = apart[apart > _ALIKE * np.nanmax(times)]
-    return (
-        int(np.clip(np.ceil(-np.log10(apart.min()) - 1e-6), 2, _MOST_DECIMALS))
-        if len(apart)
-        else 2
-    )
-
-
-def _places(values: Sequence[Any]) -> np.ndarray:
-    """Where values lie on an axis: at themselves where they are numbers, otherwise one beside the other."""
-    return np.array(values if _are_numbers(values) else range(len(values)), float)
-
-
-def _name(ax: Axes, axis: str, values: Sequence[Any], *, always: bool = False) -> None:
-    """Write names beside the places of values that are not numbers, or of all."""
-    if always or not _are_numbers(values):
-        step = math.ceil(len(values) / _MOST_TICKS)
-        shown = range(0, len(values), step)
-        ax.set(
-            **{
-                f"{axis}ticks": list(shown),
-                f"{axis}ticklabels": [_write_value(values[place]) for place in shown],
-            }
-        )
-
-
 def _write_value(value: Any) -> str:
     if value is None:
         return "not set"
     return f"{value:.4g}" if _are_numbers([value]) else style.plain(str(value))
-
-
-def _cross(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Mark plans that are not verified."""
-    if len(x):
-        ax.scatter(
-            x,
-            y,
-            marker="x",
-            color=style.COLOURS[1],
-            s=18.0,
-            linewidths=0.8,
-            label="no verified plan",
-            zorder=3.0,
-        )
-        style.legend_above(ax, style.COLUMN_WIDTH)

@@ -1,10 +1,13 @@
-"""From a sweep file to the plans that it asks for, each known by all that decides its outcome."""
+"""From a sweep file to the plans that it asks for, each known by all that decides its outcome; and making a plan."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
+import tempfile
+import time
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +16,15 @@ from typing import Any
 from pydantic import ValidationError
 
 import brachis
+from brachis import planner
 from brachis.apps.sweeps.settings import SweepSettings
 from brachis.common.arguments import file_name
 from brachis.common.files import Kind, check_kind, read_text
-from brachis.errors import BrachisError, TaskError, UnknownNameError
+from brachis.errors import BrachisError, ClusterError, TaskError, UnknownNameError
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
+from brachis.robot.plausibility import PlausibilityWarning
 from brachis.robot.urdf import read_file
 from brachis.task import Task, with_keys
 from brachis.task.fields import plain
@@ -50,6 +55,41 @@ class Plan:
     version: str
 
 
+VERIFIED = "verified"
+UNVERIFIED = "unverified"
+FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a plan.
+
+    Attributes
+    ----------
+    facts : dict
+        Values of `brachis.apps.sweeps.result.COLUMNS`; those that are left out are null.
+    motion : bytes or None
+        The saved trajectory, an npz archive.
+    """
+
+    facts: dict[str, Any]
+    motion: bytes | None = None
+
+    @classmethod
+    def of_error(
+        cls, error: BaseException, wall_time: float | None = None, *, message: str = ""
+    ) -> Outcome:
+        """Return the outcome of a plan that failed; the message is the error's own unless another is given."""
+        return cls(
+            {
+                "status": FAILED,
+                "error": type(error).__name__,
+                "message": message or str(error) or type(error).__name__,
+                "wall_time_s": wall_time,
+            }
+        )
+
+
 @dataclass(frozen=True)
 class Row:
     """One row of the sweep's table.
@@ -57,9 +97,9 @@ class Row:
     Attributes
     ----------
     changes : mapping
-        What it sets of the varied keys.
+        Values of the varied keys.
     plan : Plan or BrachisError
-        The error is why there is no plan.
+        An error if the task is refused.
     """
 
     changes: Mapping[str, Any]
@@ -102,15 +142,14 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         others of the key are not becomes a row with that error.
     """
     content: object = source
-    name, folder = "sweep", Path.cwd()
+    name = "sweep"
+    folder = Path.cwd()
     if not isinstance(source, Mapping):
         path = file_name(source, "source")
         check_kind(path, Kind.SWEEP, TaskError)
-        content, name, folder = (
-            _yaml(path, Path.cwd()),
-            str(path),
-            path.absolute().parent,
-        )
+        content = _read(path, folder)
+        name = str(path)
+        folder = path.absolute().parent
     if not isinstance(content, Mapping):
         raise TaskError(
             "a sweep is a mapping",
@@ -124,34 +163,27 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         settings = SweepSettings.model_validate(plain(content))
     except ValidationError as error:
         raise task_error(error, name, SweepSettings) from None
-    base, task_name, task_folder = _base(settings, name, folder)
+    base: object = settings.task
+    task_name = f"{name}: task"
+    if isinstance(base, str):
+        path = folder / base
+        base = _read(path, folder)
+        task_name = str(path)
+        folder = path.parent
+    if not isinstance(base, Mapping):
+        raise TaskError("a task is a mapping", found=show(base), where=task_name)
     base = with_keys(base, settings.fixed)
     rows = tuple(
-        Row(changes, _plan(base, changes, task_name, task_folder))
+        Row(changes, _plan(base, changes, task_name, folder))
         for changes in settings.changes()
     )
     _check_keys(settings, rows, name)
     return SweepPlan(settings, base, rows)
 
 
-def _yaml(path: Path, folder: Path) -> object:
-    return read_yaml(
-        read_text(path, where=str(path), folder=folder, largest=LARGEST_TASK), str(path)
-    )
-
-
-def _base(
-    settings: SweepSettings, name: str, folder: Path
-) -> tuple[Mapping[str, Any], str, Path]:
-    """Return the task that is varied, not checked yet, with what its messages name and its files are relative to."""
-    if not isinstance(settings.task, str):
-        assert isinstance(settings.task, dict)
-        return settings.task, f"{name}: task", folder
-    path = folder / settings.task
-    content = _yaml(path, folder)
-    if not isinstance(content, Mapping):
-        raise TaskError("a task is a mapping", found=show(content), where=str(path))
-    return content, str(path), path.parent
+def _read(path: Path, folder: Path) -> object:
+    text = read_text(path, where=str(path), folder=folder, largest=LARGEST_TASK)
+    return read_yaml(text, str(path))
 
 
 def _plan(
@@ -166,55 +198,52 @@ def _plan(
         urdf = read_file(Path(task.robot.urdf))
     except BrachisError as error:
         return error
-    # Plans are made side by side already; how many processes a single one may use must not tell them apart.
-    task = task.model_copy(
-        update={"search": task.search.model_copy(update={"jobs": 1})}
-    )
+    # Plans run side by side already, and the number of processes of one must not make it another plan.
+    search = task.search.model_copy(update={"jobs": 1})
+    task = task.model_copy(update={"search": search})
     known = task.to_dict()
     known["robot"].pop("urdf", None)  # its text counts, not where it is
     said = json.dumps([known, urdf, brachis.__version__], sort_keys=True)
-    return Plan(
-        hashlib.sha256(said.encode()).hexdigest()[:16], task, urdf, brachis.__version__
-    )
+    digest = hashlib.sha256(said.encode()).hexdigest()[:16]
+    return Plan(digest, task, urdf, brachis.__version__)
 
 
 def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None:
-    """Refuse keys with which no task is one, and names that the robot does not know.
+    """Refuse keys that make every task wrong, and names that the robot does not have.
 
     Raises
     ------
     TaskError
     """
-    tried: dict[str, BrachisError | None] = {}
+    unknown: dict[str, BrachisError | None] = {}
     refused: dict[str, str] = {}
     for key in settings.keys or ("task",):
-        having = [row for row in rows if key in row.changes or not row.changes]
-        sound = [row.plan for row in having if isinstance(row.plan, Plan)]
-        for plan in sound:
-            if plan.digest not in tried:
-                tried[plan.digest] = _unknown_name(plan)
-            if tried[plan.digest] is None:
+        plans = [row.plan for row in rows if key in row.changes or not row.changes]
+        first = None
+        for plan in sorted(plans, key=lambda plan: isinstance(plan, BrachisError)):
+            error = plan if isinstance(plan, BrachisError) else None
+            if isinstance(plan, Plan):
+                if plan.digest not in unknown:
+                    unknown[plan.digest] = _unknown_name(plan)
+                error = unknown[plan.digest]
+            first = first or error
+            if error is None:
                 break
-        errors = [tried[plan.digest] for plan in sound if plan.digest in tried]
-        errors = errors or [
-            row.plan for row in having if isinstance(row.plan, BrachisError)
-        ]
-        if all(errors):
+        else:
             refused[key] = (
-                f"refused in every plan that sets it ({len(having)}); the first: {errors[0]}"
+                f"refused in every plan that sets it ({len(plans)}); the first: {first}"
             )
     if refused:
         # One wrong key refuses the plans of all others.
-        key = next(
-            (each for each in refused if each in refused[each]), next(iter(refused))
-        )
+        named = [key for key in refused if key in refused[key]]
+        key = named[0] if named else next(iter(refused))
         raise TaskError(refused[key], where=f"{name}: {key}")
 
 
 def _unknown_name(plan: Plan) -> BrachisError | None:
-    """Return why the robot does not know a joint or frame that the plan names.
+    """Return the error of a plan that names a joint or frame that the robot does not have.
 
-    What else robot and path refuse depends on values, of which others may be sound.
+    Other errors of robot and path depend on values, and other values of the same key may be right.
     """
     try:
         Problem.of(robot_of(plan), plan.task)
@@ -228,3 +257,49 @@ def _unknown_name(plan: Plan) -> BrachisError | None:
 def robot_of(plan: Plan) -> Robot:
     """Make the robot of a plan; reads no file."""
     return robot_from_settings(plan.task.robot, urdf_text=plan.urdf)
+
+
+def run_plan(plan: Plan) -> Outcome:
+    """Make a plan; a worker calls this.
+
+    Raises
+    ------
+    ClusterError
+        This process has another version of brachis than the one that asks.
+    """
+    if plan.version != brachis.__version__:
+        raise ClusterError(
+            "a worker has another version of brachis",
+            found=brachis.__version__,
+            allowed=plan.version,
+            hint="Install the same everywhere",
+        )
+    began = time.perf_counter()
+    try:
+        with warnings.catch_warnings():  # they are among the outcome's remarks
+            warnings.simplefilter("ignore", PlausibilityWarning)
+            result = planner.plan(
+                robot_of(plan), plan.task, progress=False, check_advice=False
+            )
+        wall_time = time.perf_counter() - began
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "motion.npz"
+            result.trajectory.save(path)
+            motion = path.read_bytes()
+    except Exception as error:  # noqa: BLE001  (one of thousands of plans must not end the others)
+        return Outcome.of_error(error, time.perf_counter() - began)
+    undone = (f"not completed: {each}" for each in result.not_completed)
+    remarks = [*map(str, result.warnings), *undone]
+    facts = {
+        "status": VERIFIED if result.verified else UNVERIFIED,
+        "t_end_s": result.t_end,
+        "worst_ratio": result.verification.worst_ratio,
+        "path_error": result.verification.path_error,
+        "chosen_joints": ", ".join(result.trajectory.redundant_joints),
+        "chosen_branch": result.trajectory.branch,
+        "chosen_solver": result.solver_report.solver,
+        "iterations": sum(report.iterations for report in result.candidate.reports),
+        "wall_time_s": wall_time,
+        "remarks": "; ".join(remarks) or None,
+    }
+    return Outcome(facts, motion)

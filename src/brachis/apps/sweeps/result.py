@@ -1,6 +1,4 @@
-"""What a sweep gives: its table, and what can be read off it.
-
-A sweep's folder: every finished plan in files of its own, and the table of all of them.
+"""What a sweep gives: its folder, with every finished plan in files of its own, and the table of all plans.
 
 ``plans/3f/3f0a....parquet`` is one row, ``plans/3f/3f0a....npz`` its motion. Both are whole or not there: they are
 written under temporary names, the motion first, so that a row is a plan that is finished.
@@ -17,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from brachis.apps.sweeps.pools import FAILED, UNVERIFIED, VERIFIED, Outcome
+from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED, Outcome
 from brachis.apps.sweeps.settings import SweepSettings
 from brachis.common.files import (
     atomic_write,
@@ -50,7 +48,7 @@ COLUMNS = {
     "remarks": "string",
     "motion": "string",
 }
-"""Of what came of a plan: names and Arrow types. Times in s; the path error in m, or rad, whichever is larger."""
+"""Columns of an outcome: names and Arrow types. Times in s; the path error in m or rad, whichever is larger."""
 TABLES = ("table.parquet", "table.csv")
 _ABOUT = "sweep.json"
 _MARK = "brachis_sweep"
@@ -92,50 +90,36 @@ class Store:
         self._arrow = arrow()
         with writing_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
-            foreign = any(folder.iterdir()) and not self._is_ours()
-        if foreign:
-            problem = "the folder holds other files"
+            is_foreign = any(folder.iterdir()) and self.read_description() is None
+        if is_foreign:
             raise InputError(
-                problem,
+                "the folder holds other files",
                 where=str(folder),
                 allowed=f"a new folder, or one with a sweep's {_ABOUT}",
             )
-
-    def _is_ours(self) -> bool:
-        try:
-            return _MARK in json.loads(read_file(self.folder / _ABOUT))
-        except (OSError, ValueError, TypeError):
-            return False
 
     def describe(self, about: Mapping[str, Any]) -> None:
         """Write down what the folder is for."""
         with atomic_write(self.folder / _ABOUT) as stream:
             stream.write(json.dumps({_MARK: 1, **about}, indent=2).encode() + b"\n")
 
-    def about(self) -> dict[str, Any]:
-        """Return what was written down.
-
-        Raises
-        ------
-        InputError
-            The folder is not a sweep's.
-        """
-        if not self._is_ours():
-            raise InputError(
-                "the folder is not a sweep's",
-                where=str(self.folder),
-                allowed=f"one with its {_ABOUT}",
-            )
-        about: dict[str, Any] = json.loads(read_file(self.folder / _ABOUT))
-        return about
+    def read_description(self) -> dict[str, Any] | None:
+        """Return what was written down; None if the folder is not a sweep's."""
+        try:
+            about: dict[str, Any] = json.loads(read_file(self.folder / _ABOUT))
+            is_ours = _MARK in about
+        except (OSError, ValueError, TypeError):
+            return None
+        return about if is_ours else None
 
     def _place(self, digest: str, suffix: str) -> Path:
-        """Name a file; of folders with thousands of files every write would have to read the list."""
+        """Name a file of a plan, in one of 256 folders: a folder with thousands of files is slow to write to."""
         return self.folder / "plans" / digest[:2] / f"{digest}{suffix}"
 
     def write(self, digest: str, outcome: Outcome) -> dict[str, Any]:
         """Store a finished plan; returns its columns."""
-        motion, part = self._place(digest, ".npz"), self._place(digest, ".parquet")
+        motion = self._place(digest, ".npz")
+        part = self._place(digest, ".parquet")
         with writing_errors(part):
             part.parent.mkdir(parents=True, exist_ok=True)
         facts = {**dict.fromkeys(COLUMNS), **outcome.facts}
@@ -151,52 +135,44 @@ class Store:
         return facts
 
     def read(self, digest: str) -> dict[str, Any] | None:
-        """Return the columns of a finished plan; None where it is not stored, or not as a whole."""
+        """Return the columns of a finished plan; None if it is not stored completely."""
         try:
             content = read_file(self._place(digest, ".parquet"))
             table = self._arrow.parquet.read_table(self._arrow.BufferReader(content))
             (facts,) = table.to_pylist()
         except (OSError, ValueError, self._arrow.ArrowException):
             return None
-        whole = set(facts) == set(COLUMNS) and (
-            not facts["motion"] or is_file(self.folder / facts["motion"])
-        )
-        return facts if whole else None
+        if set(facts) != set(COLUMNS):
+            return None
+        motion = facts["motion"]
+        return None if motion and not is_file(self.folder / motion) else facts
 
-    def table(
+    def write_table(
         self,
         keys: Sequence[str],
         rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]],
     ) -> pa.Table:
-        """Make the table of all plans.
+        """Write the table of all plans as Parquet and as CSV, and return it.
 
         Parameters
         ----------
         keys : sequence of str
-            Columns of what was varied.
+            The varied keys.
         rows : sequence of (mapping, mapping)
-            What a plan sets of them, and its columns.
+            Values of these keys, and the columns of the outcome.
         """
         pa = self._arrow
-        varied = {
-            key: _column([changes.get(key) for changes, _ in rows]) for key in keys
-        }
-        found = {
-            name: pa.array([facts[name] for _, facts in rows], kind)
-            for name, kind in COLUMNS.items()
-        }
-        return pa.table(
-            {"plan": pa.array(range(len(rows)), "int64"), **varied, **found}
-        )
-
-    def write_table(self, table: pa.Table) -> None:
-        """Write the table as Parquet and as CSV."""
-        pa = self._arrow
-        for name, write in zip(
-            TABLES, (pa.parquet.write_table, pa.csv.write_csv), strict=True
-        ):
+        columns = {"plan": pa.array(range(len(rows)), "int64")}
+        for key in keys:
+            columns[key] = _column([changes.get(key) for changes, _ in rows])
+        for name, kind in COLUMNS.items():
+            columns[name] = pa.array([facts[name] for _, facts in rows], kind)
+        table = pa.table(columns)
+        writers = (pa.parquet.write_table, pa.csv.write_csv)
+        for name, write in zip(TABLES, writers, strict=True):
             with atomic_write(self.folder / name) as stream:
                 write(table, stream)
+        return table
 
     def read_table(self) -> pa.Table:
         """Read the table.
@@ -204,7 +180,7 @@ class Store:
         Raises
         ------
         InputError
-            There is none that can be read.
+            It is missing or cannot be read.
         """
         path = self.folder / TABLES[0]
         try:
@@ -216,20 +192,13 @@ class Store:
 
 
 def _column(values: Sequence[Any]) -> list[Any]:
-    """Return values of one kind as they are, and others, lists for example, as JSON."""
-    kinds = {
-        bool if isinstance(value, bool) else type(value)
-        for value in values
-        if value is not None
-    }
+    """Return numbers, texts and truth values as they are, and others, lists for example, as JSON."""
+    kinds = {type(value) for value in values if value is not None}
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
     if len(kinds) <= 1 and kinds <= {int, float, str, bool}:
         return list(values)
     return [None if value is None else json.dumps(value) for value in values]
-
-
-_MOST_AXES = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -286,7 +255,14 @@ class SweepResult(Summary):
         if not is_folder(path):
             raise InputError("there is no such folder", where=str(path))
         store = Store(path)
-        settings = SweepSettings.model_validate(store.about()["settings"])
+        about = store.read_description()
+        if about is None:
+            raise InputError(
+                "the folder is not a sweep's",
+                where=str(path),
+                allowed=f"one with its {_ABOUT}",
+            )
+        settings = SweepSettings.model_validate(about["settings"])
         return cls(path, settings.keys, store.read_table())
 
     @property
@@ -362,26 +338,20 @@ class SweepResult(Summary):
     def summary(self) -> dict[str, Any]:
         """Return the sweep in short: numbers of plans, best, median and worst verified ones, failures by cause."""
         ranked = self.ranked()
-        places = (
-            {"best": 0, "median": (len(ranked) - 1) // 2, "worst": -1} if ranked else {}
-        )
-        return {
-            "plans": len(self.table),
-            **{status: self.count(status) for status in (VERIFIED, UNVERIFIED, FAILED)},
-            **{
-                name: {
-                    key: ranked[place][key] for key in ("plan", *self.keys, "t_end_s")
-                }
-                for name, place in places.items()
-            },
-            "failures": {
-                error: {"plans": count, "message": message}
-                for error, (count, message) in self.failures().items()
-            },
-            "wall_time_s": sum(
-                filter(None, self.table.column("wall_time_s").to_pylist())
-            ),
+        found: dict[str, Any] = {"plans": len(self.table)}
+        for status in (VERIFIED, UNVERIFIED, FAILED):
+            found[status] = self.count(status)
+        if ranked:
+            median = ranked[(len(ranked) - 1) // 2]
+            shown = {"best": ranked[0], "median": median, "worst": ranked[-1]}
+            for name, row in shown.items():
+                found[name] = {key: row[key] for key in ("plan", *self.keys, "t_end_s")}
+        found["failures"] = {
+            error: {"plans": count, "message": message}
+            for error, (count, message) in self.failures().items()
         }
+        times = self.table.column("wall_time_s").to_pylist()
+        return {**found, "wall_time_s": sum(filter(None, times))}
 
     def plot(self, keys: Sequence[str] | None = None) -> Figure:
         """Draw the end times of verified plans over one key, a line, or two, a heat map.
@@ -404,4 +374,4 @@ class SweepResult(Summary):
                 raise UnknownNameError(
                     "key that varies", key, self.varied, where="keys"
                 )
-        return plot_sweep(self.rows(), tuple(keys or self.varied[:_MOST_AXES]))
+        return plot_sweep(self.rows(), tuple(keys or self.varied[:2]))

@@ -1,4 +1,4 @@
-"""Running a sweep: what is stored is kept, the rest is planned, and every plan is stored as soon as it is finished."""
+"""Running a sweep: stored plans are kept, the others are made, and each is stored as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -11,16 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import brachis
-from brachis.apps.sweeps.plans import Plan, SweepPlan, load_sweep
-from brachis.apps.sweeps.pools import FAILED, Outcome, pool_for
+from brachis.apps.sweeps.plans import FAILED, Outcome, Plan, SweepPlan, load_sweep
+from brachis.apps.sweeps.pools import Pool, pool_for
 from brachis.apps.sweeps.result import COLUMNS, Store, SweepResult
 from brachis.common import interrupts
 from brachis.common.arguments import check_callable
 from brachis.common.progress import Listener, report_progress
 from brachis.errors import write_count
-
-_MINUTE, _HOUR = 60, 3600
-"""Seconds."""
 
 
 def sweep(
@@ -43,18 +40,18 @@ def sweep(
     Parameters
     ----------
     source : path or mapping
-        A sweep file, or its content; see `SweepSettings`.
+        A sweep file, or its content as in `SweepSettings`.
     out : path, optional
         Folder; by default one in the current folder, named as the file without its suffix, or ``sweep``.
     jobs : int, optional
         Processes on this machine, no more than it has processors, which is also the default.
     scheduler : str, optional
-        Where plans are made instead: address of a Dask scheduler, such as ``tcp://host:8786``, or its scheduler file.
+        Makes the plans on a cluster: address of a Dask scheduler, such as ``tcp://host:8786``, or its scheduler file.
         The workers need brachis, and no files.
     retry : bool, optional
         Whether stored failures are planned again.
     listener : callable, optional
-        Told how far the sweep is, and how much time is left.
+        Called with how far the sweep is, and how much time is left.
     progress : bool, optional
         Whether to show that, as `plan` does.
 
@@ -91,124 +88,75 @@ def sweep(
     """
     check_callable(listener, "listener")
     with report_progress(listener, progress) as tell:
-        return _sweep(source, out, jobs, scheduler, retry=retry, listener=tell)
+        tell("checking the sweep")
+        planned = load_sweep(source)
+        pool = pool_for(jobs, scheduler, tell)
+        name = "sweep" if isinstance(source, Mapping) else Path(source).stem
+        store = Store(Path(name if out is None else out))
+        settings = planned.settings.model_dump(mode="json", exclude_defaults=True)
+        store.describe(
+            {"version": brachis.__version__, "settings": settings, "task": planned.base}
+        )
+        found = _run(planned, store, pool, retry=retry, tell=tell)
+    rows = []
+    for row in planned.rows:
+        if isinstance(row.plan, Plan):
+            facts = found[row.plan.digest]
+        else:
+            facts = {**dict.fromkeys(COLUMNS), **Outcome.of_error(row.plan).facts}
+        rows.append((row.changes, facts))
+    keys = planned.settings.keys
+    return SweepResult(store.folder, keys, store.write_table(keys, rows))
 
 
-def _sweep(
-    source: str | os.PathLike[str] | Mapping[str, Any],
-    out: str | os.PathLike[str] | None,
-    jobs: int | None,
-    scheduler: str | None,
-    *,
-    retry: bool,
-    listener: Listener,
-) -> SweepResult:
-    """Plan what is not stored yet; see `sweep`."""
-    listener("checking the sweep")
-    planned = load_sweep(source)
-    pool = pool_for(jobs, scheduler, listener)
-    store = Store(Path(out) if out is not None else _folder_for(source))
-    settings = planned.settings.model_dump(mode="json", exclude_defaults=True)
-    store.describe(
-        {"version": brachis.__version__, "settings": settings, "task": planned.base}
-    )
+def _run(
+    planned: SweepPlan, store: Store, pool: Pool, *, retry: bool, tell: Listener
+) -> dict[str, dict[str, Any]]:
+    """Make the plans that are not stored yet, and return the columns of all, by digest."""
     plans = {
         row.plan.digest: row.plan for row in planned.rows if isinstance(row.plan, Plan)
     }
-    found = {
-        digest: facts for digest in plans if (facts := store.read(digest)) is not None
-    }
-    if retry:
-        found = {
-            digest: facts
-            for digest, facts in found.items()
-            if facts["status"] != FAILED
-        }
-    progress = _Progress(len(plans), found, listener)
+    found = {}
+    for digest in plans:
+        facts = store.read(digest)
+        if facts is not None and not (retry and facts["status"] == FAILED):
+            found[digest] = facts
+    stored = len(found)
+    began = time.monotonic()
+    tell(
+        f"{stored} of {write_count(len(plans), 'plan')}{' are stored already' if stored else ''}"
+    )
+    missing = [plan for digest, plan in plans.items() if digest not in found]
     try:
-        with closing(
-            pool([plan for digest, plan in plans.items() if digest not in found])
-        ) as made:
-            for (
-                plan,
-                outcome,
-            ) in (
-                made
-            ):  # workers end with the block, even where an outcome cannot be stored
+        # Workers end with this block, even if an outcome cannot be stored.
+        with closing(pool(missing)) as outcomes:
+            for plan, outcome in outcomes:
                 found[plan.digest] = store.write(plan.digest, outcome)
-                progress.tell()
+                done = len(found)
+                failed = sum(facts["status"] == FAILED for facts in found.values())
+                each = (time.monotonic() - began) / (done - stored)
+                left = write_duration(each * (len(plans) - done))
+                failures = f", {failed} failed" if failed else ""
+                tell(
+                    f"{done} of {write_count(len(plans), 'plan')}{failures}; {left} left"
+                )
     except KeyboardInterrupt as interrupt:
         interrupts.clear()
-        told = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"
-        raise KeyboardInterrupt(told) from interrupt
-    return _result(planned, store, found)
+        message = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"
+        raise KeyboardInterrupt(message) from interrupt
+    return found
 
 
-def _folder_for(source: str | os.PathLike[str] | Mapping[str, Any]) -> Path:
-    return Path("sweep" if isinstance(source, Mapping) else Path(source).stem)
-
-
-def _result(
-    planned: SweepPlan, store: Store, found: Mapping[str, Mapping[str, Any]]
-) -> SweepResult:
-    rows = [
-        (
-            row.changes,
-            found[row.plan.digest]
-            if isinstance(row.plan, Plan)
-            else {**dict.fromkeys(COLUMNS), **Outcome.of_error(row.plan).facts},
-        )
-        for row in planned.rows
-    ]
-    table = store.table(planned.settings.keys, rows)
-    store.write_table(table)
-    return SweepResult(store.folder, planned.settings.keys, table)
-
-
-class _Progress:
-    """Says how far a sweep is.
-
-    Parameters
-    ----------
-    total : int
-        Number of plans.
-    found : mapping
-        Finished ones, those of earlier runs at first; it grows.
-    listener : callable
-    """
-
-    def __init__(
-        self, total: int, found: Mapping[str, Mapping[str, Any]], listener: Listener
-    ) -> None:
-        self._total, self._found, self._listener = total, found, listener
-        self._before, self._began = len(found), time.monotonic()
-        listener(
-            f"{len(found)} of {write_count(total, 'plan')}{' are stored already' if found else ''}"
-        )
-
-    def tell(self) -> None:
-        """Say it."""
-        done, failed = (
-            len(self._found),
-            sum(facts["status"] == FAILED for facts in self._found.values()),
-        )
-        each = (time.monotonic() - self._began) / (done - self._before)
-        text = f"{done} of {write_count(self._total, 'plan')}"
-        text += f", {failed} failed" if failed else ""
-        self._listener(f"{text}; {in_words(each * (self._total - done))} left")
-
-
-def in_words(seconds: float) -> str:
+def write_duration(seconds: float) -> str:
     """Write a duration as people say it.
 
     Examples
     --------
-    >>> in_words(4.2), in_words(130.0), in_words(7500.0)
+    >>> write_duration(4.2), write_duration(130.0), write_duration(7500.0)
     ('5 s', '2 min 10 s', '2 h 05 min')
     """
-    whole = math.ceil(seconds)
-    if whole < _MINUTE:
-        return f"{whole} s"
-    if whole < _HOUR:
-        return f"{whole // _MINUTE} min {whole % _MINUTE:02d} s"
-    return f"{whole // _HOUR} h {whole % _HOUR // _MINUTE:02d} min"
+    minutes, whole = divmod(math.ceil(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {whole:02d} s" if minutes else f"{whole} s"

@@ -1,0 +1,134 @@
+"""What the rows of a recorded motion prove of its limits, whatever it does between them.
+
+A joint that moves by dq within a period h has a velocity of dq / h at some time of it, and an acceleration equal to the
+second difference over h^2 within two periods, a jerk equal to the third over h^3 within three (mean value theorem of
+divided differences). So a limit on one of these is exceeded for certain where the differences exceed it. A limit on
+another quantity (a torque, the tool's speed) is compared with the quantity's value for these means, at the posture in
+the middle of the periods; changes of posture and velocity within the periods are neglected. What the errors of the rows
+may add to a ratio is subtracted. These errors matter less over more periods, so that several are also taken as one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+
+from brachis.limits import Limit, Moments, Role, limits_of
+from brachis.robot import bind
+from brachis.trajectory import Trajectory
+
+_STRIDES = (1, 2, 4)
+"""Periods that are taken as one, for limits of joints; limits of the tool may change along the path, so only one."""
+
+
+@dataclass(frozen=True, eq=False)
+class RatioBounds:
+    """What rows prove of one limit.
+
+    Attributes
+    ----------
+    limit : str
+        Name of the limit.
+    subjects : tuple of str
+        Of its c values: joints, or the tool.
+    t : (K,) ndarray
+        Times of the rows, s.
+    ratios : (K, c) ndarray
+        Sizes of the ratios that are reached for certain; 0 where nothing is proven.
+    """
+
+    limit: str
+    subjects: tuple[str, ...]
+    t: np.ndarray
+    ratios: np.ndarray
+
+    @property
+    def worst(self) -> tuple[float, str, float]:
+        """Largest ratio, its subject, and its time, s."""
+        row, column = np.unravel_index(np.argmax(self.ratios), self.ratios.shape)
+        ratio = float(self.ratios[row, column])
+        return ratio, self.subjects[column], float(self.t[row])
+
+
+def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
+    """Compare the rows of an imported motion with every limit of its task; empty if the rows are not known."""
+    assert trajectory.recovered is not None
+    t = trajectory.recovered.rows[:, 0]
+    if not len(t):
+        return ()
+    robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+    bounds = []
+    for limit in limits_of(robot, trajectory.task):
+        subjects = tuple(label.subject for label in limit.labels)
+        ratios = _bound_limit(trajectory, t, limit)
+        bounds.append(RatioBounds(limit.name, subjects, t, ratios))
+    return tuple(bounds)
+
+
+def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndarray:
+    """Return the sizes of the ratios to one limit that the rows at times t prove, (K, c)."""
+    ratios = np.zeros((len(t), len(limit.labels)))
+    first_row, _ = _differentiate(trajectory, np.zeros((1, 1), dtype=int))
+    slopes = _slopes(limit, first_row)
+    order = max(power for power, slope in enumerate(slopes) if slope is not None)
+    one_sided = np.where(np.isfinite(limit.upper), -np.inf, np.inf)
+    harmless = np.where(np.isfinite(limit.centre), limit.centre, one_sided)
+    is_mean = limit.guarantee.is_mean
+    strides = _STRIDES if limit.role is Role.ROBOT and not is_mean else (1,)
+    for stride in strides:
+        first = np.arange(max(len(t) - order * stride, 0))[:, None]
+        windows = first + stride * np.arange(order + 1)
+        s = trajectory.path_spline(t[windows[:, [0, -1]]].ravel()).reshape(-1, 2)
+        across = (s[:, :1] < limit.breaks) & (limit.breaks < s[:, 1:])
+        windows = windows[~across.any(axis=1)]
+        if not len(windows):
+            continue
+        means, errors = _differentiate(trajectory, windows)
+        off = np.zeros((len(windows), len(limit.labels)))
+        for slope, error in zip(_slopes(limit, means), errors, strict=True):
+            if slope is not None:
+                off += (np.abs(slope) @ error[:, :, None])[:, :, 0]
+        values = limit.values(means)
+        values = values - np.clip(values - harmless, -off, off)
+        middle = windows[:, order // 2]
+        if is_mean:
+            mean = np.trapezoid(values, t[middle], axis=0) / t[-1]
+            return np.abs(limit.ratio(mean))[None] + ratios
+        np.maximum.at(ratios, middle, np.abs(limit.ratio(values)))
+    return ratios
+
+
+def _slopes(limit: Limit, moments: Moments) -> tuple[np.ndarray | None, ...]:
+    """Return the derivatives of a limit's values by q, qdot, qddot and qdddot."""
+    partials = limit.partials(moments)
+    return partials.q, partials.qdot, partials.qddot, partials.qdddot
+
+
+def _differentiate(
+    trajectory: Trajectory, windows: np.ndarray
+) -> tuple[Moments, np.ndarray]:
+    """Differentiate the polynomials through m + 1 rows each, in the middle of windows of rows, (W, m + 1).
+
+    Returns
+    -------
+    Moments
+        The m-th derivative is m! times the divided difference; higher ones are 0.
+    (4, W, n) ndarray
+        The most that the errors of the rows add to q and each derivative.
+    """
+    recovered = trajectory.recovered
+    assert recovered is not None
+    t = recovered.rows[windows, 0]
+    order = windows.shape[1] - 1
+    middle = 0.5 * (t[:, order // 2] + t[:, (order + 1) // 2])
+    unit = np.max(t[:, -1] - t[:, 0], initial=0.0) or 1.0
+    powers = ((t - middle[:, None]) / unit)[:, :, None] ** np.arange(order + 1)
+    factors = [[factorial(power) / unit**power] for power in range(order + 1)]
+    weights = np.zeros((len(windows), 4, order + 1))
+    weights[:, : order + 1] = np.linalg.inv(powers) * factors
+    errors = np.abs(weights).sum(axis=2)[:, :, None] * recovered.error
+    q, qdot, qddot, qdddot = np.moveaxis(weights @ recovered.rows[windows, 1:], 1, 0)
+    moments = Moments(q, qdot, qddot, qdddot, trajectory.path_spline(middle))
+    return moments, np.moveaxis(errors, 1, 0)
