@@ -20,6 +20,7 @@ from brachis.common import files
 from brachis.common.files import atomic_write, status_of, writing_errors
 from brachis.errors import InputError
 from brachis.robot.urdf import check_inertias, read_file
+from brachis.robot.urdf_bodies import read_dynamics
 from brachis.robot.urdf_elements import UrdfTree, read_tree
 
 _NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
