@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from brachis.apps import bottleneck, plots, report
 from brachis.apps.view import Viewer, view
-from brachis.errors import UnknownNameError
+from brachis.errors import NotInstalledError, UnknownNameError
 from brachis.search.planned import PlannedMotion
 
 if TYPE_CHECKING:
@@ -133,6 +133,9 @@ class Result(PlannedMotion):
         )
 
     def _repr_html_(self) -> str:
-        """Show the summary beside the overview in a notebook."""
-        picture = plots.as_html(self.plot())
+        """Show the summary in a notebook, and the overview if Matplotlib is installed."""
+        try:
+            picture = plots.as_html(self.plot())
+        except NotInstalledError:
+            return super()._repr_html_()
         return f'<div style="display:flex;align-items:flex-start">{super()._repr_html_()}{picture}</div>'

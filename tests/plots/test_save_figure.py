@@ -16,7 +16,7 @@ from brachis.apps.plots import (
     save_figure,
     style,
 )
-from brachis.errors import InputError
+from brachis.errors import InputError, NotInstalledError
 
 MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 
@@ -168,3 +168,12 @@ def test_matplotlib_is_imported_late_and_left_as_it_is_and_pyplot_never(
         *PLOTS,
         "comparison",
     }
+
+
+def test_without_matplotlib_the_error_says_what_to_install(
+    line_trajectory, monkeypatch
+):
+    style.figure_class.cache_clear()
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(NotInstalledError, match=r'Matplotlib.*"brachis\[plots\]"'):
+        plot_torques(line_trajectory)

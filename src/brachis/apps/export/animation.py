@@ -55,9 +55,9 @@ def frames(
     slower : float, optional
         How many times slower the motion is played, which is written above.
     """
+    figure = style.new_figure(style.PAGE_WIDTH, 88.0)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure = style.new_figure(style.PAGE_WIDTH, 88.0)
     figure.set_dpi(100)
     canvas: Any = FigureCanvasAgg(figure)
     grid = figure.add_gridspec(1, 2)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.common.files import atomic_write
-from brachis.errors import InputError
+from brachis.errors import InputError, NotInstalledError
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -90,8 +90,17 @@ def check_suffix(path: str | os.PathLike[str]) -> str:
 
 @cache
 def figure_class() -> type[Figure]:
-    """Return a class of Matplotlib's figures that notebooks show without further ado."""
-    from matplotlib.figure import Figure
+    """Return a class of Matplotlib's figures that notebooks show without further ado.
+
+    Raises
+    ------
+    NotInstalledError
+        Matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise NotInstalledError("a figure", "Matplotlib", "plots") from None
 
     class NotebookFigure(Figure):
         """A figure that a notebook shows."""
