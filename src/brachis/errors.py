@@ -161,7 +161,7 @@ class BrachisError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Be sent to other processes with all data, whatever a subclass takes to be made."""
-        return _restored, (type(self), self.args, self.__dict__)
+        return type(self).__new__, (type(self), *self.args), self.__dict__
 
     def with_remedies(self, *remedies: Remedy) -> Self:
         """Return the error with numbers of the task that may be changed."""
@@ -184,15 +184,6 @@ class BrachisError(Exception):
         if self.hint:
             text += f". {self.hint}"
         return text
-
-
-def _restored(
-    kind: type[BrachisError], args: tuple[object, ...], data: dict[str, object]
-) -> BrachisError:
-    """Make an error again that another process raised."""
-    error = kind.__new__(kind, *args)
-    error.__dict__.update(data)
-    return error
 
 
 class BrachisWarning(UserWarning):
@@ -423,7 +414,6 @@ def nearest(
 ) -> str | None:
     """Suggest a valid name: one for a word of other libraries, else the longest beginning of `name`, else the nearest.
 
-    Names with a likeness of 1 are the same, but for capitals. Where an attribute is asked for, functions that stand
     elsewhere in brachis count as well.
     """
     by_small = {one.lower(): one for one in valid}

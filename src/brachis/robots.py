@@ -39,7 +39,7 @@ def path_of(name: str) -> Path:
     Raises
     ------
     UnknownNameError
-        There is no such robot.
+        brachis has no robot of this name.
     """
     if name not in names():
         raise UnknownNameError("robot", name, names(), where="brachis.robots")
@@ -63,7 +63,7 @@ def locate(
     Raises
     ------
     UnknownNameError
-        It is no file, and no name, but like one.
+        It is neither a file nor a name, but like a name.
     """
     return path_of(robot) if isinstance(robot, str) and _is_name(robot) else robot
 

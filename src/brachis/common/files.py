@@ -360,7 +360,7 @@ def read_text(
         content = read_file(path, largest).decode()
         return io.IncrementalNewlineDecoder(None, translate=True).decode(content)
     except FileNotFoundError:
-        problem = "there is no such file"
+        problem = "the file does not exist"
         hint = f"Paths are relative to {folder}" if folder else hint
     except UnicodeDecodeError as refusal:
         problem = f"not a text file in UTF-8: {refusal.reason} at byte {refusal.start}"

@@ -201,19 +201,19 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
     """
     if asked == given:
         return given
-    own, other = given, asked
+    sides = [given, asked]
     if key in _PER_JOINT:
         absent = _PER_JOINT[key]
-        own, other = (
+        listed = [per_joint_values(key, side, names, absent) for side in sides]
+        sides = [
             {
                 name: value
-                for name, value in zip(
-                    names, per_joint_values(key, side, names, absent), strict=True
-                )
+                for name, value in zip(names, values, strict=True)
                 if value != absent
             }
-            for side in (given, asked)
-        )
+            for values in listed
+        ]
+    own, other = sides
     if not (isinstance(own, Mapping) and isinstance(other, Mapping)):
         raise TaskError(
             "the task and the robot that is given with it contradict each other",

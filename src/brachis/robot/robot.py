@@ -325,7 +325,8 @@ class Robot(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
-        limits, payload = self.limits, self.settings.payload
+        limits = self.limits
+        payload = self.settings.payload
         return {
             "urdf": self.source,
             "joints": ", ".join(self.joint_names),
@@ -414,9 +415,11 @@ class Robot(Summary):
             )
         q = np.array(values, dtype=float)
         if not np.all(np.abs(q) <= FARTHEST):
-            allowed = f"finite numbers, within {FARTHEST:g} rad or m of zero"
             raise InputError(
-                "is no posture", where=where, found=q.tolist(), allowed=allowed
+                "a joint position is out of range",
+                where=where,
+                found=q.tolist(),
+                allowed=f"finite numbers, within {FARTHEST:g} rad or m of zero",
             )
         return q
 
@@ -428,12 +431,15 @@ class Robot(Summary):
 
     def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame in the world frame, from postures (K, n)."""
-        data, frame = self.model.createData(), self.frame_id
-        positions, rotations = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+        data = self.model.createData()
+        frame = self.frame_id
+        positions = np.empty((len(q), 3))
+        rotations = np.empty((len(q), 3, 3))
         for k, posture in enumerate(q):
             pin.forwardKinematics(self.model, data, posture)
             placement = pin.updateFramePlacement(self.model, data, frame)
-            positions[k], rotations[k] = placement.translation, placement.rotation
+            positions[k] = placement.translation
+            rotations[k] = placement.rotation
         return positions, rotations
 
     def heights(self, q: np.ndarray) -> np.ndarray:

@@ -110,7 +110,7 @@ def read_result(path: Path) -> dict[str, Any]:
     try:
         meta, arrays = _read_parts(io.BytesIO(read_file(path, _LARGEST_FILE)))
     except FileNotFoundError as error:
-        raise ResultFileError("there is no such file", where=where) from error
+        raise ResultFileError("the file does not exist", where=where) from error
     except _BROKEN as error:
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ResultFileError(

@@ -368,9 +368,10 @@ class Trajectory(Summary):
             times.min() >= -slack and times.max() <= self.t_end + slack
         ):
             last, t_end = write_apart(times.max(), self.t_end, digits=6)
-            found, allowed = f"{times.min():g} s to {last} s", f"0 s to {t_end} s"
             raise InputError(
-                "time outside the trajectory", found=found, allowed=allowed
+                "time outside the trajectory",
+                found=f"{times.min():g} s to {last} s",
+                allowed=f"0 s to {t_end} s",
             )
         return np.clip(times, 0.0, self.t_end)
 
