@@ -20,17 +20,11 @@ from brachis.common.files import is_file, shipped_folder
 from brachis.errors import UnknownNameError, no_attribute
 from brachis.robot import Robot
 
-_MISSPELT = 0.75
-"""Likeness to a name from which on a word is taken for it; so are its first letters."""
-
 
 def names() -> tuple[str, ...]:
     """Return the names of the robots, in alphabetical order."""
-    return tuple(
-        sorted(
-            path.parent.name for path in shipped_folder("robots").glob("*/robot.urdf")
-        )
-    )
+    files = shipped_folder("robots").glob("*/robot.urdf")
+    return tuple(sorted(path.parent.name for path in files))
 
 
 def path_of(name: str) -> Path:
@@ -69,15 +63,14 @@ def locate(
 
 
 def _is_name(given: str | os.PathLike[str]) -> bool:
-    """Tell a name, misspelt perhaps, from the file name of something."""
-    if given in names():
-        return True
+    """Tell a name, its first letters or one that is misspelt, from the file name of something."""
+    known = names()
     path = Path(given)
-    bare = not path.suffix and len(path.parts) == 1 and not is_file(path)
-    begun = any(name.startswith(str(given)) for name in names())
-    return bare and (
-        begun or bool(difflib.get_close_matches(str(given), names(), cutoff=_MISSPELT))
-    )
+    if given in known or path.suffix or len(path.parts) != 1 or is_file(path):
+        return given in known
+    word = str(given)
+    begins = any(name.startswith(word) for name in known)
+    return begins or bool(difflib.get_close_matches(word, known, cutoff=0.75))
 
 
 @cache

@@ -166,19 +166,15 @@ def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotS
     frames = _merge("robot", own_frames, asked_frames, ())
     names = robot.urdf_joints
     limits = written.get("limits", {})
-    limited = {
-        name
-        for limit in limits.values()
-        if isinstance(limit, Mapping)
-        for name in limit
-    }
+    limited = [each for each in limits.values() if isinstance(each, Mapping)]
     locked: Mapping[str, float] = {}
-    if frames != own_frames or not limited <= set(names):
-        chain = read_chain(
-            robot.urdf,
-            robot.source,
-            **dict.fromkeys(_FRAMES[:2]) | {_FRAMES[2]: {}} | frames,
-        )
+    if frames != own_frames or not set().union(*limited) <= set(names):
+        chosen: dict[str, Any] = {
+            "tool_frame": None,
+            "base_frame": None,
+            "locked_joints": {},
+        }
+        chain = read_chain(robot.urdf, robot.source, **{**chosen, **frames})
         names = chain.joint_names
         locked = chain.locked
     if limits:

@@ -259,26 +259,21 @@ class Robot(Summary):
         >>> robot.limits.torque.tolist(), robot.limits.velocity.tolist()
         ([20.0, 10.0, 10.0], [2.0, 2.0, 2.0])
         """
-        own = self.urdf_joints
-        kept = to_spec(self.limits, own)
-        changes: dict[str, Any] = {}
+        names = self.urdf_joints
+        changes: dict[str, Any] = vars(to_spec(self.limits, names)).copy()
         for kind, value in limits.items():
-            if kind not in LimitKeywords.__annotations__:
-                raise UnknownNameError(
-                    "limit", kind, LimitKeywords.__annotations__, where="with_limits"
-                )
-            stated = getattr(kept, kind)
-            if isinstance(value, Mapping) and isinstance(stated, Mapping):
-                changes[kind] = {**stated, **value}
-            else:
-                changes[kind] = value
-        spec = LimitSpec(**{**vars(kept), **changes})
-        resolved = resolve_limits(spec, own, self.urdf_limits[: len(own)])
-        resolved = resolved.with_free_joint() if self.rolls_freely else resolved
+            if kind not in changes:
+                raise UnknownNameError("limit", kind, changes, where="with_limits")
+            stated = changes[kind]
+            merge = isinstance(value, Mapping) and isinstance(stated, Mapping)
+            changes[kind] = {**stated, **value} if merge else value
+        spec = LimitSpec(**changes)
+        resolved = resolve_limits(spec, names, self.urdf_limits[: len(names)])
+        if self.rolls_freely:
+            resolved = resolved.with_free_joint()
         self.friction.check_against(self.model, resolved.torque)
-        settings = self.settings.model_copy(
-            update={"limits": spec, "speed_override": 1.0}
-        )
+        changed = {"limits": spec, "speed_override": 1.0}
+        settings = self.settings.model_copy(update=changed)
         return replace(self, limits=resolved, settings=settings)
 
     @check_keywords
@@ -398,14 +393,13 @@ class Robot(Summary):
         InputError, UnknownNameError
             A joint is missing, unknown or not finite, or the list has another length than the chain.
         """
-        if self.rolls_freely:
-            joints = _with_roll(joints, self.n)
-        values = per_joint_values(where, joints, list(self.joint_names), None)
-        missing = [
-            name
-            for name, value in zip(self.joint_names, values, strict=True)
-            if value is None
-        ]
+        if self.rolls_freely and isinstance(joints, Mapping):
+            joints = {ROLL_JOINT: 0.0, **joints}
+        elif self.rolls_freely and isinstance(joints, Sequence | np.ndarray):
+            joints = [*joints, 0.0] if len(joints) == self.n - 1 else joints
+        values = per_joint_values(where, joints, self.joint_names, None)
+        pairs = zip(self.joint_names, values, strict=True)
+        missing = [name for name, value in pairs if value is None]
         if missing:
             raise InputError(
                 "joints are missing",
@@ -447,20 +441,10 @@ class Robot(Summary):
 
         The plane goes through the base frame; its normal is the z axis of the URDF's root link.
         """
-        base = self.model.frames[
-            self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
-        ].placement
+        base = self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
+        floor = self.model.frames[base].placement.translation
         up = pin.rpy.rpyToMatrix(*np.radians(self.settings.mounting.rpy_deg))[:, 2]
-        return np.asarray((self.tool_placements(q)[0] - base.translation) @ up)
-
-
-def _with_roll(joints: object, n: int) -> object:
-    """Add the virtual joint's position, zero, to a posture that leaves it out."""
-    if isinstance(joints, Mapping):
-        return {ROLL_JOINT: 0.0, **joints}
-    if isinstance(joints, (Sequence, np.ndarray)) and len(joints) == n - 1:
-        return [*joints, 0.0]
-    return joints
+        return np.asarray((self.tool_placements(q)[0] - floor) @ up)
 
 
 def _without_defaults(

@@ -14,6 +14,7 @@ from typing import Any, TypeAlias, TypeVar
 from lxml import etree
 
 from brachis.errors import UrdfError, nearest
+from brachis.task.fields import LARGEST
 
 Element: TypeAlias = Any  # lxml comes without types
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
@@ -240,8 +241,6 @@ def _list_downward(
 
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_LARGEST = 1e12
-"""No length, mass or inertia of a robot is larger, in SI units; squares of such figures are still numbers."""
 
 
 @dataclass(frozen=True)
@@ -267,7 +266,7 @@ class Entry:
     unit: str
     count: int = 1
     required: bool = False
-    largest: float = _LARGEST
+    largest: float = LARGEST
 
 
 ENTRIES: dict[str, tuple[Entry, ...]] = {

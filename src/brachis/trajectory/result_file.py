@@ -38,8 +38,6 @@ ARRAYS = (
     "chart_knots",
 )
 """Names of the arrays in the file; as in `Trajectory`."""
-_CHART_DEGREE = 5
-"""Degree of the splines of a chart's rows."""
 _LARGEST_FILE = 32_000_000
 """Bytes of a result file, and of what it holds unpacked."""
 _MOST_NODES = 50_000
@@ -242,19 +240,18 @@ def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
     """Degree of redundancy, from a checked chart or else from the joints that are named."""
     if rows.shape[:1] == (0,) and not knots.size:
         return named
+    degree = 5
     fits = rows.ndim == 3 and rows.shape[2] == n + 1
-    if fits and len(rows) == 1:
-        fits = knots.shape == (0,)
-    elif fits:  # the reference begins at s = 0 and ends at 1 to rounding
-        fits = len(knots) == len(rows) + _CHART_DEGREE + 1 and _are_knots(
-            np.round(knots, 9), _CHART_DEGREE
-        )
+    if fits:  # the chart's reference begins at s = 0 and ends at 1 to rounding
+        count = len(rows) + degree + 1 if len(rows) != 1 else 0
+        rounded = np.round(knots, 9)
+        fits = knots.shape == (count,) and (not count or _are_knots(rounded, degree))
     _refuse_unless(
         fits,
         "the rows and knots of the chart do not fit each other or the robot",
         where="chart_rows",
         found=f"{rows.shape}, knots {knots.shape}",
-        allowed=f"rows (B, r, {n + 1}), and B + {_CHART_DEGREE + 1} knots from 0 to 1 where B is not 1",
+        allowed=f"rows (B, r, {n + 1}), and B + {degree + 1} knots from 0 to 1 where B is not 1",
     )
     _refuse_unless(
         named in (0, rows.shape[1]),
