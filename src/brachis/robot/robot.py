@@ -265,8 +265,10 @@ class Robot(Summary):
             if kind not in changes:
                 raise UnknownNameError("limit", kind, changes, where="with_limits")
             stated = changes[kind]
-            merge = isinstance(value, Mapping) and isinstance(stated, Mapping)
-            changes[kind] = {**stated, **value} if merge else value
+            if isinstance(value, Mapping) and isinstance(stated, Mapping):
+                changes[kind] = {**stated, **value}
+            else:
+                changes[kind] = value
         spec = LimitSpec(**changes)
         resolved = resolve_limits(spec, names, self.urdf_limits[: len(names)])
         if self.rolls_freely:
