@@ -62,7 +62,7 @@ class Remedy:
 
     @property
     def verb(self) -> str:
-        """Say what to do with the number."""
+        """What to do with the number: ``lower`` or ``raise``."""
         return "lower" if self.guess < self.asked else "raise"
 
 

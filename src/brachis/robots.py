@@ -41,7 +41,7 @@ def path_of(name: str) -> Path:
 
 
 def is_robot(given: object) -> bool:
-    """Tell whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names` or like one."""
+    """Return whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names` or like one."""
     if isinstance(given, Robot):
         return True
     return isinstance(given, str | os.PathLike) and (
@@ -63,7 +63,7 @@ def locate(
 
 
 def _is_name(given: str | os.PathLike[str]) -> bool:
-    """Tell a name, its first letters or one that is misspelt, from the file name of something."""
+    """Return whether this is a name, its first letters or a misspelt name, and not the name of a file."""
     known = names()
     path = Path(given)
     if given in known or path.suffix or len(path.parts) != 1 or is_file(path):

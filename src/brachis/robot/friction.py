@@ -42,7 +42,7 @@ class Friction(Summary):
     v_eps: np.ndarray
 
     def __post_init__(self) -> None:
-        """Take copies that nobody can write to."""
+        """Make the arrays read-only copies."""
         freeze(self, *(each.name for each in fields(self)))
 
     @classmethod

@@ -48,7 +48,7 @@ def robot_from_settings(
     urdf : path, optional
         URDF file to use in place of the one that the task names.
     urdf_text : str, optional
-        Text of the URDF, where it has been kept with the task; nothing is read from disk then.
+        Text of the URDF, if it was saved with the task; nothing is read from disk then.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotS
 
 
 def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
-    """Return what is set on one side or, alike, on both; joint by joint where only some joints are set.
+    """Merge two values: both sides may set different keys or joints, or set the same ones to the same value.
 
     Raises
     ------
@@ -272,7 +272,7 @@ def in_use(robot: Robot) -> dict[str, str]:
 
 
 def _by_joint(robot: Robot, kind: str) -> str:
-    """Write one term of the friction with its units, joint by joint unless it is the same at all."""
+    """Write one term of the friction with its units, joint by joint unless all joints have the same value."""
     names = robot.urdf_joints
     columns = zip(getattr(robot.friction, kind), robot.position_units, strict=True)
     rows = [f"{value:g} {UNITS[kind][unit]}" for value, unit in columns][: len(names)]

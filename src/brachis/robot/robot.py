@@ -77,7 +77,7 @@ class Robot(Summary):
     urdf_dynamics : UrdfDynamics
         Joints, bodies and friction as the URDF states them, without payload, mounting and tool offset.
     friction : Friction
-        Torque terms beside the rigid-body model's.
+        Torque terms that the rigid-body model lacks.
     settings : RobotSettings
         What the robot was made with, as the ``robot`` part of a task.
     source : str
@@ -137,7 +137,7 @@ class Robot(Summary):
         urdf_text : str, optional
             Text of the URDF where it is already known; `path` then only names it.
         **keywords
-            Keys of the ``robot`` part of a task; None for what is as by default.
+            Keys of the ``robot`` part of a task; None for the default.
         tool_frame : str, optional
             Link at the end of the chain; the only leaf link if left out.
         base_frame : str, optional
@@ -452,7 +452,7 @@ class Robot(Summary):
 def _without_defaults(
     settings: RobotSettings, limits: LimitSpec, names: Sequence[str]
 ) -> RobotSettings:
-    """Leave out settings that are as by default, and state limits joint by joint, so that others can be added."""
+    """Leave out settings that have their default, and state limits joint by joint, so that others can be added."""
     by_name: dict[str, Any] = {}
     for each in fields(limits):
         value = getattr(limits, each.name)

@@ -56,7 +56,7 @@ class UrdfDynamics(Summary):
     tool : (4, 4) ndarray
         Placement of the tool frame in the frame of the last joint.
     friction : dict of str to (n,) ndarray
-        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N. Zero where nothing is said.
+        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N. Zero by default.
     """
 
     bodies: tuple[Body, ...]

@@ -19,6 +19,7 @@ from brachis.common.arrays import freeze, with_like_signs
 from brachis.common.summary import Summary
 from brachis.errors import InputError, UnknownNameError, write_apart, write_count
 from brachis.robot import Robot, dynamics
+from brachis.robot.task_map import Pose
 from brachis.task import Task
 from brachis.trajectory.pieces import piece_coefficients
 from brachis.trajectory.recovered import Recovered
@@ -49,19 +50,11 @@ def tool_motion(
     speed : (K,) ndarray
         m/s.
     """
-    model = robot.model
-    data = model.createData()
-    frame = robot.frame_id
-    position = np.empty((len(q), 3))
-    quaternion = np.empty((len(q), 4))
-    speed = np.empty(len(q))
-    for k in range(len(q)):
-        pin.forwardKinematics(model, data, q[k], qdot[k])
-        placement = pin.updateFramePlacement(model, data, frame)
-        position[k] = placement.translation
-        quaternion[k] = np.roll(pin.Quaternion(placement.rotation).coeffs(), 1)
-        speed[k] = np.linalg.norm(pin.getFrameVelocity(model, data, frame).linear)
-    return position, with_like_signs(quaternion), speed
+    position, rotations = robot.tool_placements(q)
+    coefficients = [pin.Quaternion(rotation).coeffs() for rotation in rotations]
+    quaternion = np.roll(np.reshape(coefficients, (-1, 4)), 1, axis=1)
+    velocity = np.einsum("ikn,kn->ik", Pose(robot).twists(q)[:3], qdot)
+    return position, with_like_signs(quaternion), np.linalg.norm(velocity, axis=0)
 
 
 CONTINUOUS_TORQUE = 3
@@ -132,7 +125,7 @@ class Trajectory(Summary):
     recovered: Recovered | None = None
 
     def __post_init__(self) -> None:
-        """Take copies of the arrays that nobody can write to."""
+        """Make the arrays read-only copies."""
         freeze(self, *ARRAYS)
 
     @property
