@@ -261,12 +261,11 @@ class UnknownNameError(InputError):
         self.kind = kind
         self.name = name
         self.valid = tuple(valid)
-        near = nearest(name, self.valid)
         super().__init__(
             f"there is no {kind} named {name!r}",
             allowed=", ".join(self.valid) or "none",
             where=where,
-            hint=hint or (f"Did you mean {near!r}?" if near else None),
+            hint=hint or suggest(name, self.valid),
         )
 
 
@@ -408,7 +407,6 @@ class PlanningError(BrachisError):
 def nearest(
     name: str,
     valid: Iterable[str],
-    likeness: float = 0.5,
     *,
     is_attribute: bool = False,
 ) -> str | None:
@@ -428,8 +426,16 @@ def nearest(
         return known[0]
     if begun:
         return by_small[max(begun, key=len)]
-    near = difflib.get_close_matches(small, by_small, n=1, cutoff=likeness)
+    near = difflib.get_close_matches(small, by_small, n=1, cutoff=0.5)
     return by_small[near[0]] if near else None
+
+
+def suggest(
+    name: str, valid: Iterable[str], *, is_attribute: bool = False
+) -> str | None:
+    """Ask whether the `nearest` valid name is meant; None if none is near."""
+    near = nearest(name, valid, is_attribute=is_attribute)
+    return f"Did you mean {near!r}?" if near else None
 
 
 class MissingAttributeError(AttributeError):
@@ -486,8 +492,8 @@ def no_attribute(
     module: str, kind: str, name: str, valid: Sequence[str]
 ) -> AttributeError:
     """Return what a module raises that has things of one kind, such as robots, by their names."""
-    near = nearest(name, valid)
-    hint = f". Did you mean {near!r}?" if near else ""
+    hint = suggest(name, valid)
     return AttributeError(
-        f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}{hint}"
+        f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}"
+        + (f". {hint}" if hint else "")
     )

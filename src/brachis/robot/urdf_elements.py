@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from lxml import etree
 
-from brachis.errors import UrdfError, nearest
+from brachis.errors import UrdfError, suggest
 from brachis.task.fields import LARGEST
 
 Element: TypeAlias = Any  # lxml comes without types
@@ -78,7 +78,7 @@ def read_tree(text: str, where: str) -> UrdfTree:
                 where=where,
                 found=kind,
                 allowed=", ".join(_JOINT_TYPES),
-                hint=_suggest(kind, _JOINT_TYPES),
+                hint=suggest(kind, _JOINT_TYPES),
             )
     above = _joints_above(links, joints, where)
     downward = _list_downward(links, joints, above, where)
@@ -87,11 +87,6 @@ def read_tree(text: str, where: str) -> UrdfTree:
             for entry in ENTRIES[kind]:
                 _check_entry(owner, entry, where)
     return UrdfTree(robot, links, joints, above, downward)
-
-
-def _suggest(name: str, valid: Iterable[str]) -> str | None:
-    near = nearest(name, valid)
-    return f"Did you mean {near!r}?" if near else None
 
 
 def _place_of(element: Element, where: str) -> str:
@@ -195,7 +190,7 @@ def _joints_above(
                     where=f"{where}, line {joint.sourceline}",
                     found=link or "none",
                     allowed=", ".join(links),
-                    hint=_suggest(link, links) or add,
+                    hint=suggest(link, links) or add,
                 )
         child = end_of(joint, "child")
         if child in above:
