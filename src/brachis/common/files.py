@@ -183,10 +183,10 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     try:
         content = io.BytesIO()
         yield content
-        with writing_errors(path), file:
-            file.write(content.getbuffer())
-        if not in_place:
-            with writing_errors(path):
+        with writing_errors(path):
+            with file:
+                file.write(content.getbuffer())
+            if not in_place:
                 temporary.replace(target)
     finally:
         with suppress(OSError):
@@ -283,7 +283,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     patterns = {
         Kind.RESULT: rb"\APK",
         Kind.FIGURES: rb'\A\{\n  "t_end"',
-        Kind.URDF: rb"\A\s*<(?s:.*)<?robot\b",
+        Kind.URDF: rb"(?s)\A\s*(?=<).*<robot\b",
         Kind.SWEEP: rb"(?m)^sweep\s*:",
         Kind.TASK: rb"(?m)^brachis\s*:",
     }
