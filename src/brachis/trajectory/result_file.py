@@ -118,7 +118,7 @@ def read_result(path: Path) -> dict[str, Any]:
             allowed="a file written by brachis plan",
         ) from error
     schema = meta.get("schema")
-    if schema not in {2, SCHEMA}:
+    if schema not in (2, SCHEMA):
         raise ResultFileError(
             "unknown schema version", where=where, found=schema, allowed=SCHEMA
         )
@@ -126,14 +126,13 @@ def read_result(path: Path) -> dict[str, Any]:
         if schema != SCHEMA:
             meta["task"] = _renew_task(meta.get("task"))
         return _check_parts(_Meta.model_validate(meta), arrays)
-    except ValidationError as error:
-        reason = str(task_error(error, "meta", _Meta))
-        raise ResultFileError(_DAMAGED, where=where, found=reason) from error
-    except InputError as error:
-        raise ResultFileError(_DAMAGED, where=where, found=str(error)) from error
-
-
-_DAMAGED = "the result file is broken"
+    except (ValidationError, InputError) as error:
+        found: Exception = error
+        if isinstance(error, ValidationError):
+            found = task_error(error, "meta", _Meta)
+        raise ResultFileError(
+            "the result file is broken", where=where, found=str(found)
+        ) from error
 
 
 def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
