@@ -80,8 +80,7 @@ def read_tree(text: str, where: str) -> UrdfTree:
                 allowed=", ".join(_JOINT_TYPES),
                 hint=suggest(kind, _JOINT_TYPES),
             )
-    above = _joints_above(links, joints, where)
-    downward = _list_downward(links, joints, above, where)
+    above, downward = _connect(links, joints, where)
     for kind, owners in (("link", links), ("joint", joints)):
         for owner in owners.values():
             for entry in ENTRIES[kind]:
@@ -175,11 +174,13 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
     return named
 
 
-def _joints_above(
+def _connect(
     links: Mapping[str, Element], joints: Mapping[str, Element], where: str
-) -> dict[str, str]:
-    """Find the joint that every link hangs from."""
+) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the joint above every link but the root, and all links, every one after the link that it hangs from."""
     above: dict[str, str] = {}
+    below: dict[str, list[str]] = {name: [] for name in links}
+    flaws = []
     for name, joint in joints.items():
         for end in ("parent", "child"):
             link = end_of(joint, end)
@@ -194,45 +195,28 @@ def _joints_above(
                 )
         child = end_of(joint, "child")
         if child in above:
-            raise UrdfError(
-                "the links do not form one tree",
-                where=where,
-                found=f"link {child!r} is the child of two joints, {above[child]!r} and {name!r}",
-                allowed="one joint above every link",
-            )
+            both = f"{above[child]!r} and {name!r}"
+            flaws.append(f"link {child!r} is the child of two joints, {both}")
         above[child] = name
-    return above
-
-
-def _list_downward(
-    links: Mapping[str, Element],
-    joints: Mapping[str, Element],
-    above: Mapping[str, str],
-    where: str,
-) -> tuple[str, ...]:
-    """List all links, every one after the link that it hangs from."""
-    roots = [name for name in links if name not in above]
-    if len(roots) != 1:
+        below[end_of(joint, "parent")].append(child)
+    downward = [name for name in links if name not in above]
+    if len(downward) != 1:
+        flaws.append(f"root links: {', '.join(downward) or 'none'}")
+    if not flaws:
+        for link in downward:  # which grows on the way
+            downward.extend(below[link])
+        looped = links.keys() - set(downward)
+        if looped:
+            names = ", ".join(name for name in links if name in looped)
+            flaws.append(f"a loop of links: {names}")
+    if flaws:
         raise UrdfError(
             "the links do not form one tree",
             where=where,
-            found=f"root links: {', '.join(roots) or 'none'}",
-            allowed="one link without a joint above it",
+            found=flaws[0],
+            allowed="one root link, and one joint above every other link",
         )
-    below: dict[str, list[str]] = {name: [] for name in links}
-    for child, joint in above.items():
-        below[end_of(joints[joint], "parent")].append(child)
-    downward = roots
-    for link in downward:  # which grows on the way
-        downward.extend(below[link])
-    if len(downward) < len(links):
-        looped = ", ".join(name for name in links if name not in downward)
-        raise UrdfError(
-            "the links do not form one tree",
-            where=where,
-            found=f"a loop of links: {looped}",
-        )
-    return tuple(downward)
+    return above, tuple(downward)
 
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -270,12 +254,8 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
         Entry("inertial/origin", "rpy", "rad", 3),
         Entry("inertial/mass", "value", "kg", required=True),
         *(
-            Entry("inertial/inertia", moment, "kg m^2", required=True)
-            for moment in ("ixx", "iyy", "izz")
-        ),
-        *(
-            Entry("inertial/inertia", product, "kg m^2")
-            for product in ("ixy", "ixz", "iyz")
+            Entry("inertial/inertia", key, "kg m^2", required=key[1] == key[2])
+            for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
         ),
     ),
     "joint": (
