@@ -298,7 +298,7 @@ def test_a_misspelt_robot_is_told_from_a_missing_file():
         with pytest.raises(UnknownNameError, match="there is no robot"):
             brachis.plan(name, **LINE)
     for name in ("gantry2_result", "task"):
-        with pytest.raises(TaskError, match="there is no such file"):
+        with pytest.raises(TaskError, match="the file does not exist"):
             brachis.plan(name)
 
 
@@ -347,7 +347,7 @@ SEGMENT = brachis.Line(by=[0.0, 0.3])
 SCARA = {"start": Q0, "task_space": ["x", "y"]}
 ANSWERS = {
     'brachis.Robot("a.urdf")': (InputError, "from_urdf"),
-    'brachis.plan("a.urdf")': (brachis.errors.UrdfError, "there is no such file"),
+    'brachis.plan("a.urdf")': (brachis.errors.UrdfError, "the file does not exist"),
     "brachis.plan()": (TaskError, "task_space: What the path prescribes"),
     'brachis.plan(robot="scara3", path=SEGMENT, **SCARA)': (
         InputError,

@@ -511,7 +511,7 @@ def test_a_fault_of_our_own_is_not_taken_for_a_broken_file(
 
 
 def test_missing_file_and_folder(tmp_path):
-    with pytest.raises(ResultFileError, match="there is no such file"):
+    with pytest.raises(ResultFileError, match="the file does not exist"):
         Trajectory.load(tmp_path / "gone.npz")
     with pytest.raises(ResultFileError, match=r"not a brachis result.*a folder"):
         Trajectory.load(tmp_path)

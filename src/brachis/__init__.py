@@ -117,11 +117,11 @@ def __getattr__(name: str) -> object:
         return importlib.import_module(f"brachis.{_MODULES[name]}")
     if name in _HOME:
         return getattr(importlib.import_module(f"brachis.{_HOME[name]}"), name)
-    from brachis.errors import nearest
+    from brachis.errors import suggest
 
-    near = None if name.startswith("_") else nearest(name, __all__, is_attribute=True)
-    hint = f". Did you mean {near!r}?" if near else ""
-    raise AttributeError(f"module 'brachis' has no attribute {name!r}{hint}")
+    hint = None if name.startswith("_") else suggest(name, __all__, is_attribute=True)
+    message = f"module 'brachis' has no attribute {name!r}"
+    raise AttributeError(f"{message}. {hint}" if hint else message)
 
 
 def __dir__() -> list[str]:

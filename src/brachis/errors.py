@@ -62,7 +62,7 @@ class Remedy:
 
     @property
     def verb(self) -> str:
-        """Say what to do with the number."""
+        """What to do with the number: ``lower`` or ``raise``."""
         return "lower" if self.guess < self.asked else "raise"
 
 
@@ -161,7 +161,7 @@ class BrachisError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Be sent to other processes with all data, whatever a subclass takes to be made."""
-        return _restored, (type(self), self.args, self.__dict__)
+        return type(self).__new__, (type(self), *self.args), self.__dict__
 
     def with_remedies(self, *remedies: Remedy) -> Self:
         """Return the error with numbers of the task that may be changed."""
@@ -184,15 +184,6 @@ class BrachisError(Exception):
         if self.hint:
             text += f". {self.hint}"
         return text
-
-
-def _restored(
-    kind: type[BrachisError], args: tuple[object, ...], data: dict[str, object]
-) -> BrachisError:
-    """Make an error again that another process raised."""
-    error = kind.__new__(kind, *args)
-    error.__dict__.update(data)
-    return error
 
 
 class BrachisWarning(UserWarning):
@@ -270,12 +261,11 @@ class UnknownNameError(InputError):
         self.kind = kind
         self.name = name
         self.valid = tuple(valid)
-        near = nearest(name, self.valid)
         super().__init__(
             f"there is no {kind} named {name!r}",
             allowed=", ".join(self.valid) or "none",
             where=where,
-            hint=hint or (f"Did you mean {near!r}?" if near else None),
+            hint=hint or suggest(name, self.valid),
         )
 
 
@@ -417,13 +407,11 @@ class PlanningError(BrachisError):
 def nearest(
     name: str,
     valid: Iterable[str],
-    likeness: float = 0.5,
     *,
     is_attribute: bool = False,
 ) -> str | None:
     """Suggest a valid name: one for a word of other libraries, else the longest beginning of `name`, else the nearest.
 
-    Names with a likeness of 1 are the same, but for capitals. Where an attribute is asked for, functions that stand
     elsewhere in brachis count as well.
     """
     by_small = {one.lower(): one for one in valid}
@@ -438,8 +426,16 @@ def nearest(
         return known[0]
     if begun:
         return by_small[max(begun, key=len)]
-    near = difflib.get_close_matches(small, by_small, n=1, cutoff=likeness)
+    near = difflib.get_close_matches(small, by_small, n=1, cutoff=0.5)
     return by_small[near[0]] if near else None
+
+
+def suggest(
+    name: str, valid: Iterable[str], *, is_attribute: bool = False
+) -> str | None:
+    """Ask whether the `nearest` valid name is meant; None if none is near."""
+    near = nearest(name, valid, is_attribute=is_attribute)
+    return f"Did you mean {near!r}?" if near else None
 
 
 class MissingAttributeError(AttributeError):
@@ -496,8 +492,8 @@ def no_attribute(
     module: str, kind: str, name: str, valid: Sequence[str]
 ) -> AttributeError:
     """Return what a module raises that has things of one kind, such as robots, by their names."""
-    near = nearest(name, valid)
-    hint = f". Did you mean {near!r}?" if near else ""
+    hint = suggest(name, valid)
     return AttributeError(
-        f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}{hint}"
+        f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}"
+        + (f". {hint}" if hint else "")
     )

@@ -20,17 +20,11 @@ from brachis.common.files import is_file, shipped_folder
 from brachis.errors import UnknownNameError, no_attribute
 from brachis.robot import Robot
 
-_MISSPELT = 0.75
-"""Likeness to a name from which on a word is taken for it; so are its first letters."""
-
 
 def names() -> tuple[str, ...]:
     """Return the names of the robots, in alphabetical order."""
-    return tuple(
-        sorted(
-            path.parent.name for path in shipped_folder("robots").glob("*/robot.urdf")
-        )
-    )
+    files = shipped_folder("robots").glob("*/robot.urdf")
+    return tuple(sorted(path.parent.name for path in files))
 
 
 def path_of(name: str) -> Path:
@@ -39,7 +33,7 @@ def path_of(name: str) -> Path:
     Raises
     ------
     UnknownNameError
-        There is no such robot.
+        brachis has no robot of this name.
     """
     if name not in names():
         raise UnknownNameError("robot", name, names(), where="brachis.robots")
@@ -47,7 +41,7 @@ def path_of(name: str) -> Path:
 
 
 def is_robot(given: object) -> bool:
-    """Tell whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names` or like one."""
+    """Return whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names` or like one."""
     if isinstance(given, Robot):
         return True
     return isinstance(given, str | os.PathLike) and (
@@ -63,21 +57,20 @@ def locate(
     Raises
     ------
     UnknownNameError
-        It is no file, and no name, but like one.
+        It is neither a file nor a name, but like a name.
     """
     return path_of(robot) if isinstance(robot, str) and _is_name(robot) else robot
 
 
 def _is_name(given: str | os.PathLike[str]) -> bool:
-    """Tell a name, misspelt perhaps, from the file name of something."""
-    if given in names():
-        return True
+    """Return whether this is a name, its first letters or a misspelt name, and not the name of a file."""
+    known = names()
     path = Path(given)
-    bare = not path.suffix and len(path.parts) == 1 and not is_file(path)
-    begun = any(name.startswith(str(given)) for name in names())
-    return bare and (
-        begun or bool(difflib.get_close_matches(str(given), names(), cutoff=_MISSPELT))
-    )
+    if given in known or path.suffix or len(path.parts) != 1 or is_file(path):
+        return given in known
+    word = str(given)
+    begins = any(name.startswith(word) for name in known)
+    return begins or bool(difflib.get_close_matches(word, known, cutoff=0.75))
 
 
 @cache

@@ -117,7 +117,7 @@ WRONG = {
     ),
     "no argument": (("plan",), ["missing argument 'TASK'"]),
     "a robot's typo": (("new", "scara4"), ["'scara4'", "Did you mean 'scara3'?"]),
-    "no robot": (("inspect", "gone.urdf"), ["gone.urdf: there is no such file"]),
+    "no robot": (("inspect", "gone.urdf"), ["gone.urdf: the file does not exist"]),
     "a URDF for a task": (
         ("plan", SCARA),
         ["found a URDF; allowed: a task file", f"brachis new {SCARA}"],

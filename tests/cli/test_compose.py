@@ -159,7 +159,7 @@ def test_wrong_files(run, tmp_path):
     gone, broken = tmp_path / "gone.urdf", tmp_path / "broken.urdf"
     broken.write_text("<robot name='x'><link")
     for arm, out, words in (
-        (gone, tmp_path / "new.urdf", "gone.urdf: there is no such file"),
+        (gone, tmp_path / "new.urdf", "gone.urdf: the file does not exist"),
         (broken, tmp_path / "new.urdf", "not well-formed XML"),
         (SCARA, tmp_path / "no/new.urdf", "new.urdf: cannot be written"),
         (SCARA, SCARA, "would be written over an input"),

@@ -70,7 +70,7 @@ WRONG_TASKS = {
     "missing URDF": (
         "robot.urdf",
         "nowhere.urdf",
-        ["nowhere.urdf", "there is no such file"],
+        ["nowhere.urdf", "the file does not exist"],
     ),
     "no limit at all": (
         "robot.limits.torque",
@@ -186,7 +186,7 @@ def test_result_that_is_none(command, run, tmp_path):
     broken.write_bytes(b"PK no archive")
     for path, expected in (
         (broken, "not a brachis result"),
-        (tmp_path / "gone.npz", "there is no such file"),
+        (tmp_path / "gone.npz", "the file does not exist"),
     ):
         outcome = run(command[0], path, *command[1:])
         assert outcome.code == 2

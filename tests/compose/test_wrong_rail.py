@@ -165,7 +165,7 @@ def test_wrong_urdf(arm, tmp_path, case):
 
 
 def test_missing_arm(tmp_path):
-    with pytest.raises(UrdfError, match=r"nowhere\.urdf: there is no such file"):
+    with pytest.raises(UrdfError, match=r"nowhere\.urdf: the file does not exist"):
         on_rail(tmp_path / "nowhere.urdf", Rail(**RAIL), output=tmp_path / "new.urdf")
 
 

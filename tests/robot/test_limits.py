@@ -299,7 +299,7 @@ def test_friction_that_no_drive_has_is_refused(friction, where):
 
 
 def test_positions_and_gravity_that_no_robot_has_are_refused():
-    with pytest.raises(InputError, match="is no posture"):
+    with pytest.raises(InputError, match="a joint position is out of range"):
         planar_robot("CC").posture([1e300, 0.0], "start.joints")
     with pytest.raises(InputError, match=r"robot: gravity\[2\]: out of range"):
         planar_robot("RR", gravity=[0.0, 0.0, -1e300])

@@ -9,7 +9,7 @@ import pytest
 from brachis import LimitSpec
 from brachis.errors import UrdfError
 from brachis.robot import Robot
-from brachis.robot.urdf_bodies import check_bodies, read_dynamics
+from brachis.robot.urdf_bodies import read_dynamics
 from brachis.robot.urdf_elements import read_tree
 from support.chains import INERTIAL, Joint, chain_urdf, planar_urdf
 
@@ -147,28 +147,6 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
             read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4}, "tool"
         ).bodies
         assert np.abs(other[0].com - bodies[0].com).max() > 1e-3
-
-
-@pytest.mark.parametrize(
-    ("kind", "change"),
-    [("mass", (0.5, 0, 0)), ("centre of mass", (0, 0.1, 0)), ("inertia", (0, 0, 0.1))],
-)
-def test_a_model_that_weighs_something_else_is_refused(kind, change):
-    robot = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
-    bodies = read_dynamics(
-        read_tree(TEXT, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool"
-    ).bodies
-    model, old = robot.model.copy(), robot.model.inertias[2]
-    mass, lever, moment = change
-    model.inertias[2] = pin.Inertia(
-        old.mass + mass, old.lever + lever, old.inertia + moment * np.eye(3)
-    )
-    with pytest.raises(
-        UrdfError, match=f"moved by joint 'j2' has another {kind} in the model"
-    ) as caught:
-        check_bodies(model, bodies, "file.urdf")
-    assert "of links tool, link2" in str(caught.value)
-    check_bodies(robot.model, bodies, "file.urdf")
 
 
 def test_long_chains_are_summed_up_without_recursion():

@@ -305,7 +305,7 @@ def test_broken_files(tmp_path, text, words):
 
 
 def test_missing_file_and_binary_file(tmp_path):
-    with pytest.raises(UrdfError, match="there is no such file"):
+    with pytest.raises(UrdfError, match="the file does not exist"):
         Robot.from_urdf(tmp_path / "none.urdf")
     with pytest.raises(UrdfError, match="it is a folder"):
         Robot.from_urdf(tmp_path)
@@ -366,5 +366,5 @@ def test_posture_checks():
         robot.posture([1.0, 2.0, 3.0], "start.joints")
     with pytest.raises(UnknownNameError, match="Did you mean 'j1'"):
         robot.posture({"j1x": 1.0}, "start.joints")
-    with pytest.raises(InputError, match="is no posture"):
+    with pytest.raises(InputError, match="a joint position is out of range"):
         robot.posture([1.0, float("inf")], "start.joints")

@@ -222,7 +222,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
         ),
         ({"gird": {}}, ["gird", "Did you mean 'grid'"]),
         ({"task": 3}, ["no task", "found 3"]),
-        ({"task": "nothing.yaml"}, ["nothing.yaml", "no such file"]),
+        ({"task": "nothing.yaml"}, ["nothing.yaml", "the file does not exist"]),
         ({"fixed": {"spline.degre": 3}}, ["Did you mean 'degree'"]),
     ],
 )

@@ -170,7 +170,7 @@ def test_the_file_is_relative_to_the_task_file() -> None:
     with pytest.raises(TaskError) as caught:
         load_task("tasks/task.yaml")
     assert str(caught.value) == (
-        "tasks/task.yaml: path[0].csv.file: there is no such file; found poses.csv. "
+        "tasks/task.yaml: path[0].csv.file: the file does not exist; found poses.csv. "
         f"Paths are relative to {Path.cwd() / 'tasks'}"
     )
 
@@ -297,7 +297,7 @@ def test_columns_of_the_wrong_task_space() -> None:
 def test_unreadable_files() -> None:
     with pytest.raises(
         TaskError,
-        match=r"task: path\[0\].csv.file: there is no such file; found poses.csv",
+        match=r"task: path\[0\].csv.file: the file does not exist; found poses.csv",
     ):
         task()
     Path("poses.csv").write_bytes(b"\xff\xfe\x00")

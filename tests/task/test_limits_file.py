@@ -132,7 +132,7 @@ def test_a_wrong_file_is_refused_with_its_key(loaded, changes, words):
 
 
 def test_files_that_are_none(tmp_path, loaded):
-    with pytest.raises(TaskError, match=r"robot\.limits_file: there is no such file"):
+    with pytest.raises(TaskError, match=r"robot\.limits_file: the file does not exist"):
         loaded({"limits_file": "nowhere.yaml"})
     (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
     with pytest.raises(TaskError, match="a limits file is a mapping"):

@@ -578,7 +578,7 @@ def test_merge_keys_may_be_overridden(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
-    assert "nothing.yaml: there is no such file" in str(
+    assert "nothing.yaml: the file does not exist" in str(
         refused(tmp_path / "nothing.yaml")
     )
     assert "the file cannot be read" in str(refused(str(tmp_path)))

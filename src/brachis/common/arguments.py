@@ -76,7 +76,7 @@ def file_name(value: object, where: str) -> Path:
 
 
 def check_callable(value: object, where: str) -> None:
-    """Refuse what is neither a function nor None.
+    """Raise an error unless the value is a function or None.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def check_callable(value: object, where: str) -> None:
 
 
 def check_list(value: object, where: str, of: str) -> None:
-    """Refuse what is not a list or tuple, `of` certain things.
+    """Raise an error unless the value is a list or tuple; `of` names its items in the message.
 
     Raises
     ------

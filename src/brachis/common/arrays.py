@@ -7,10 +7,6 @@ from typing import Any
 
 import numpy as np
 
-_STEP = 3e-5
-"""By so much a motion goes on, in units of its coordinates, to differentiate what depends on it: the error of central
-differences is of the order of its square."""
-
 
 def freeze(owner: Any, *names: str) -> None:
     """Replace arrays of a frozen dataclass by read-only copies of its own."""
@@ -52,7 +48,8 @@ def rates(
         np.abs(part).max(axis=1, initial=0.0) ** (1.0 / order)
         for order, part in enumerate(derivatives, 1)
     ]
-    h = _STEP / np.maximum(np.max(speeds, axis=0), 1.0)
+    # The error of central differences is of the order of the square of the step, in units of the coordinates.
+    h = 3e-5 / np.maximum(np.max(speeds, axis=0), 1.0)
     step = np.concatenate([h, -h])[:, None]
     xdot, xddot, xdddot = (np.tile(part, (2, 1)) for part in derivatives)
     moved = (

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Deadline:
-    """A moment by the monotonic clock, which all processes of a machine share; never, unless said otherwise.
+    """A moment by the monotonic clock, which all processes of a machine share; by default never.
 
     Attributes
     ----------

@@ -46,12 +46,12 @@ def status_of(path: str | os.PathLike[str]) -> os.stat_result | None:
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Tell whether there is a regular file; False for a name that the system refuses, where `Path.is_file` raises."""
+    """Return whether there is a regular file; False for a name that the system refuses (`Path.is_file` raises)."""
     return os.path.isfile(path)  # noqa: PTH113
 
 
 def is_folder(path: str | os.PathLike[str]) -> bool:
-    """Tell whether there is a folder; see `is_file`."""
+    """Return whether there is a folder; see `is_file`."""
     return os.path.isdir(path)  # noqa: PTH112
 
 
@@ -109,7 +109,7 @@ def temporary_in(folder: Path) -> Path:
 
     Only names of this program are looked at whose process is of this host and runs no more.
     """
-    # Hosts that share a folder are told apart: their process numbers say nothing about each other's.
+    # Several hosts may share a folder; each knows its own process numbers only.
     host = hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
     with suppress(OSError):
         for path in folder.glob(f".brachis-{host}-*.part"):
@@ -183,10 +183,10 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     try:
         content = io.BytesIO()
         yield content
-        with writing_errors(path), file:
-            file.write(content.getbuffer())
-        if not in_place:
-            with writing_errors(path):
+        with writing_errors(path):
+            with file:
+                file.write(content.getbuffer())
+            if not in_place:
                 temporary.replace(target)
     finally:
         with suppress(OSError):
@@ -207,7 +207,7 @@ def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def shipped_folder(folder: str) -> Path:
-    """Return a folder of files that come with brachis: within an installed package, or in the source tree beside it.
+    """Return a folder of files that come with brachis: within an installed package, or in the source tree.
 
     Parameters
     ----------
@@ -269,12 +269,12 @@ _ADVICE = {
     Kind.SWEEP: "brachis sweep {path} plans it",
     Kind.URDF: "brachis new {path} writes a task for it",
     Kind.RESULT: "brachis verify, plot and bottleneck take it; it was planned from a task file, for a URDF",
-    Kind.FIGURES: "The motion itself is in the npz file beside it",
+    Kind.FIGURES: "The motion itself is in the npz file in the same folder",
 }
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind | None:
-    """Tell what a file is; None where it cannot be read, or is something else."""
+    """Recognise a file by its beginning; None if it cannot be read, or is something else."""
     try:
         content = read_file(path, 4 * LARGEST_TEXT, beginning=16_384)
     except OSError:
@@ -283,7 +283,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     patterns = {
         Kind.RESULT: rb"\APK",
         Kind.FIGURES: rb'\A\{\n  "t_end"',
-        Kind.URDF: rb"\A\s*<(?s:.*)<?robot\b",
+        Kind.URDF: rb"(?s)\A\s*(?=<).*<robot\b",
         Kind.SWEEP: rb"(?m)^sweep\s*:",
         Kind.TASK: rb"(?m)^brachis\s*:",
     }
@@ -302,7 +302,7 @@ def check_kind(
     ----------
     path : path
     expected : Kind or str
-        In words where it is a kind that cannot be told.
+        In words for a kind that cannot be recognised.
     error : type
         What is raised.
 
@@ -360,7 +360,7 @@ def read_text(
         content = read_file(path, largest).decode()
         return io.IncrementalNewlineDecoder(None, translate=True).decode(content)
     except FileNotFoundError:
-        problem = "there is no such file"
+        problem = "the file does not exist"
         hint = f"Paths are relative to {folder}" if folder else hint
     except UnicodeDecodeError as refusal:
         problem = f"not a text file in UTF-8: {refusal.reason} at byte {refusal.start}"

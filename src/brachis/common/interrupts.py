@@ -144,7 +144,7 @@ def block_in_children() -> Iterator[None]:
 def _quiet(
     hook: Callable[[UnraisableHookArgs], object],
 ) -> Callable[[UnraisableHookArgs], object]:
-    """Say nothing of a KeyboardInterrupt in a finaliser: the press is remembered."""
+    """Return a hook that ignores a KeyboardInterrupt in a finaliser: the press is remembered."""
 
     def quiet(unraisable: UnraisableHookArgs) -> None:
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):

@@ -96,6 +96,6 @@ class _Line:
 
 
 def _in_notebook() -> bool:
-    """Tell whether this runs in a notebook's kernel."""
+    """Return whether this runs in a notebook's kernel."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")

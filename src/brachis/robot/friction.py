@@ -14,9 +14,6 @@ from brachis.errors import InputError
 from brachis.robot.limits import LARGEST, per_joint_values
 from brachis.task import FROM_URDF, FrictionSettings
 
-_LEAST_SPEED = 1e-9
-"""rad/s or m/s: the slope of a step at a smaller speed cannot be told from infinity."""
-
 
 @dataclass(frozen=True, repr=False)
 class Friction(Summary):
@@ -45,7 +42,7 @@ class Friction(Summary):
     v_eps: np.ndarray
 
     def __post_init__(self) -> None:
-        """Take copies that nobody can write to."""
+        """Make the arrays read-only copies."""
         freeze(self, *(each.name for each in fields(self)))
 
     @classmethod
@@ -111,12 +108,13 @@ class Friction(Summary):
                 )
         terms["armature"] = terms["armature"] + rotors * ratios**2
         v_eps = terms.pop("coulomb_velocity")
-        if not v_eps.min() >= _LEAST_SPEED:
+        least = 1e-9  # rad/s or m/s: steeper steps have slopes that overflow in squares
+        if not v_eps.min() >= least:
             raise InputError(
                 "the speed at which Coulomb friction is developed is too small",
                 where="robot.friction.coulomb_velocity",
                 found=settings.coulomb_velocity,
-                allowed=f"{_LEAST_SPEED:g} to {LARGEST:g} rad/s or m/s",
+                allowed=f"{least:g} to {LARGEST:g} rad/s or m/s",
             )
         return cls(**terms, v_eps=v_eps)
 

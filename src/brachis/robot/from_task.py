@@ -48,7 +48,7 @@ def robot_from_settings(
     urdf : path, optional
         URDF file to use in place of the one that the task names.
     urdf_text : str, optional
-        Text of the URDF, where it has been kept with the task; nothing is read from disk then.
+        Text of the URDF, if it was saved with the task; nothing is read from disk then.
 
     Raises
     ------
@@ -166,19 +166,15 @@ def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotS
     frames = _merge("robot", own_frames, asked_frames, ())
     names = robot.urdf_joints
     limits = written.get("limits", {})
-    limited = {
-        name
-        for limit in limits.values()
-        if isinstance(limit, Mapping)
-        for name in limit
-    }
+    limited = [each for each in limits.values() if isinstance(each, Mapping)]
     locked: Mapping[str, float] = {}
-    if frames != own_frames or not limited <= set(names):
-        chain = read_chain(
-            robot.urdf,
-            robot.source,
-            **dict.fromkeys(_FRAMES[:2]) | {_FRAMES[2]: {}} | frames,
-        )
+    if frames != own_frames or not set().union(*limited) <= set(names):
+        chosen: dict[str, Any] = {
+            "tool_frame": None,
+            "base_frame": None,
+            "locked_joints": {},
+        }
+        chain = read_chain(robot.urdf, robot.source, **{**chosen, **frames})
         names = chain.joint_names
         locked = chain.locked
     if limits:
@@ -192,7 +188,7 @@ def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotS
 
 
 def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
-    """Return what is set on one side or, alike, on both; joint by joint where only some joints are set.
+    """Merge two values: both sides may set different keys or joints, or set the same ones to the same value.
 
     Raises
     ------
@@ -201,19 +197,19 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
     """
     if asked == given:
         return given
-    own, other = given, asked
+    sides = [given, asked]
     if key in _PER_JOINT:
         absent = _PER_JOINT[key]
-        own, other = (
+        listed = [per_joint_values(key, side, names, absent) for side in sides]
+        sides = [
             {
                 name: value
-                for name, value in zip(
-                    names, per_joint_values(key, side, names, absent), strict=True
-                )
+                for name, value in zip(names, values, strict=True)
                 if value != absent
             }
-            for side in (given, asked)
-        )
+            for values in listed
+        ]
+    own, other = sides
     if not (isinstance(own, Mapping) and isinstance(other, Mapping)):
         raise TaskError(
             "the task and the robot that is given with it contradict each other",
@@ -276,7 +272,7 @@ def in_use(robot: Robot) -> dict[str, str]:
 
 
 def _by_joint(robot: Robot, kind: str) -> str:
-    """Write one term of the friction with its units, joint by joint unless it is the same at all."""
+    """Write one term of the friction with its units, joint by joint unless all joints have the same value."""
     names = robot.urdf_joints
     columns = zip(getattr(robot.friction, kind), robot.position_units, strict=True)
     rows = [f"{value:g} {UNITS[kind][unit]}" for value, unit in columns][: len(names)]

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from brachis.errors import InputError, UrdfError
 from brachis.robot.urdf import UrdfChain
-from brachis.robot.urdf_bodies import check_bodies, check_inertia, symmetric_matrix
+from brachis.robot.urdf_bodies import check_inertia, symmetric_matrix
 from brachis.task import Payload, Placement, RobotSettings
 
 
@@ -30,7 +30,7 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
     Raises
     ------
     UrdfError
-        Pinocchio cannot build the model; the chain is not serial; the model does not weigh what the URDF says.
+        Pinocchio cannot build the model, or the chain is not serial.
     InputError
         No rigid body has the payload's inertia.
     """
@@ -55,7 +55,6 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
             found=list(names),
             allowed=list(chain.joint_names),
         )
-    check_bodies(model, chain.dynamics.bodies, where)
     model.gravity.linear = np.array(settings.gravity)
     model.armature = np.zeros(model.nv)
     mounting = _se3(settings.mounting)

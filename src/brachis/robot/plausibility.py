@@ -54,7 +54,7 @@ class Issue:
     usual: str
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Write it in one line."""
         return f"{self.where}: {self.message}; found {self.found}; usual: {self.usual}"
 
     def to_dict(self) -> dict[str, str]:
@@ -121,7 +121,7 @@ class Check:
         In `unit`; a NaN passes.
     unit : str
     aside : str
-        What is said behind what is usual: for what, or what else to write.
+        Text after the usual figure: for which robot or limit, or what else to write.
     shown : str
         The figure in words, if it is more than one number.
     """

@@ -77,7 +77,7 @@ class Robot(Summary):
     urdf_dynamics : UrdfDynamics
         Joints, bodies and friction as the URDF states them, without payload, mounting and tool offset.
     friction : Friction
-        Torque terms beside the rigid-body model's.
+        Torque terms that the rigid-body model lacks.
     settings : RobotSettings
         What the robot was made with, as the ``robot`` part of a task.
     source : str
@@ -137,7 +137,7 @@ class Robot(Summary):
         urdf_text : str, optional
             Text of the URDF where it is already known; `path` then only names it.
         **keywords
-            Keys of the ``robot`` part of a task; None for what is as by default.
+            Keys of the ``robot`` part of a task; None for the default.
         tool_frame : str, optional
             Link at the end of the chain; the only leaf link if left out.
         base_frame : str, optional
@@ -259,26 +259,23 @@ class Robot(Summary):
         >>> robot.limits.torque.tolist(), robot.limits.velocity.tolist()
         ([20.0, 10.0, 10.0], [2.0, 2.0, 2.0])
         """
-        own = self.urdf_joints
-        kept = to_spec(self.limits, own)
-        changes: dict[str, Any] = {}
+        names = self.urdf_joints
+        changes: dict[str, Any] = vars(to_spec(self.limits, names)).copy()
         for kind, value in limits.items():
-            if kind not in LimitKeywords.__annotations__:
-                raise UnknownNameError(
-                    "limit", kind, LimitKeywords.__annotations__, where="with_limits"
-                )
-            stated = getattr(kept, kind)
+            if kind not in changes:
+                raise UnknownNameError("limit", kind, changes, where="with_limits")
+            stated = changes[kind]
             if isinstance(value, Mapping) and isinstance(stated, Mapping):
                 changes[kind] = {**stated, **value}
             else:
                 changes[kind] = value
-        spec = LimitSpec(**{**vars(kept), **changes})
-        resolved = resolve_limits(spec, own, self.urdf_limits[: len(own)])
-        resolved = resolved.with_free_joint() if self.rolls_freely else resolved
+        spec = LimitSpec(**changes)
+        resolved = resolve_limits(spec, names, self.urdf_limits[: len(names)])
+        if self.rolls_freely:
+            resolved = resolved.with_free_joint()
         self.friction.check_against(self.model, resolved.torque)
-        settings = self.settings.model_copy(
-            update={"limits": spec, "speed_override": 1.0}
-        )
+        changed = {"limits": spec, "speed_override": 1.0}
+        settings = self.settings.model_copy(update=changed)
         return replace(self, limits=resolved, settings=settings)
 
     @check_keywords
@@ -325,7 +322,8 @@ class Robot(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
-        limits, payload = self.limits, self.settings.payload
+        limits = self.limits
+        payload = self.settings.payload
         return {
             "urdf": self.source,
             "joints": ", ".join(self.joint_names),
@@ -397,14 +395,13 @@ class Robot(Summary):
         InputError, UnknownNameError
             A joint is missing, unknown or not finite, or the list has another length than the chain.
         """
-        if self.rolls_freely:
-            joints = _with_roll(joints, self.n)
-        values = per_joint_values(where, joints, list(self.joint_names), None)
-        missing = [
-            name
-            for name, value in zip(self.joint_names, values, strict=True)
-            if value is None
-        ]
+        if self.rolls_freely and isinstance(joints, Mapping):
+            joints = {ROLL_JOINT: 0.0, **joints}
+        elif self.rolls_freely and isinstance(joints, Sequence | np.ndarray):
+            joints = [*joints, 0.0] if len(joints) == self.n - 1 else joints
+        values = per_joint_values(where, joints, self.joint_names, None)
+        pairs = zip(self.joint_names, values, strict=True)
+        missing = [name for name, value in pairs if value is None]
         if missing:
             raise InputError(
                 "joints are missing",
@@ -414,9 +411,11 @@ class Robot(Summary):
             )
         q = np.array(values, dtype=float)
         if not np.all(np.abs(q) <= FARTHEST):
-            allowed = f"finite numbers, within {FARTHEST:g} rad or m of zero"
             raise InputError(
-                "is no posture", where=where, found=q.tolist(), allowed=allowed
+                "a joint position is out of range",
+                where=where,
+                found=q.tolist(),
+                allowed=f"finite numbers, within {FARTHEST:g} rad or m of zero",
             )
         return q
 
@@ -428,12 +427,15 @@ class Robot(Summary):
 
     def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame in the world frame, from postures (K, n)."""
-        data, frame = self.model.createData(), self.frame_id
-        positions, rotations = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+        data = self.model.createData()
+        frame = self.frame_id
+        positions = np.empty((len(q), 3))
+        rotations = np.empty((len(q), 3, 3))
         for k, posture in enumerate(q):
             pin.forwardKinematics(self.model, data, posture)
             placement = pin.updateFramePlacement(self.model, data, frame)
-            positions[k], rotations[k] = placement.translation, placement.rotation
+            positions[k] = placement.translation
+            rotations[k] = placement.rotation
         return positions, rotations
 
     def heights(self, q: np.ndarray) -> np.ndarray:
@@ -441,26 +443,16 @@ class Robot(Summary):
 
         The plane goes through the base frame; its normal is the z axis of the URDF's root link.
         """
-        base = self.model.frames[
-            self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
-        ].placement
+        base = self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
+        floor = self.model.frames[base].placement.translation
         up = pin.rpy.rpyToMatrix(*np.radians(self.settings.mounting.rpy_deg))[:, 2]
-        return np.asarray((self.tool_placements(q)[0] - base.translation) @ up)
-
-
-def _with_roll(joints: object, n: int) -> object:
-    """Add the virtual joint's position, zero, to a posture that leaves it out."""
-    if isinstance(joints, Mapping):
-        return {ROLL_JOINT: 0.0, **joints}
-    if isinstance(joints, (Sequence, np.ndarray)) and len(joints) == n - 1:
-        return [*joints, 0.0]
-    return joints
+        return np.asarray((self.tool_placements(q)[0] - floor) @ up)
 
 
 def _without_defaults(
     settings: RobotSettings, limits: LimitSpec, names: Sequence[str]
 ) -> RobotSettings:
-    """Leave out settings that are as by default, and state limits joint by joint, so that others can be added."""
+    """Leave out settings that have their default, and state limits joint by joint, so that others can be added."""
     by_name: dict[str, Any] = {}
     for each in fields(limits):
         value = getattr(limits, each.name)

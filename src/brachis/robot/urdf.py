@@ -176,10 +176,11 @@ def read_chain(
         A frame or joint does not exist.
     """
     tree = read_tree(text, where)
-    tool = _find_tool(tree, tool_frame, where)
-    base = base_frame if base_frame is not None else tree.root
-    if base not in tree.links:
-        raise UnknownNameError("frame", base, tree.links, where=f"{where}: base_frame")
+    for key, frame in (("tool_frame", tool_frame), ("base_frame", base_frame)):
+        if frame is not None and frame not in tree.links:
+            raise UnknownNameError("frame", frame, tree.links, where=f"{where}: {key}")
+    tool = _only_leaf(tree, where) if tool_frame is None else tool_frame
+    base = tree.root if base_frame is None else base_frame
     path = _joints_between(tree, base, tool, where)
     movable = _movable(tree)
     for name, position in locked_joints.items():
@@ -232,13 +233,8 @@ def read_file(path: Path) -> str:
     )
 
 
-def _find_tool(tree: UrdfTree, tool_frame: str | None, where: str) -> str:
-    """Check the named tool frame, or take the only leaf link."""
-    if tool_frame is not None:
-        if tool_frame not in tree.links:
-            place = f"{where}: tool_frame"
-            raise UnknownNameError("frame", tool_frame, tree.links, where=place)
-        return tool_frame
+def _only_leaf(tree: UrdfTree, where: str) -> str:
+    """Return the only link without children."""
     leaves = _leaves(tree)
     if len(leaves) != 1:
         raise UrdfError(

@@ -1,4 +1,4 @@
-"""A URDF's chain as its text states it, read without Pinocchio: to compare a model with, and to verify motions by."""
+"""A URDF's chain as its text states it, read without Pinocchio: to verify motions by."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from brachis.common.summary import Summary
-from brachis.errors import InputError, UrdfError
+from brachis.errors import InputError
 from brachis.robot.urdf_elements import Element, UrdfTree, end_of, number_of, numbers_of
 
 
@@ -33,8 +33,6 @@ class Body(Summary):
         Centre of mass in the frame of the joint's child link, m; zeros where the mass is zero.
     inertia : (3, 3) ndarray
         About the centre of mass, axes of the same frame, kg m^2.
-    size : float
-        Sum of the links' moments about the frame's origin, kg m^2: what differences are measured by.
     """
 
     joint: str
@@ -45,7 +43,6 @@ class Body(Summary):
     mass: float
     com: np.ndarray
     inertia: np.ndarray
-    size: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +56,7 @@ class UrdfDynamics(Summary):
     tool : (4, 4) ndarray
         Placement of the tool frame in the frame of the last joint.
     friction : dict of str to (n,) ndarray
-        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N. Zero where nothing is said.
+        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N. Zero by default.
     """
 
     bodies: tuple[Body, ...]
@@ -116,40 +113,6 @@ def read_dynamics(
     return UrdfDynamics(tuple(bodies), placements[tool], friction)
 
 
-def check_bodies(model: pin.Model, bodies: Sequence[Body], where: str) -> None:
-    """Refuse a model that does not weigh what its URDF says.
-
-    Parameters
-    ----------
-    model : pinocchio.Model
-        Of a chain.
-    bodies : sequence of Body
-        In the order of the chain.
-    where : str
-        Name of the file, for messages.
-
-    Raises
-    ------
-    UrdfError
-    """
-    for body, inertia in zip(bodies, list(model.inertias)[1:], strict=True):
-        length = np.sqrt(body.size / body.mass) if body.mass > 0.0 else 0.0
-        figures = (
-            ("mass", "kg", inertia.mass, body.mass, body.mass),
-            ("centre of mass", "m", inertia.lever, body.com, length),
-            ("inertia", "kg m^2", inertia.inertia, body.inertia, body.size),
-        )
-        for kind, unit, found, stated, size in figures:
-            if not np.abs(found - stated).max() <= 1e-9 * max(size, 1e-9):
-                raise UrdfError(
-                    f"the body moved by joint {body.joint!r} has another {kind} in the model than in the file",
-                    where=where,
-                    found=f"{np.round(found, 9).tolist()} {unit}",
-                    allowed=f"{np.round(stated, 9).tolist()} {unit}, of links {', '.join(body.links)}",
-                    hint="Report this: the URDF was misread",
-                )
-
-
 def _read_body(
     tree: UrdfTree, name: str, placement: np.ndarray, links: Mapping[str, np.ndarray]
 ) -> Body:
@@ -181,7 +144,6 @@ def _read_body(
         mass=mass,
         com=com,
         inertia=second - mass * _spread(com),
-        size=float(np.trace(np.abs(second))),
     )
 
 
@@ -232,9 +194,8 @@ def _spread(lever: np.ndarray) -> np.ndarray:
 def _origin(owner: Element, path: str) -> np.ndarray:
     """Placement, (4, 4), that an origin describes: roll, pitch and yaw about fixed axes."""
     placed = np.eye(4)
-    x, y, z = np.eye(3)
-    roll, pitch, yaw = numbers_of(owner, path, "rpy", "0 0 0")
-    placed[:3, :3] = _turn(z, yaw) @ _turn(y, pitch) @ _turn(x, roll)
+    angles = numbers_of(owner, path, "rpy", "0 0 0")
+    placed[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
     placed[:3, 3] = numbers_of(owner, path, "xyz", "0 0 0")
     return placed
 
@@ -245,15 +206,5 @@ def _displacement(joint: Element, position: float) -> np.ndarray:
     if joint.get("type") == "prismatic":
         placed[:3, 3] = position * _axis(joint)
     elif joint.get("type") in ("revolute", "continuous"):
-        placed[:3, :3] = _turn(_axis(joint), position)
+        placed[:3, :3] = Rotation.from_rotvec(position * _axis(joint)).as_matrix()
     return placed
-
-
-def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation matrix, (3, 3), about a unit vector (Rodrigues)."""
-    cross = np.array(
-        [[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]]
-    )
-    return np.asarray(
-        np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    )

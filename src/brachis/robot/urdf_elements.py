@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from lxml import etree
 
-from brachis.errors import UrdfError, nearest
+from brachis.errors import UrdfError, suggest
+from brachis.task.fields import LARGEST
 
 Element: TypeAlias = Any  # lxml comes without types
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
@@ -77,20 +78,14 @@ def read_tree(text: str, where: str) -> UrdfTree:
                 where=where,
                 found=kind,
                 allowed=", ".join(_JOINT_TYPES),
-                hint=_suggest(kind, _JOINT_TYPES),
+                hint=suggest(kind, _JOINT_TYPES),
             )
-    above = _joints_above(links, joints, where)
-    downward = _list_downward(links, joints, above, where)
+    above, downward = _connect(links, joints, where)
     for kind, owners in (("link", links), ("joint", joints)):
         for owner in owners.values():
             for entry in ENTRIES[kind]:
                 _check_entry(owner, entry, where)
     return UrdfTree(robot, links, joints, above, downward)
-
-
-def _suggest(name: str, valid: Iterable[str]) -> str | None:
-    near = nearest(name, valid)
-    return f"Did you mean {near!r}?" if near else None
 
 
 def _place_of(element: Element, where: str) -> str:
@@ -179,11 +174,13 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
     return named
 
 
-def _joints_above(
+def _connect(
     links: Mapping[str, Element], joints: Mapping[str, Element], where: str
-) -> dict[str, str]:
-    """Find the joint that every link hangs from."""
+) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the joint above every link but the root, and all links, every one after the link that it hangs from."""
     above: dict[str, str] = {}
+    below: dict[str, list[str]] = {name: [] for name in links}
+    flaws = []
     for name, joint in joints.items():
         for end in ("parent", "child"):
             link = end_of(joint, end)
@@ -194,54 +191,35 @@ def _joints_above(
                     where=f"{where}, line {joint.sourceline}",
                     found=link or "none",
                     allowed=", ".join(links),
-                    hint=_suggest(link, links) or add,
+                    hint=suggest(link, links) or add,
                 )
         child = end_of(joint, "child")
         if child in above:
-            raise UrdfError(
-                "the links do not form one tree",
-                where=where,
-                found=f"link {child!r} is the child of two joints, {above[child]!r} and {name!r}",
-                allowed="one joint above every link",
-            )
+            both = f"{above[child]!r} and {name!r}"
+            flaws.append(f"link {child!r} is the child of two joints, {both}")
         above[child] = name
-    return above
-
-
-def _list_downward(
-    links: Mapping[str, Element],
-    joints: Mapping[str, Element],
-    above: Mapping[str, str],
-    where: str,
-) -> tuple[str, ...]:
-    """List all links, every one after the link that it hangs from."""
-    roots = [name for name in links if name not in above]
-    if len(roots) != 1:
+        below[end_of(joint, "parent")].append(child)
+    downward = [name for name in links if name not in above]
+    if len(downward) != 1:
+        flaws.append(f"root links: {', '.join(downward) or 'none'}")
+    if not flaws:
+        for link in downward:  # which grows on the way
+            downward.extend(below[link])
+        looped = links.keys() - set(downward)
+        if looped:
+            names = ", ".join(name for name in links if name in looped)
+            flaws.append(f"a loop of links: {names}")
+    if flaws:
         raise UrdfError(
             "the links do not form one tree",
             where=where,
-            found=f"root links: {', '.join(roots) or 'none'}",
-            allowed="one link without a joint above it",
+            found=flaws[0],
+            allowed="one root link, and one joint above every other link",
         )
-    below: dict[str, list[str]] = {name: [] for name in links}
-    for child, joint in above.items():
-        below[end_of(joints[joint], "parent")].append(child)
-    downward = roots
-    for link in downward:  # which grows on the way
-        downward.extend(below[link])
-    if len(downward) < len(links):
-        looped = ", ".join(name for name in links if name not in downward)
-        raise UrdfError(
-            "the links do not form one tree",
-            where=where,
-            found=f"a loop of links: {looped}",
-        )
-    return tuple(downward)
+    return above, tuple(downward)
 
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_LARGEST = 1e12
-"""No length, mass or inertia of a robot is larger, in SI units; squares of such figures are still numbers."""
 
 
 @dataclass(frozen=True)
@@ -267,7 +245,7 @@ class Entry:
     unit: str
     count: int = 1
     required: bool = False
-    largest: float = _LARGEST
+    largest: float = LARGEST
 
 
 ENTRIES: dict[str, tuple[Entry, ...]] = {
@@ -276,12 +254,8 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
         Entry("inertial/origin", "rpy", "rad", 3),
         Entry("inertial/mass", "value", "kg", required=True),
         *(
-            Entry("inertial/inertia", moment, "kg m^2", required=True)
-            for moment in ("ixx", "iyy", "izz")
-        ),
-        *(
-            Entry("inertial/inertia", product, "kg m^2")
-            for product in ("ixy", "ixz", "iyz")
+            Entry("inertial/inertia", key, "kg m^2", required=key[1] == key[2])
+            for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
         ),
     ),
     "joint": (

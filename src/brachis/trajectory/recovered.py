@@ -72,7 +72,7 @@ class Recovered:
     error: np.ndarray = field(repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse tolerances that say nothing; take copies of the arrays that nobody can write to.
+        """Check the tolerance, and make the arrays read-only copies.
 
         Raises
         ------

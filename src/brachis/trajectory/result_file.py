@@ -38,12 +38,12 @@ ARRAYS = (
     "chart_knots",
 )
 """Names of the arrays in the file; as in `Trajectory`."""
-_CHART_DEGREE = 5
-"""Degree of the splines of a chart's rows."""
-_LARGEST_FILE = 32_000_000
-"""Bytes of a result file, and of what it holds unpacked."""
-_MOST_NODES = 50_000
-"""Nodes of a motion: they bound the time that its verification takes."""
+_MOST = {
+    "bytes": 32_000_000,  # of the file, and of what it holds unpacked
+    "nodes": 50_000,  # of a motion: they bound the time that its verification takes
+    "degree": 7,  # of splines, as in tasks
+}
+"""Bounds on what a result file may hold."""
 _BROKEN = (
     OSError,
     ValueError,
@@ -108,9 +108,9 @@ def read_result(path: Path) -> dict[str, Any]:
     check_kind(path, Kind.RESULT, ResultFileError)
     where = str(path)
     try:
-        meta, arrays = _read_parts(io.BytesIO(read_file(path, _LARGEST_FILE)))
+        meta, arrays = _read_parts(io.BytesIO(read_file(path, _MOST["bytes"])))
     except FileNotFoundError as error:
-        raise ResultFileError("there is no such file", where=where) from error
+        raise ResultFileError("the file does not exist", where=where) from error
     except _BROKEN as error:
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ResultFileError(
@@ -120,7 +120,7 @@ def read_result(path: Path) -> dict[str, Any]:
             allowed="a file written by brachis plan",
         ) from error
     schema = meta.get("schema")
-    if schema not in {2, SCHEMA}:
+    if schema not in (2, SCHEMA):
         raise ResultFileError(
             "unknown schema version", where=where, found=schema, allowed=SCHEMA
         )
@@ -128,14 +128,13 @@ def read_result(path: Path) -> dict[str, Any]:
         if schema != SCHEMA:
             meta["task"] = _renew_task(meta.get("task"))
         return _check_parts(_Meta.model_validate(meta), arrays)
-    except ValidationError as error:
-        reason = str(task_error(error, "meta", _Meta))
-        raise ResultFileError(_DAMAGED, where=where, found=reason) from error
-    except InputError as error:
-        raise ResultFileError(_DAMAGED, where=where, found=str(error)) from error
-
-
-_DAMAGED = "the result file is broken"
+    except (ValidationError, InputError) as error:
+        found: Exception = error
+        if isinstance(error, ValidationError):
+            found = task_error(error, "meta", _Meta)
+        raise ResultFileError(
+            "the result file is broken", where=where, found=str(found)
+        ) from error
 
 
 def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
@@ -148,9 +147,9 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
     if not {member.compress_type for member in members} <= numpys:
         raise ValueError("an archive that NumPy does not write")
     unpacked = sum(member.file_size for member in members)
-    if unpacked > _LARGEST_FILE:
+    if unpacked > _MOST["bytes"]:
         raise ValueError(
-            f"an archive of {unpacked / 1e6:.3g} MB unpacked, at most {_LARGEST_FILE / 1e6:g} MB are read"
+            f"an archive of {unpacked / 1e6:.3g} MB unpacked, at most {_MOST['bytes'] / 1e6:g} MB are read"
         )
     stream.seek(0)
     with np.load(stream, allow_pickle=False) as archive:
@@ -242,19 +241,18 @@ def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
     """Degree of redundancy, from a checked chart or else from the joints that are named."""
     if rows.shape[:1] == (0,) and not knots.size:
         return named
+    degree = 5
     fits = rows.ndim == 3 and rows.shape[2] == n + 1
-    if fits and len(rows) == 1:
-        fits = knots.shape == (0,)
-    elif fits:  # the reference begins at s = 0 and ends at 1 to rounding
-        fits = len(knots) == len(rows) + _CHART_DEGREE + 1 and _are_knots(
-            np.round(knots, 9), _CHART_DEGREE
-        )
+    if fits:  # the chart's reference begins at s = 0 and ends at 1 to rounding
+        count = len(rows) + degree + 1 if len(rows) != 1 else 0
+        rounded = np.round(knots, 9)
+        fits = knots.shape == (count,) and (not count or _are_knots(rounded, degree))
     _refuse_unless(
         fits,
         "the rows and knots of the chart do not fit each other or the robot",
         where="chart_rows",
         found=f"{rows.shape}, knots {knots.shape}",
-        allowed=f"rows (B, r, {n + 1}), and B + {_CHART_DEGREE + 1} knots from 0 to 1 where B is not 1",
+        allowed=f"rows (B, r, {n + 1}), and B + {degree + 1} knots from 0 to 1 where B is not 1",
     )
     _refuse_unless(
         named in (0, rows.shape[1]),
@@ -269,14 +267,10 @@ def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
 def _are_knots(knots: np.ndarray, degree: int) -> bool:
     """Return whether these are the knots of splines of a degree over [0, 1]."""
     outer = degree + 1
-    if not 1 <= degree <= _HIGHEST_DEGREE or knots.ndim != 1 or len(knots) < 2 * outer:
+    if not 1 <= degree <= _MOST["degree"] or knots.ndim != 1 or len(knots) < 2 * outer:
         return False
     ends = not knots[:outer].any() and (knots[-outer:] == 1.0).all()
     return bool(ends and (np.diff(knots) >= 0.0).all())
-
-
-_HIGHEST_DEGREE = 7
-"""Degree of splines, as in tasks."""
 
 
 def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
@@ -298,7 +292,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
         f"not the knots of a spline of degree {degree}",
         where="knots",
         found=_describe(knots),
-        allowed=f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_HIGHEST_DEGREE}",
+        allowed=f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_MOST['degree']}",
     )
     _refuse_unless(
         bool((np.diff(knots[degree : len(knots) - degree]) >= shortest).all()),
@@ -318,11 +312,11 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
 def _check_nodes(times: np.ndarray) -> None:
     """Refuse motions of so many nodes that they are not verified."""
     _refuse_unless(
-        times.size <= _MOST_NODES,
+        times.size <= _MOST["nodes"],
         "the motion has too many nodes",
         where="times",
         found=times.size,
-        allowed=_MOST_NODES,
+        allowed=_MOST["nodes"],
         hint="Import fewer rows, or a part of them",
     )
 

@@ -58,7 +58,7 @@ class Samples(Summary):
     tool_speed: np.ndarray
 
     def __post_init__(self) -> None:
-        """Take copies that nobody can write to."""
+        """Make the arrays read-only copies."""
         freeze(self, *(field.name for field in fields(self)))
 
     def __len__(self) -> int:

@@ -19,6 +19,7 @@ from brachis.common.arrays import freeze, with_like_signs
 from brachis.common.summary import Summary
 from brachis.errors import InputError, UnknownNameError, write_apart, write_count
 from brachis.robot import Robot, dynamics
+from brachis.robot.task_map import Pose
 from brachis.task import Task
 from brachis.trajectory.pieces import piece_coefficients
 from brachis.trajectory.recovered import Recovered
@@ -49,19 +50,11 @@ def tool_motion(
     speed : (K,) ndarray
         m/s.
     """
-    model = robot.model
-    data = model.createData()
-    frame = robot.frame_id
-    position = np.empty((len(q), 3))
-    quaternion = np.empty((len(q), 4))
-    speed = np.empty(len(q))
-    for k in range(len(q)):
-        pin.forwardKinematics(model, data, q[k], qdot[k])
-        placement = pin.updateFramePlacement(model, data, frame)
-        position[k] = placement.translation
-        quaternion[k] = np.roll(pin.Quaternion(placement.rotation).coeffs(), 1)
-        speed[k] = np.linalg.norm(pin.getFrameVelocity(model, data, frame).linear)
-    return position, with_like_signs(quaternion), speed
+    position, rotations = robot.tool_placements(q)
+    coefficients = [pin.Quaternion(rotation).coeffs() for rotation in rotations]
+    quaternion = np.roll(np.reshape(coefficients, (-1, 4)), 1, axis=1)
+    velocity = np.einsum("ikn,kn->ik", Pose(robot).twists(q)[:3], qdot)
+    return position, with_like_signs(quaternion), np.linalg.norm(velocity, axis=0)
 
 
 CONTINUOUS_TORQUE = 3
@@ -132,7 +125,7 @@ class Trajectory(Summary):
     recovered: Recovered | None = None
 
     def __post_init__(self) -> None:
-        """Take copies of the arrays that nobody can write to."""
+        """Make the arrays read-only copies."""
         freeze(self, *ARRAYS)
 
     @property
@@ -196,9 +189,7 @@ class Trajectory(Summary):
             A time lies outside [0, t_end].
         """
         times = self._check_times(t)
-        node = np.clip(
-            np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2
-        )
+        node = np.searchsorted(self.times[1:-1], times, side="right")
         return self.q[node] + np.asarray(self.pieces(times))
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
@@ -215,30 +206,20 @@ class Trajectory(Summary):
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""
-        t = self._check_times(t)
-        states = (
-            np.atleast_2d(part(t))
-            for part in (self.position, self.velocity, self.acceleration)
-        )
-        tau = dynamics.torque(self.robot, *states)
+        tau = self.at(t).tau
         return tau if np.ndim(t) else tau[0]
 
     def at(self, t: ArrayLike) -> Samples:
         """All quantities at times `t`, (K,), s; of a number K = 1."""
         times = np.atleast_1d(numbers(t, "t", "s"))
-        states = self.position(times), self.velocity(times), self.acceleration(times)
-        return self._samples(times, self.path_coordinate(times), *states)
+        return self._samples(times, self.velocity(times), self.acceleration(times))
 
-    def _samples(
-        self,
-        t: np.ndarray,
-        s: np.ndarray,
-        q: np.ndarray,
-        qdot: np.ndarray,
-        qddot: np.ndarray,
-    ) -> Samples:
+    def _samples(self, t: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> Samples:
+        within = np.minimum(t, self.t_end)
+        q = self.position(within)
         tau = dynamics.torque(self.robot, q, qdot, qddot)
-        return Samples(t, s, q, qdot, qddot, tau, *tool_motion(self.robot, q, qdot))
+        tool = tool_motion(self.robot, q, qdot)
+        return Samples(t, self.path_coordinate(within), q, qdot, qddot, tau, *tool)
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
         """Sample at a controller's rate.
@@ -283,19 +264,15 @@ class Trajectory(Summary):
                 allowed="exact",
             )
         whole = int(np.ceil(self.t_end / dt * (1.0 - tolerances.ROUNDING)))
-        before = np.arange(whole) * dt
+        t = np.arange(whole + 1.0) * dt
         if last == "exact":
-            return self.at(np.append(before, self.t_end))
-        moving = self.at(before)
-        rest = np.zeros((1, self.robot.n))
-        end = self.position(self.t_end)[None]
-        held = self._samples(np.array([whole * dt]), np.ones(1), end, rest, rest)
-        return Samples(
-            **{
-                name: np.concatenate([values, getattr(held, name)])
-                for name, values in vars(moving).items()
-            }
-        )
+            t[-1] = self.t_end
+            return self.at(t)
+        qdot = self.velocity(np.minimum(t, self.t_end))
+        qddot = self.acceleration(np.minimum(t, self.t_end))
+        qdot[-1] = 0.0
+        qddot[-1] = 0.0
+        return self._samples(t, qdot, qddot)
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table, a row every `dt` seconds; see `sample`.
@@ -363,16 +340,15 @@ class Trajectory(Summary):
     def _check_times(self, t: ArrayLike) -> np.ndarray:
         """Refuse times outside the trajectory; rounding at the ends is forgiven."""
         times = numbers(t, "t", "s")
-        slack = 1e-9 * self.t_end
-        if times.size and not (
-            times.min() >= -slack and times.max() <= self.t_end + slack
-        ):
+        inside = np.clip(times, 0.0, self.t_end)
+        if not np.all(np.abs(times - inside) <= 1e-9 * self.t_end):
             last, t_end = write_apart(times.max(), self.t_end, digits=6)
-            found, allowed = f"{times.min():g} s to {last} s", f"0 s to {t_end} s"
             raise InputError(
-                "time outside the trajectory", found=found, allowed=allowed
+                "time outside the trajectory",
+                found=f"{times.min():g} s to {last} s",
+                allowed=f"0 s to {t_end} s",
             )
-        return np.clip(times, 0.0, self.t_end)
+        return inside
 
 
 _P = ParamSpec("_P")

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NoReturn
 
 import numpy as np
 import pinocchio as pin
@@ -44,7 +43,6 @@ class JointSpace(TaskMap):
     def __post_init__(self) -> None:
         """Name the rows after the joints."""
         object.__setattr__(self, "rows", joint_rows(self.robot.joint_names))
-        super().__post_init__()
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -73,14 +71,6 @@ class JointSpace(TaskMap):
         """Return zeros, (K, n, n) each."""
         zeros = self.velocity_slopes(twists, qdot)
         return TaskDerivatives(zeros, zeros, zeros)
-
-    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> NoReturn:
-        """Refuse: placements of the tool do not say where the joints are."""
-        raise NotImplementedError
-
-    def rates(self, twists: np.ndarray) -> NoReturn:
-        """Refuse: twists of the tool do not say how the joints move."""
-        raise NotImplementedError
 
 
 FREE_ROLL = "pose_free_roll"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, Final
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Final
 
 import numpy as np
 import pinocchio as pin
@@ -70,8 +71,6 @@ class TaskMap(Summary, ABC):
     robot : Robot
     rows : tuple of str
         Names of the m rows, those of the position (m) first, then the angles (rad).
-    axes : tuple of int
-        World axes (0, 1, 2) of the position rows; none in a space of joints.
 
     Examples
     --------
@@ -86,20 +85,11 @@ class TaskMap(Summary, ABC):
 
     robot: Robot
     rows: tuple[str, ...]
-    axes: tuple[int, ...] = field(init=False)
-    _data: pin.Data = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        """Look the axes up, and make a workspace."""
-        axes = tuple(AXES.index(row) for row in self.rows if row in AXES)
-        object.__setattr__(self, "axes", axes)
-        object.__setattr__(self, "_data", self.robot.model.createData())
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Leave Pinocchio's workspace behind."""
-        return type(self), tuple(
-            getattr(self, entry.name) for entry in fields(self) if entry.init
-        )
+    @cached_property
+    def axes(self) -> tuple[int, ...]:
+        """World axes (0, 1, 2) of the position rows; none in a space of joints."""
+        return tuple(AXES.index(row) for row in self.rows if row in AXES)
 
     @property
     def m(self) -> int:
@@ -136,9 +126,9 @@ class TaskMap(Summary, ABC):
         """Task coordinates, (K, c), of postures (K, n)."""
         return self.of_placements(*self.robot.tool_placements(q))
 
-    @abstractmethod
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3) in the world frame."""
+        """Task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3); a space of joints has none."""
+        raise NotImplementedError
 
     @abstractmethod
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -152,7 +142,7 @@ class TaskMap(Summary, ABC):
     def twists(self, q: np.ndarray) -> np.ndarray:
         """Columns (6, K, n) of the tool frame's Jacobian at K postures (K, n): linear, then angular velocity."""
         model = self.robot.model
-        data = self._data
+        data = model.createData()
         frame = self.robot.frame_id
         columns = np.empty((len(q), 6, self.robot.n))
         for k in range(len(q)):
@@ -161,9 +151,9 @@ class TaskMap(Summary, ABC):
             )  # (6,) for one joint
         return np.moveaxis(columns, 1, 0)
 
-    @abstractmethod
     def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Rows (m, ...) of the task velocity that twists (6, ...) make."""
+        """Rows (m, ...) of the task velocity that twists (6, ...) of the tool make; a space of joints has none."""
+        raise NotImplementedError
 
     def jacobian(self, twists: np.ndarray) -> np.ndarray:
         """Task Jacobian J (K, m, n) from the `twists` at K postures."""

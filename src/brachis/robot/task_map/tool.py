@@ -64,7 +64,8 @@ def _sums(parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _bracket(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Lie bracket of twists (6, K, n or 1)."""
-    v, w = first[:3], first[3:]
+    v = first[:3]
+    w = first[3:]
     return np.concatenate(
         [cross(w, second[:3]) + cross(v, second[3:]), cross(w, second[3:])]
     )
@@ -108,8 +109,8 @@ class Pose(TaskMap):
         to = first[..., 3:].reshape(*shape, 3, 3)
         back = np.swapaxes(second[..., 3:].reshape(*shape, 3, 3), -1, -2)
         shift = np.einsum("...ij,...j->...i", back, first[..., :3] - second[..., :3])
-        turn = _rotation_vectors((back @ to).reshape(-1, 3, 3))
-        return np.concatenate([shift, turn.reshape(*shape, 3)], axis=-1)
+        turn = [pin.log3(part) for part in (back @ to).reshape(-1, 3, 3)]
+        return np.concatenate([shift, np.reshape(turn, (*shape, 3))], axis=-1)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """Return the twists themselves."""
@@ -125,23 +126,6 @@ class Pose(TaskMap):
     ) -> TaskDerivatives:
         """Return dV/dq, da/dq and da/dqdot, each (K, 6, n)."""
         return self._of_rows(_derive(twists, qdot, qddot)[2])
-
-
-def _rotation_vectors(rotations: np.ndarray) -> np.ndarray:
-    """Rotation vectors (K, 3) of rotation matrices (K, 3, 3); of one near half a turn by SciPy, through quaternions."""
-    twice = rotations - np.swapaxes(rotations, 1, 2)
-    axes = 0.5 * np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1)
-    sine = np.linalg.norm(axes, axis=1)
-    cosine = 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
-    angles = np.arctan2(sine, cosine)
-    scale = np.divide(angles, sine, out=np.ones_like(sine), where=sine > 0.0)
-    vectors = axes * scale[:, None]
-    far = angles > 3.0
-    if far.any():
-        from scipy.spatial.transform import Rotation
-
-        vectors[far] = Rotation.from_matrix(rotations[far]).as_rotvec()
-    return np.asarray(vectors)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
