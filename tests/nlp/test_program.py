@@ -23,7 +23,6 @@ from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
-    MeshOptions,
     coarsest,
     optimise_knots,
     refine_mesh,
@@ -33,6 +32,7 @@ from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.robot import Robot
+from brachis.task import SplineSettings
 from support.chains import INERTIAL, Joint, chain_urdf
 from support.phases import phase_of, reachable_points
 
@@ -143,7 +143,10 @@ def test_meshes_of_every_phase_are_refined():
     program = two_moves(degree=3, intervals=4)
     report = solve(program, first_point(program))
     fine = refine_mesh(
-        SolvedProgram(program, (report,)), solve, MeshOptions(tolerance=1e-3), NEVER
+        SolvedProgram(program, (report,)),
+        solve,
+        SplineSettings(intervals="auto", tolerance=1e-3),
+        NEVER,
     )
     assert not fine.not_completed
     assert min(phase.intervals for phase in fine.program.phases) > 8
