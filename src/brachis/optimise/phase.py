@@ -246,7 +246,7 @@ class Phase:
 
     def end_variables(self, point: int) -> np.ndarray:
         """Variables that are the curves' values at the start (`point` 0) or end (-1), (c,); -1 where fixed."""
-        own = np.array([spline.variable[point, 0] for spline in self.splines])
+        own = np.array([spline.end_variable(point) for spline in self.splines])
         first = np.array([part.start for part in self.slices])
         return np.where(own >= 0, first + own, -1)
 
