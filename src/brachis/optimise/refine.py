@@ -241,10 +241,10 @@ def _zoom(
         order = np.argsort(fine.ravel(), kind="stable")
         worst = np.empty(fine.size)
         worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
-        worst = worst.reshape(fine.shape)
-        chosen = (np.arange(len(centres)), np.argmax(worst, axis=1))
+        best = np.argmax(worst.reshape(fine.shape), axis=1)
+        chosen = np.arange(len(centres)) * len(steps) + best
         is_high = worst[chosen] > goal - 0.1 * _NEAR
-        centres = fine[chosen][is_high]
+        centres = fine.ravel()[chosen][is_high]
         heights = worst[chosen][is_high]
         reach = 0.25 * reach[is_high]
         if not len(centres):
