@@ -68,7 +68,7 @@ class Evaluator:
         Raises
         ------
         UnreachableError
-            There is no posture at one of the times.
+            The joint map has no posture at one of the times.
         """
         motion = self.joint_map.state(y, ydot, yddot, ydddot, t=t, near=near)
         return Evaluation(self.limits, motion)
