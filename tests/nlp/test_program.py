@@ -22,16 +22,16 @@ from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
-    MeshOptions,
     coarsest,
     optimise_knots,
     refine_mesh,
-    solve_nested,
+    solve_by_levels,
 )
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.robot import Robot
+from brachis.task import SplineSettings
 from support.chains import INERTIAL, Joint, chain_urdf
 from support.phases import phase_of, reachable_points
 
@@ -142,7 +142,10 @@ def test_meshes_of_every_phase_are_refined():
     program = two_moves(degree=3, intervals=4)
     report = solve(program, first_point(program))
     fine = refine_mesh(
-        SolvedProgram(program, (report,)), solve, MeshOptions(tolerance=1e-3), NEVER
+        SolvedProgram(program, (report,)),
+        solve,
+        SplineSettings(intervals="auto", tolerance=1e-3),
+        NEVER,
     )
     assert not fine.not_completed
     assert min(phase.intervals for phase in fine.program.phases) > 8
@@ -170,7 +173,7 @@ def test_phases_are_solved_from_few_intervals():
     coarse = coarsest(program)
     assert [phase.intervals for phase in coarse.phases] == [15, 14]
     report = solve(coarse, first_point(coarse))
-    nested = solve_nested(program, SolvedProgram(coarse, (report,)), solve)
+    nested = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
     assert not nested.not_completed
     assert [phase.intervals for phase in nested.program.phases] == [60, 14]
     assert nested.report.objective < report.objective
