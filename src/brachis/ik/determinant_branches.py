@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.ik.protocol import IKSolver, NotApplicableError
-from brachis.ik.screws import ChainGeometry, PosedScrews
+from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import EXACT
 
 SINGULAR = "J_nr is singular everywhere"
@@ -59,15 +59,15 @@ class DeterminantSolver(IKSolver):
         if postures is None:
             rng = np.random.default_rng(0)
             postures = rng.uniform(-np.pi, np.pi, (64, chain.n))
-        self._random = self._determinants(chain.screws_at(postures))
+        self._random = self._determinants(postures)
         self._scale = largest_size(self._random)
 
-    def _determinants(self, screws: PosedScrews) -> np.ndarray:
-        """Det J_nr, (K,)."""
-        return screws.determinant(self._joints)
+    def _determinants(self, q: np.ndarray) -> np.ndarray:
+        """Det J_nr, (K,), in postures (K, n)."""
+        return self._chain.screws_at(q).determinant(self._joints)
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return det J_nr, (K, 1), divided by its largest size, with the sign of the branch."""
         sign = 1.0 if branch == 0 else -1.0
-        values = self._determinants(self._chain.screws_at(q))
+        values = self._determinants(q)
         return sign * values[:, None] / self._scale

@@ -162,7 +162,7 @@ class EaikSolver(DeterminantSolver):
         """By how much postures miss their targets, m or an element of a rotation, and det J_nr; both (N,)."""
         screws = self._chain.screws_at(q)
         miss = np.abs(wanted - Poses.of_tool(screws).targets()).max(axis=1)
-        return miss, self._determinants(screws)
+        return miss, screws.determinant(self._joints)
 
     def _ask(
         self, targets: np.ndarray, values: np.ndarray
