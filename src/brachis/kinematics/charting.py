@@ -19,9 +19,7 @@ from brachis.path import Path
 from brachis.robot import TaskMap
 
 _ENOUGH = 0.35
-"""Least transversality of constant rows along the reference."""
-_APART = 1e-7
-"""Path coordinates of a reference differ by more."""
+"""Least transversality of rows along the reference."""
 _PLACES = (9, 17, 33, 65, 129)
 """Numbers of places through which rows that follow the null space are led, as few as are enough."""
 
@@ -56,7 +54,8 @@ def chart_around(
         The null space turns faster than rows can follow, as it does beside singularities of the arm.
     """
     kept = _growing(s)
-    s, reference = s[kept], reference[kept]
+    s = s[kept]
+    reference = reference[kept]
     if rows is not None:
         return ChartMap(task_map, path, rows, s, reference)
     null = null_spaces(Newton(task_map).task_coordinates(reference)[1])
@@ -64,7 +63,7 @@ def chart_around(
     constant = np.linalg.eigh(np.einsum("kir,kjr->ij", null, null))[1][:, ::-1][:, :r].T
     if transversality(constant[None], null).min(initial=np.inf) >= _ENOUGH:
         return ChartMap(task_map, path, ChartRows.constant(constant), s, reference)
-    following = np.swapaxes(_continued(null), 1, 2)
+    following = np.swapaxes(_continue_bases(null), 1, 2)
     for count in _PLACES:
         places = np.unique(
             np.linspace(0, len(s) - 1, min(count, len(s))).round().astype(int)
@@ -75,14 +74,15 @@ def chart_around(
         if transversality(chosen.at(s)[0], null).min() >= _ENOUGH:
             return ChartMap(task_map, path, chosen, s, reference)
     raise UnreachableError(
-        "the arm comes too near a singularity of its own for a chart"
+        "the task Jacobian is nearly singular along the reference: no chart fits around it"
     )
 
 
 def _growing(s: np.ndarray) -> np.ndarray:
     """Return where path coordinates (S,) have grown since the one before, and the first and the last place."""
     furthest = np.maximum.accumulate(s)
-    grown = np.append(True, np.diff(furthest) > _APART) & (s < s[-1] - _APART)
+    apart = 1e-7
+    grown = np.append(True, np.diff(furthest) > apart) & (s < s[-1] - apart)
     grown[0] = grown[-1] = True
     return np.flatnonzero(grown)
 
@@ -96,7 +96,8 @@ def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
 
 def moving_most(null: np.ndarray) -> np.ndarray:
     """For null spaces, (K, n, r), the r joints, (K, r), ascending, whose rows span most, by pivoting."""
-    left, chosen = null.copy(), []
+    left = null.copy()
+    chosen = []
     for _ in range(null.shape[2]):
         joint = np.argmax(np.linalg.norm(left, axis=2), axis=1)
         chosen.append(joint)
@@ -108,7 +109,7 @@ def moving_most(null: np.ndarray) -> np.ndarray:
     )
 
 
-def _continued(null: np.ndarray) -> np.ndarray:
+def _continue_bases(null: np.ndarray) -> np.ndarray:
     """Turn each basis, (S, n, r), within its null space to be nearest to the one before."""
     turned = null.copy()
     for k in range(1, len(null)):

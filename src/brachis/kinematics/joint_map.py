@@ -11,23 +11,29 @@ d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
 
 of which only the last is new; it is taken by differences along the motion.
 
-Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`); along a path of all joints
-y = (s) (`joint_space`). Without a path y = q (`direct`). Everything that lays down, solves and refines a program takes
-any of them.
+Along a path of the tool y = (s, q_r), and the closed form gives the other joints (`closed_form`), or y = (s, sigma)
+(`chart`); along a path of all joints y = (s), and without a path y = q (`joint_space`). Everything that lays down,
+solves and refines a program takes any of them.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from brachis.common.arrays import rates
-from brachis.path import Path, PathSample
+from brachis.path import Path
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
+
+
+def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Apply K matrices (K, i, j) to K vectors (K, j)."""
+    return np.einsum("kij,kj->ki", matrices, vectors)
 
 
 @dataclass(frozen=True)
@@ -69,13 +75,10 @@ class JointState(SharedTorques):
     def qdddot(self) -> np.ndarray:
         """Jerk of all joints, (K, n)."""
         exact = self.derivatives
-        pairs = (
-            (exact.qddot_y, self.ydot),
-            (exact.qddot_ydot, self.yddot),
-            (self.gradient, self.ydddot),
-        )
         return np.asarray(
-            sum(np.einsum("kij,kj->ki", slope, part) for slope, part in pairs)
+            apply_each(exact.qddot_y, self.ydot)
+            + apply_each(exact.qddot_ydot, self.yddot)
+            + apply_each(self.gradient, self.ydddot)
         )
 
     @cached_property
@@ -87,29 +90,6 @@ class JointState(SharedTorques):
             return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
 
         return rates(slopes, (self.y, self.ydot, self.yddot, self.ydddot))[0]
-
-
-@dataclass(frozen=True)
-class PathState(JointState):
-    """Motion of all joints along a path at K times.
-
-    Attributes
-    ----------
-    path : PathSample
-    twists : (6, K, n) ndarray
-        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
-    inverse : (K, a, a) ndarray
-        Of the matrix that is solved for the joints which follow: J_nr^-1 with a = m, or J_aug^-1 with a = n.
-    """
-
-    path: PathSample
-    twists: np.ndarray
-    inverse: np.ndarray
-
-    @property
-    def s(self) -> np.ndarray:
-        """Path coordinate, (K,)."""
-        return self.y[:, 0]
 
 
 @dataclass(frozen=True)
@@ -126,7 +106,7 @@ class JointDerivatives:
     qddot_ydot: np.ndarray
 
 
-class JointMap(Protocol):
+class JointMap(ABC):
     """Joint motion as a function of curves y, with c = 1 + r along a path, and c = n without one.
 
     Attributes
@@ -146,24 +126,20 @@ class JointMap(Protocol):
 
     robot: Robot
     start: np.ndarray
+    path: Path | None = None
+    r: int = 0
+    redundant_joints: tuple[str, ...] = ()
+    branch_label: str = ""
 
-    @property
-    def path(self) -> Path | None: ...  # noqa: D102
-    @property
-    def r(self) -> int: ...  # noqa: D102
-    @property
-    def redundant_joints(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def branch_label(self) -> str: ...  # noqa: D102
-
+    @abstractmethod
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of the curves, (c,), in a posture, (n,), at path coordinate s; NaN stays NaN."""
-        ...
 
+    @abstractmethod
     def postures(self, y: np.ndarray) -> np.ndarray:
         """Joint positions, (K, n), at successive times with curves (K, c); NaN where there is no answer."""
-        ...
 
+    @abstractmethod
     def state(
         self,
         y: np.ndarray,
@@ -189,20 +165,19 @@ class JointMap(Protocol):
         UnreachableError
             There is no answer at one of the times.
         """
-        ...
 
+    @abstractmethod
     def derivatives(self, state: Any) -> JointDerivatives:
         """Exact derivatives of a state that this map gave."""
-        ...
 
     def start_margins(self) -> np.ndarray:
         """Margins, (b,), of the start to where the map ends to be computable; b = 0 where it never does."""
-        ...
+        return np.empty(0)
 
     def margins(self, state: Any) -> np.ndarray:
         """Margins, (K, b), of a state that this map gave; see `start_margins`."""
-        ...
+        return np.empty((len(state.q), 0))
 
     def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
         """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""
-        ...
+        return np.empty((len(state.q), 0, self.robot.n)), None

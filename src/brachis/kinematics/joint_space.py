@@ -5,7 +5,7 @@ With q_ds, q_dds and q_ddds the path's derivatives by s,
     G = q_ds,    qdot = q_ds sdot,    qddot = q_ds sddot + q_dds sdot^2
     dqdot/ds = q_dds sdot,    dqddot/dsdot = 2 q_dds sdot,    dqddot/ds = q_dds sddot + q_ddds sdot^2
 
-Joint motion without a path: every joint is chosen freely, y = q.
+`DirectJointMap` is the motion without a path: every joint is chosen freely, y = q.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kinematics.joint_map import JointDerivatives, JointState
+from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 
@@ -31,7 +31,7 @@ class JointSpaceState(JointState):
         return self.y[:, 0]
 
 
-class JointSpaceMap:
+class JointSpaceMap(JointMap):
     """A path of all joints as a `JointMap`.
 
     Parameters
@@ -41,20 +41,19 @@ class JointSpaceMap:
         Its target are the joint positions.
     """
 
-    redundant_joints: tuple[str, ...] = ()
-    branch_label = ""
-    r = 0
+    path: Path
 
     def __init__(self, robot: Robot, path: Path) -> None:
-        self.robot, self.path = robot, path
+        self.robot = robot
+        self.path = path
         self.start = path.sample(np.zeros(1)).target[0]
 
     def coordinates(self, s: float, _q: np.ndarray) -> np.ndarray:
-        """See `JointMap`."""
+        """Return s as the only curve."""
         return np.array([s])
 
     def postures(self, y: np.ndarray) -> np.ndarray:
-        """See `JointMap`."""
+        """Return the path's target."""
         return self.path.sample(y[:, 0]).target
 
     def state(
@@ -67,43 +66,24 @@ class JointSpaceMap:
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
     ) -> JointSpaceState:
-        """See `JointMap`."""
+        """Return the motion along the path; neither `t` nor `near` matters."""
         path = self.path.sample(y[:, 0])
-        qdot, qddot = path.xi * ydot, path.xi * yddot + path.xi_ds * ydot**2
-        return JointSpaceState(
-            self,
-            y,
-            ydot,
-            yddot,
-            ydddot,
-            path.target,
-            qdot,
-            qddot,
-            path.xi[:, :, None],
-            path,
-        )
+        qdot = path.xi * ydot
+        qddot = path.xi * yddot + path.xi_ds * ydot**2
+        gradient = path.xi[:, :, None]
+        curves = (y, ydot, yddot, ydddot)
+        return JointSpaceState(self, *curves, path.target, qdot, qddot, gradient, path)
 
     def derivatives(self, state: JointSpaceState) -> JointDerivatives:
-        """See `JointMap`."""
-        path, sdot = state.path, state.ydot
-        qddot_y = path.xi_dds * sdot**2 + path.xi_ds * state.yddot
-        parts = (path.xi_ds * sdot, qddot_y, 2.0 * path.xi_ds * sdot)
+        """Return the exact derivatives; see the module's formulas."""
+        path = state.path
+        qdot_y = path.xi_ds * state.ydot
+        qddot_y = path.xi_dds * state.ydot**2 + path.xi_ds * state.yddot
+        parts = (qdot_y, qddot_y, 2.0 * qdot_y)
         return JointDerivatives(*(part[:, :, None] for part in parts))
 
-    def start_margins(self) -> np.ndarray:
-        """See `JointMap`."""
-        return np.empty(0)
 
-    def margins(self, state: JointSpaceState) -> np.ndarray:
-        """See `JointMap`."""
-        return np.empty((len(state.q), 0))
-
-    def margin_gradient(self, state: JointSpaceState) -> tuple[np.ndarray, None]:
-        """See `JointMap`."""
-        return np.empty((len(state.q), 0, self.robot.n)), None
-
-
-class DirectJointMap:
+class DirectJointMap(JointMap):
     """The identity as a `JointMap`, for free moves.
 
     Parameters
@@ -113,29 +93,18 @@ class DirectJointMap:
         Posture at, or near, the beginning.
     """
 
-    path = None
-    branch_label = ""
-
     def __init__(self, robot: Robot, start: np.ndarray) -> None:
         self.robot = robot
         self.start = start
-
-    @property
-    def r(self) -> int:
-        """See `JointMap`."""
-        return self.robot.n
-
-    @property
-    def redundant_joints(self) -> tuple[str, ...]:
-        """See `JointMap`."""
-        return self.robot.joint_names
+        self.r = robot.n
+        self.redundant_joints = robot.joint_names
 
     def coordinates(self, _s: float, q: np.ndarray) -> np.ndarray:
-        """See `JointMap`."""
+        """Return the posture."""
         return q
 
     def postures(self, y: np.ndarray) -> np.ndarray:
-        """See `JointMap`."""
+        """Return the curves."""
         return y
 
     def state(
@@ -148,23 +117,11 @@ class DirectJointMap:
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
     ) -> JointState:
-        """See `JointMap`."""
+        """Return the curves as the motion; neither `t` nor `near` matters."""
         gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))
         return JointState(self, y, ydot, yddot, ydddot, y, ydot, yddot, gradient)
 
     def derivatives(self, state: JointState) -> JointDerivatives:
-        """See `JointMap`."""
+        """Return zeros: all derivatives but G vanish."""
         zeros = np.zeros_like(state.gradient)
         return JointDerivatives(zeros, zeros, zeros)
-
-    def start_margins(self) -> np.ndarray:
-        """See `JointMap`."""
-        return np.empty(0)
-
-    def margins(self, state: JointState) -> np.ndarray:
-        """See `JointMap`."""
-        return np.empty((len(state.q), 0))
-
-    def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:
-        """See `JointMap`."""
-        return np.empty((len(state.q), 0, self.r)), None
