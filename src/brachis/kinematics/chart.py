@@ -145,6 +145,8 @@ class ChartMap(PathMap):
         s: np.ndarray,
         reference: np.ndarray,
     ) -> None:
+        from scipy.interpolate import make_interp_spline
+
         robot = task_map.robot
         self.robot = robot
         self.task_map = task_map
@@ -156,10 +158,12 @@ class ChartMap(PathMap):
         self.reference = reference
         self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
-        null_motion = self._inverse_at(s, reference)[:, :, task_map.m :]
-        self._table = np.concatenate(
-            [reference, rows.values(s, reference), null_motion.reshape(len(s), -1)],
-            axis=1,
+        augmented = self._augmented_at(s, reference)
+        inverse = np.linalg.pinv(augmented, rcond=_SINGULAR)  # not regular throughout
+        self_motion = inverse[:, :, task_map.m :].reshape(len(s), -1)
+        sigma = rows.values(s, reference)
+        self._lines = make_interp_spline(
+            s, np.concatenate([reference, sigma, self_motion], axis=1), k=1
         )
         even = np.linspace(0.0, 1.0, 33)
         augmented = self._augmented_at(even, self._between(even)[0])
@@ -174,24 +178,12 @@ class ChartMap(PathMap):
             [self._newton.task_coordinates(q)[1], self.rows.at(s)[0]], axis=1
         )
 
-    def _inverse_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """J_aug^-1, (K, n, n); a pseudo-inverse, as some are singular where a reference is not regular throughout."""
-        return np.asarray(np.linalg.pinv(self._augmented_at(s, q), rcond=_SINGULAR))
-
     def _between(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Postures (K, n), sigma (K, r) and dq/dsigma (K, n, r) of the reference, by straight lines in between."""
-        right = np.clip(np.searchsorted(self.s, s, side="right"), 1, len(self.s) - 1)
-        part = ((s - self.s[right - 1]) / (self.s[right] - self.s[right - 1])).clip(
-            0.0, 1.0
-        )[:, None]
         n = self.robot.n
-        r = self.r
-        table = (1.0 - part) * self._table[right - 1] + part * self._table[right]
-        return (
-            table[:, :n],
-            table[:, n : n + r],
-            table[:, n + r :].reshape(len(s), n, r),
-        )
+        table = self._lines(s.clip(self.s[0], self.s[-1]))
+        q, sigma, self_motion = np.split(table, [n, n + self.r], axis=1)
+        return q, sigma, self_motion.reshape(len(s), n, self.r)
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN where that is NaN."""
@@ -215,8 +207,8 @@ class ChartMap(PathMap):
         wanted = y[:, 1:] + offset
         if near is not None:
             return self._newton.solve(targets, near, rows, wanted)
-        reference, sigma, null_motion = self._between(s)
-        aside = apply_each(null_motion, y[:, 1:] - sigma)
+        reference, sigma, self_motion = self._between(s)
+        aside = apply_each(self_motion, y[:, 1:] - sigma)
         # Within 0.8 rad or m the reference's own self-motion says where a posture is.
         near_enough = np.abs(aside).max(axis=1, initial=0.0) < 0.8
         guess = np.where(near_enough[:, None], reference + aside, reference)
