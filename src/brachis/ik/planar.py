@@ -82,10 +82,18 @@ class PlanarSolver(DeterminantSolver):
         letters = ["R" if revolute[i] else "P" for i in rest]
         if self._tool_axis is not None:
             del letters[len(letters) - 1 - letters[::-1].index("R")]
+        # All heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
+        self._offset = (
+            self._rows @ self._normal * (self._normal @ geometry.tool_position)
+        )
         if len(rest) > 1:
-            # From two rows and the height above the plane to a position.
-            self._lift = np.linalg.inv(np.vstack([self._rows, self._normal]))
-        super().__init__(geometry, rest, _LABELS["".join(letters)])
+            self._lift = basis.T @ np.linalg.inv(self._rows @ basis.T)
+        flat = replace(
+            geometry,
+            points=self._centres @ basis,
+            tool_position=self._tool @ basis,
+        )
+        super().__init__(flat, rest, _LABELS["".join(letters)])
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
         """Compute det J_nr from plane vectors (2, K), from the tool inwards; angles are about the normal.
@@ -132,18 +140,15 @@ class PlanarSolver(DeterminantSolver):
             )
             for i in self._joints
         ]
-        tool = screws.tool_position
+        tool = screws.tool_position[:, None]
+        rows = targets[:, : len(self._rows)] - self._offset
         with np.errstate(invalid="ignore", divide="ignore"):
             if len(joints) == 1:
-                orbit = joints[0].orbit(tool[:, None])
                 row = self._rows[0][:, None, None]
-                values = [orbit.component(row, targets[:, 0], 0)]
+                values = [joints[0].orbit(tool).component(row, rows[:, 0], 0)]
             else:
-                goal = self._lift[:, :2] @ targets[:, :2].T
-                goal += self._lift[:, 2:] * (self._normal @ tool)
-                values = self._solve_two_or_three(
-                    joints, tool[:, None], goal[:, None], targets, screws
-                )
+                goal = (self._lift @ rows.T)[:, None]
+                values = self._solve_two_or_three(joints, tool, goal, targets, screws)
             return self._arrange(np.broadcast_arrays(*values), q_r)
 
     def _solve_two_or_three(

@@ -73,8 +73,8 @@ def cosine_roots(
         In [-2 pi, 2 pi]; the left side's derivative ``b cos - a sin`` is positive at the first one, negative at the
         second. NaN where there is none.
     """
-    with np.errstate(invalid="ignore"):
-        half = np.arctan2(np.sqrt(a * a + b * b - c * c), c)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        half = np.arccos(c / np.sqrt(a * a + b * b))
     middle = np.arctan2(b, a)
     return middle - half, middle + half
 
