@@ -53,18 +53,17 @@ def tool_motion(
     speed : (K,) ndarray
         m/s.
     """
-    model, data, frame = robot.model, robot.model.createData(), robot.frame_id
+    frame = robot.frame_id
     position, quaternion, speed = (
         np.empty((len(q), 3)),
         np.empty((len(q), 4)),
         np.empty(len(q)),
     )
-    for k in range(len(q)):
-        pin.forwardKinematics(model, data, q[k], qdot[k])
-        placement = pin.updateFramePlacement(model, data, frame)
+    for k, data in enumerate(robot.place_joints(q, qdot)):
+        placement = data.oMf[frame]
         position[k] = placement.translation
         quaternion[k] = np.roll(pin.Quaternion(placement.rotation).coeffs(), 1)
-        speed[k] = np.linalg.norm(pin.getFrameVelocity(model, data, frame).linear)
+        speed[k] = np.linalg.norm(pin.getFrameVelocity(robot.model, data, frame).linear)
     turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0
     quaternion[1:] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]
     return position, quaternion, speed

@@ -46,19 +46,18 @@ class Skeleton:
 def skeleton(robot: Robot, q: np.ndarray) -> Skeleton:
     """Stick figures of the postures `q`, (K, n)."""
     model = robot.model
-    data = robot.model.createData()
+    tool = robot.frame_id
     base = int(model.getFrameId(robot.base_frame))
     n = robot.n
     bones = np.empty((len(q), 2 * n + 2, 3))
-    for points, posture in zip(bones, q, strict=True):
-        pin.framesForwardKinematics(model, data, posture)
-        points[0] = data.oMf[base].translation
+    for points, data in zip(bones, robot.place_joints(q), strict=True):
+        points[0] = model.frames[base].placement.translation
         for joint in range(1, n + 1):
             points[2 * joint - 1] = (
                 data.oMi[model.parents[joint]] * model.jointPlacements[joint]
             ).translation
             points[2 * joint] = data.oMi[joint].translation
-        points[-1] = data.oMf[robot.frame_id].translation
+        points[-1] = data.oMf[tool].translation
     return Skeleton(bones, bones[:, 2:-1:2], bones[:, -1])
 
 

@@ -241,16 +241,12 @@ class Placements:
 
 def placements(robot: Robot, q: np.ndarray) -> Placements:
     """Forward kinematics of postures `q`, (K, n)."""
-    model = robot.model
-    data = robot.model.createData()
-    frame = robot.frame_id
     found = Placements(
         np.empty((len(q), robot.n + 2, 3)), np.empty((len(q), robot.n + 2, 4))
     )
-    for k, posture in enumerate(q):
-        pin.forwardKinematics(model, data, posture)
-        tool = pin.updateFramePlacement(model, data, frame)
-        for row, placement in enumerate((*data.oMi, tool)):
+    tool = robot.frame_id
+    for k, data in enumerate(robot.place_joints(q)):
+        for row, placement in enumerate((*data.oMi, data.oMf[tool])):
             found.positions[k, row] = placement.translation
             found.quaternions[k, row] = np.roll(
                 pin.Quaternion(placement.rotation).coeffs(), 1
