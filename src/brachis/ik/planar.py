@@ -27,7 +27,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from brachis.ik.determinant_branches import DeterminantSolver
+from brachis.ik.branches import DeterminantSolver
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw

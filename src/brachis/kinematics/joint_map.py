@@ -12,7 +12,7 @@ d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
 of which only the last is new; it is taken by differences along the motion.
 
 Along a path of the tool y = (s, q_r), and the closed form gives the other joints (`closed_form`), or y = (s, sigma)
-(`chart`); along a path of all joints y = (s), and without a path y = q (`joint_space`). Everything that lays down,
+(`chart`); along a path of all joints y = (s), and without a path y = q. Everything that lays down,
 solves and refines a program takes any of them.
 """
 
@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from brachis.common.arrays import rates
-from brachis.path import Path
+from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
 
@@ -64,7 +64,9 @@ class JointState(SharedTorques):
     @property
     def s(self) -> np.ndarray:
         """Path coordinate, (K,); NaN where there is no path."""
-        return np.full(len(self.y), np.nan)
+        if self.joint_map.path is None:
+            return np.full(len(self.y), np.nan)
+        return self.y[:, 0]
 
     @cached_property
     def derivatives(self) -> JointDerivatives:
@@ -181,3 +183,107 @@ class JointMap(ABC):
     def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
         """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""
         return np.empty((len(state.q), 0, self.robot.n)), None
+
+
+@dataclass(frozen=True)
+class JointSpaceState(JointState):
+    """Joint motion at K times, and the path there."""
+
+    path: PathSample
+
+
+class JointSpaceMap(JointMap):
+    """A path of all joints, q = q(s), as a `JointMap`: only s(t) is chosen, y = (s).
+
+    With q_ds, q_dds and q_ddds the path's derivatives by s,
+
+        G = q_ds,    qdot = q_ds sdot,    qddot = q_ds sddot + q_dds sdot^2
+        dqdot/ds = q_dds sdot,    dqddot/dsdot = 2 q_dds sdot,    dqddot/ds = q_dds sddot + q_ddds sdot^2
+
+    Parameters
+    ----------
+    robot : Robot
+    path : Path
+        Its target are the joint positions.
+    """
+
+    path: Path
+
+    def __init__(self, robot: Robot, path: Path) -> None:
+        self.robot = robot
+        self.path = path
+        self.start = path.sample(np.zeros(1)).target[0]
+
+    def coordinates(self, s: float, _q: np.ndarray) -> np.ndarray:
+        """Return s as the only curve."""
+        return np.array([s])
+
+    def postures(self, y: np.ndarray) -> np.ndarray:
+        """Return the path's target."""
+        return self.path.sample(y[:, 0]).target
+
+    def state(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        ydddot: np.ndarray,
+        **_turns: object,
+    ) -> JointSpaceState:
+        """Return the motion along the path; in which turns joints are, it says itself."""
+        path = self.path.sample(y[:, 0])
+        qdot = path.xi * ydot
+        qddot = path.xi * yddot + path.xi_ds * ydot**2
+        gradient = path.xi[:, :, None]
+        curves = (y, ydot, yddot, ydddot)
+        return JointSpaceState(self, *curves, path.target, qdot, qddot, gradient, path)
+
+    def derivatives(self, state: JointSpaceState) -> JointDerivatives:
+        """Return the exact derivatives; see the formulas above."""
+        path = state.path
+        qdot_y = path.xi_ds * state.ydot
+        qddot_y = path.xi_dds * state.ydot**2 + path.xi_ds * state.yddot
+        parts = (qdot_y, qddot_y, 2.0 * qdot_y)
+        return JointDerivatives(*(part[:, :, None] for part in parts))
+
+
+class DirectJointMap(JointMap):
+    """The identity as a `JointMap`, for free moves.
+
+    Parameters
+    ----------
+    robot : Robot
+    start : (n,) ndarray
+        Posture at, or near, the beginning.
+    """
+
+    def __init__(self, robot: Robot, start: np.ndarray) -> None:
+        self.robot = robot
+        self.start = start
+        self.r = robot.n
+        self.redundant_joints = robot.joint_names
+
+    def coordinates(self, _s: float, q: np.ndarray) -> np.ndarray:
+        """Return the posture."""
+        return q
+
+    def postures(self, y: np.ndarray) -> np.ndarray:
+        """Return the curves."""
+        return y
+
+    def state(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        ydddot: np.ndarray,
+        **_turns: object,
+    ) -> JointState:
+        """Return the curves as the motion; in which turns joints are, they say themselves."""
+        gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))
+        return JointState(self, y, ydot, yddot, ydddot, y, ydot, yddot, gradient)
+
+    def derivatives(self, state: JointState) -> JointDerivatives:
+        """Return zeros: all derivatives but G vanish."""
+        zeros = np.zeros_like(state.gradient)
+        return JointDerivatives(zeros, zeros, zeros)

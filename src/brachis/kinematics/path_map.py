@@ -80,11 +80,6 @@ class PathState(JointState):
     inverse: np.ndarray
     bend: Bend | None
 
-    @property
-    def s(self) -> np.ndarray:
-        """Path coordinate, (K,)."""
-        return self.y[:, 0]
-
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
         """Least singular values (K,) of J_aug, and their right singular vectors (K, n)."""
