@@ -304,7 +304,7 @@ def test_it_is_found_by_geometry():
     robot = rail_arm()
     match = find(robot, task_map_of(robot, "pose"), ["j1"], families=[spherical_wrist])
     assert match.family == "spherical_wrist"
-    assert "placing" in spherical_wrist.source
+    assert "point_recipes" in spherical_wrist.source
     with pytest.raises(
         DecompositionError, match="j1 slides at an angle to the axis of j2"
     ) as caught:

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from brachis.common.arrays import cross
-from brachis.ik.determinant_branches import DeterminantSolver, largest_size
+from brachis.ik.branches import DeterminantSolver, largest_size
 from brachis.ik.newton import Newton
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Poses
@@ -112,17 +112,11 @@ class EaikSolver(DeterminantSolver):
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Return the answers that reach their targets, (K, 2, 8, 6); angles in (-pi, pi]."""
-        joints = np.full((len(q_r), 2, _PER_SIGN, len(self._joints)), np.nan)
         finite = np.flatnonzero(
             np.isfinite(targets).all(axis=1) & np.isfinite(q_r).all(axis=1)
         )
-        if len(finite):
-            joints[finite] = self._solve_finite(targets[finite], q_r[finite])
-        return joints
-
-    def _solve_finite(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        inner = q_r[:, self._inner]
-        wanted = self._targets_between(targets, q_r)
+        inner = q_r[finite, self._inner]
+        wanted = self._targets_between(targets[finite], q_r[finite])
         joints, samples, slack = self._ask(wanted, inner)
         wanted = wanted[samples]
         q = np.zeros((len(joints), self._chain.n))
@@ -136,7 +130,7 @@ class EaikSolver(DeterminantSolver):
         q[moved] = polished[converged]
         miss[moved], determinants[moved] = self._judge(q[moved], wanted[moved])
         right = np.flatnonzero((miss < 1e-9) & (determinants != 0.0))
-        groups = 2 * samples[right] + (determinants[right] < 0.0)
+        groups = 2 * finite[samples[right]] + (determinants[right] < 0.0)
         return _arrange(wrap(q[right][:, self._joints]), groups, len(q_r))
 
     def _targets_between(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
@@ -162,7 +156,7 @@ class EaikSolver(DeterminantSolver):
         """By how much postures miss their targets, m or an element of a rotation, and det J_nr; both (N,)."""
         screws = self._chain.screws_at(q)
         miss = np.abs(wanted - Poses.of_tool(screws).targets()).max(axis=1)
-        return miss, self._determinants(screws)
+        return miss, screws.determinant(self._joints)
 
     def _ask(
         self, targets: np.ndarray, values: np.ndarray
@@ -195,7 +189,7 @@ class EaikSolver(DeterminantSolver):
             for (robot, _), pose in zip(robots, poses, strict=True)
         ]
         samples = np.repeat(np.arange(len(found)), [len(joints) for joints in found])
-        joints = np.concatenate(found)
+        joints = np.concatenate([np.empty((0, 6)), *found])
         slack = np.array([slack for _, slack in robots])[samples]
         finite = np.isfinite(joints).all(axis=1)
         return joints[finite], samples[finite], slack[finite]
@@ -203,8 +197,9 @@ class EaikSolver(DeterminantSolver):
     def _robots_at(self, values: np.ndarray) -> list[tuple[Any, float]]:
         """Robots with the slack of their answers at held values, (K, h)."""
         keys = [tuple(row) for row in values.tolist()]
-        kept = self._robots if len(self._robots) <= _KEPT else {}
-        new = [key for key in dict.fromkeys(keys) if key not in kept]
+        if len(self._robots) > _KEPT:
+            self._robots = {}
+        new = [key for key in dict.fromkeys(keys) if key not in self._robots]
         robots = self._make_robots(np.array(new), EXACT_AXES) if new else []
         for key, exact in zip(new, robots, strict=True):
             robot = exact
@@ -216,9 +211,8 @@ class EaikSolver(DeterminantSolver):
                 slack = (
                     1e-4  # roots of quartic polynomials now and then have few digits
                 )
-            kept[key] = (robot, slack)
-        self._robots = kept
-        return [kept[key] for key in keys]
+            self._robots[key] = (robot, slack)
+        return [self._robots[key] for key in keys]
 
     def _make_robots(self, values: np.ndarray, tolerance: float) -> list[Any]:
         """Make EAIK's robots at held values (U, h); None where it has no decomposition."""

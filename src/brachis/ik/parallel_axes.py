@@ -46,7 +46,7 @@ import numpy as np
 
 from brachis.common.arrays import cross
 from brachis.ik.arm import Arm, RemainingJoints
-from brachis.ik.factored_solver import Factor, FactoredSolver, fit
+from brachis.ik.branches import Factor, FactoredSolver, fit
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Circle, Poses, Screw
@@ -99,12 +99,16 @@ class ParallelAxesSolver(FactoredSolver):
                 "nor a slide and a revolute joint before and one after, in this or the reverse order"
             )
         joints, self._first = choices[0]
-        before = range(self._first)
-        self._turn = next((i for i in before if joints.revolute[i]), None)
-        self._slide = next((i for i in before if not joints.revolute[i]), None)
+        before = joints.revolute[: self._first].tolist()
+        self._turn = before.index(True) if True in before else None
+        self._slide = before.index(False) if False in before else None
         self._parallel = (self._first, self._first + 1, self._first + 2)
-        # The joint that spans the wrist's factor with the last one: e, or a where there is none.
-        self._beside = self._turn if self._first == 2 and self._turn is not None else 4
+        # x spans the wrist's factor with f, the last joint: it is e, or a where there is no e.
+        if self._first == 1:
+            self.letters = "abcdxf" if self._slide is None else "pbcdxf"
+        else:
+            self.letters = "xpbcdf" if self._slide else "pxbcdf"
+        self._beside = self.letters.index("x")
         self._elbow = 0 if self._slide is not None else 1
         super().__init__(geometry, redundant, joints, self._factors_of_steps())
 
@@ -127,15 +131,6 @@ class ParallelAxesSolver(FactoredSolver):
         way = "{p} never moves the arm along the parallel axes"
         rail = Factor(self._rail_factor, way, ("left", "right"), (self._slide,))
         return elbow, wrist, rail
-
-    def _names(self) -> dict[str, str]:
-        places = {"a": self._turn, "p": self._slide, "f": 5, "x": self._beside}
-        places |= zip("bcd", self._parallel, strict=True)
-        return {
-            letter: self._joints.names[place]
-            for letter, place in places.items()
-            if place is not None
-        }
 
     def _arm(self, screws: tuple[Screw, ...], _tool: np.ndarray | None = None) -> Arm:
         """Put in P, as the centre."""

@@ -22,11 +22,12 @@ z(q_r, 0) + D(q_r) t, where the columns of D are their directions. Redundant joi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from brachis.ik.determinant_branches import DeterminantSolver
+from brachis.ik.branches import DeterminantSolver
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
@@ -54,7 +55,7 @@ class PlanarSolver(DeterminantSolver):
     geometry : ChainGeometry
     task_map : TaskMap
     redundant : tuple of int
-    normal : (3,) ndarray
+    basis : (2, 3) ndarray
         Of the plane.
     """
 
@@ -63,111 +64,145 @@ class PlanarSolver(DeterminantSolver):
         geometry: ChainGeometry,
         task_map: TaskMap,
         redundant: tuple[int, ...],
-        normal: np.ndarray,
+        basis: np.ndarray,
     ) -> None:
         rest = complement(geometry.n, redundant)
-        self._redundant = redundant
-        self._normal = normal
+        revolute = geometry.revolute
+        self._redundant = list(redundant)
+        self._plane = basis
+        self._normal = np.cross(*basis)
         self._rows = np.eye(3)[list(task_map.axes)]
-        self._plane = _basis(normal, self._rows) if len(rest) > 1 else self._rows
+        self._senses = np.where(revolute, np.sign(geometry.axes @ self._normal), 1.0)
+        self._centres = geometry.points @ basis.T
+        self._slides = geometry.axes @ basis.T
+        self._tool = basis @ geometry.tool_position
         self._tool_axis = (
             task_map.tool_axis if isinstance(task_map, RowsAndYaw) else None
         )
-        self._senses = np.where(
-            geometry.revolute, np.sign(geometry.axes @ normal), 1.0
-        )[rest]
-        letters = ["R" if geometry.revolute[i] else "P" for i in rest]
+        letters = ["R" if revolute[i] else "P" for i in rest]
         if self._tool_axis is not None:
-            self._last = len(letters) - 1 - letters[::-1].index("R")
-            del letters[self._last]
-        super().__init__(geometry, rest, _LABELS["".join(letters)])
+            del letters[len(letters) - 1 - letters[::-1].index("R")]
+        # All heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
+        self._offset = (
+            self._rows @ self._normal * (self._normal @ geometry.tool_position)
+        )
+        if len(rest) > 1:
+            self._lift = basis.T @ np.linalg.inv(self._rows @ basis.T)
+        flat = replace(
+            geometry,
+            points=self._centres @ basis,
+            tool_position=self._tool @ basis,
+        )
+        super().__init__(flat, rest, _LABELS["".join(letters)])
 
-    def _determinants(self, screws: PosedScrews) -> np.ndarray:
-        columns = screws.jacobian_columns(self._joints)
-        rows = np.tensordot(self._plane, columns[:3], 1)
-        if self._tool_axis is not None:
-            turns = np.tensordot(self._normal, columns[3:], 1)
-            rows = np.concatenate([rows, turns[None]])
-        return determinants(rows) * self._senses.prod()
+    def _determinants(self, q: np.ndarray) -> np.ndarray:
+        """Compute det J_nr from plane vectors (2, K), from the tool inwards; angles are about the normal.
+
+        The first vector is the tool as the joints so far have moved it, the others are velocities that they give it.
+        """
+        vectors = np.empty((2, 1, len(q)), q.dtype)
+        vectors[:] = self._tool[:, None, None]
+        for i in range(self._chain.n - 1, -1, -1):
+            own = self._slides[i][:, None]
+            if self._chain.revolute[i]:
+                centre = self._centres[i][:, None]
+                vectors[:, 0] -= centre
+                sin = self._senses[i] * np.sin(q[:, i])
+                vectors = vectors * np.cos(q[:, i]) + _turn(vectors) * sin
+                own = _turn(vectors[:, 0])
+                vectors[:, 0] += centre
+            else:
+                vectors[:, 0] += own * q[:, i]
+            if i in self._joints:
+                moved = np.empty((2, vectors.shape[1] + 1, len(q)), q.dtype)
+                moved[:, 0] = vectors[:, 0]
+                moved[:, 1] = own
+                moved[:, 2:] = vectors[:, 1:]
+                vectors = moved
+        rows = vectors[:, 1:]
+        if len(self._joints) == 1:
+            rows = np.tensordot(self._rows @ self._plane.T, rows, 1)
+        elif self._tool_axis is not None:
+            turns = self._chain.revolute[self._joints].astype(q.dtype)
+            rows = np.concatenate(
+                [rows, np.broadcast_to(turns[:, None], rows[:1].shape)]
+            )
+        return determinants(rows)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Return the non-redundant joints, (K, 2, 1, m)."""
         screws = self._chain.screws_with(self._redundant, q_r)
         joints = [
             Screw(
-                screws.axes[:, i, None] * sense,
+                screws.axes[:, i, None] * self._senses[i],
                 screws.points[:, i, None],
                 bool(screws.revolute[i]),
             )
-            for i, sense in zip(self._joints, self._senses, strict=True)
+            for i in self._joints
         ]
         tool = screws.tool_position[:, None]
+        rows = targets[:, : len(self._rows)] - self._offset
         with np.errstate(invalid="ignore", divide="ignore"):
             if len(joints) == 1:
-                orbit = joints[0].orbit(tool)
                 row = self._rows[0][:, None, None]
-                values = [orbit.component(row, targets[:, 0], 0)]
-            elif self._tool_axis is None:
-                a, b = joints
-                goal = self._goal(targets, tool)
-                values = [*move_within_plane(a, b, tool, goal, 0)]
+                values = [joints[0].orbit(tool).component(row, rows[:, 0], 0)]
             else:
-                values = self._values_with_yaw(joints, tool, targets, screws)
-            answers = np.stack(np.broadcast_arrays(*values), axis=-1)
-            return self._arrange(answers * self._senses, q_r)
+                goal = (self._lift @ rows.T)[:, None]
+                values = self._solve_two_or_three(joints, tool, goal, targets, screws)
+            return self._arrange(np.broadcast_arrays(*values), q_r)
 
-    def _goal(self, targets: np.ndarray, tool: np.ndarray) -> np.ndarray:
-        """Position of the tool that the rows ask for, (3, 1, K), at its height above the plane."""
-        height = np.tensordot(self._normal, tool[:, 0], 1)
-        given = np.concatenate([targets[:, :2].T, height[None]])
-        return np.linalg.solve(np.vstack([self._rows, self._normal]), given)[:, None]
-
-    def _values_with_yaw(
+    def _solve_two_or_three(
         self,
         joints: list[Screw],
         tool: np.ndarray,
+        goal: np.ndarray,
         targets: np.ndarray,
         screws: PosedScrews,
     ) -> list[np.ndarray]:
-        """Positions of three joints for a point and an angle."""
-        normal = self._normal[:, None, None]
-        heading = np.tensordot(self._plane, screws.tool_rotation[:, self._tool_axis], 1)
+        """Positions of joints that bring the tool to its goal, both (3, 1, K), with yaw where it is prescribed."""
+        if self._tool_axis is None:
+            return [*move_within_plane(joints[0], joints[1], tool, goal, 0)]
+        heading = self._plane @ screws.tool_rotation[:, self._tool_axis]
         angle = targets[:, 2] - np.arctan2(heading[1], heading[0])
-        goal = self._goal(targets, tool)
-        a, b, c = joints
+        normal = self._normal[:, None, None]
+        first, second, last = joints
         anchor = next(i for i in (2, 0, 1) if joints[i].revolute)
-        point = joints[anchor].point
+        start = joints[anchor].point
+        end = goal + rotate(normal, angle, start - tool)
         if anchor == 0:
-            end = tool + rotate(normal, -angle, point - goal)
-            pair = move_within_plane(c.inverse, b.inverse, point, end, 0)[::-1]
-        else:
-            end = goal + rotate(normal, angle, point - tool)
-            second = b
-            if anchor == 1:
-                second = replace(c, axis=rotate(normal, angle, c.axis))
-            pair = move_within_plane(a, second, point, end, 0)
-        values = list(pair)
-        for joint, value in zip(
-            joints[:anchor] + joints[anchor + 1 :], pair, strict=True
-        ):
+            first = last.inverse
+            second = second.inverse
+            end = tool + rotate(normal, -angle, start - goal)
+        elif anchor == 1:
+            second = replace(last, axis=rotate(normal, angle, last.axis))
+        pair = move_within_plane(first, second, start, end, 0)
+        values = list(pair if anchor else pair[::-1])
+        others = [joint for joint in joints if joint is not joints[anchor]]
+        for joint, value in zip(others, values, strict=True):
             if joint.revolute:
                 angle = angle - value
         values.insert(anchor, angle)
         return values
 
-    def _arrange(self, answers: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Arrange answers (R, K, m): two follow each other as the branches do, one has the sign of its determinant."""
+    def _arrange(self, values: Sequence[np.ndarray], q_r: np.ndarray) -> np.ndarray:
+        """Arrange answers, m of (R, K): two follow each other as the branches do, one has its determinant's sign."""
+        answers = np.stack(values, axis=2) * self._senses[self._joints]
         revolute = self._chain.revolute[self._joints]
         answers[..., revolute] = wrap(answers[..., revolute])
-        answers += 0.0 * answers.sum(axis=-1, keepdims=True)
+        answers[~np.isfinite(answers).all(axis=2)] = np.nan
         if len(answers) == 1:
             q = np.empty((len(q_r), self._chain.n))
             q[:, self._redundant] = q_r
             q[:, self._joints] = answers[0]
-            sign = np.sign(self._determinants(self._chain.screws_at(q)))
+            sign = np.sign(self._determinants(q))
             exists = sign == np.array([[1.0], [-1.0]])
             answers = np.where(exists[:, :, None], answers, np.nan)
         return np.swapaxes(answers, 0, 1)[:, :, None]
+
+
+def _turn(vectors: np.ndarray) -> np.ndarray:
+    """Turn plane vectors (2, ...) by a right angle."""
+    return np.stack([-vectors[1], vectors[0]])
 
 
 def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
@@ -228,7 +263,7 @@ def planar(
             raise NotApplicableError("yaw turns in another plane than the joints")
         if not geometry.revolute[complement(geometry.n, redundant)].any():
             raise NotApplicableError("no revolute joint is left to set yaw")
-    return PlanarSolver(geometry, task_map, redundant, normal)
+    return PlanarSolver(geometry, task_map, redundant, basis)
 
 
 class PrismaticSolver(DeterminantSolver):
@@ -247,13 +282,13 @@ class PrismaticSolver(DeterminantSolver):
         """Return the matrices D, (m, m, K)."""
         return screws.axes[self._rows][:, self._joints]
 
-    def _determinants(self, screws: PosedScrews) -> np.ndarray:
-        return determinants(self._directions(screws))
+    def _determinants(self, q: np.ndarray) -> np.ndarray:
+        return determinants(self._directions(self._chain.screws_at(q)))
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Return the non-redundant joints, (K, B, 1, m)."""
         screws = self._chain.screws_with(self._redundant, q_r)
-        values = self._determinants(screws)
+        values = determinants(self._directions(screws))
         regular = np.abs(values) > 1e-12 * self._scale
         matrices = np.moveaxis(self._directions(screws), 2, 0)
         matrices = np.where(regular[:, None, None], matrices, np.eye(len(self._rows)))

@@ -37,7 +37,7 @@ import numpy as np
 
 from brachis.common.arrays import cross
 from brachis.ik.arm import Anchor, Arm, RemainingJoints
-from brachis.ik.factored_solver import Factor
+from brachis.ik.branches import Factor
 from brachis.ik.protocol import NotApplicableError
 from brachis.ik.screws import Screw
 from brachis.ik.vectors import across, angle_about, dot
@@ -318,22 +318,40 @@ RECIPES = (
 """The first one that fits is taken."""
 
 
-def choose_recipe(joints: RemainingJoints) -> tuple[Recipe, Anchor | None] | None:
-    """Return the recipe by which the first three joints place a point, and where two of their axes meet if it matters.
+def choose_recipe(
+    point: str, *orders: RemainingJoints
+) -> tuple[RemainingJoints, Recipe, Anchor | None]:
+    """Find the recipe by which the first three joints of some order place a point.
 
-    None where no recipe fits.
+    Parameters
+    ----------
+    point : str
+        What it is called in messages.
+    *orders : RemainingJoints
+        The same joints, or in the reverse order; the first one that a recipe fits is taken.
+
+    Returns
+    -------
+    joints : RemainingJoints
+        This order.
+    recipe : Recipe
+    meeting : Anchor or None
+        Where two of their axes meet, if it matters.
+
+    Raises
+    ------
+    NotApplicableError
+        No recipe fits; says how the three lie to each other in the first order.
     """
-    for recipe in RECIPES:
-        if recipe.fits(joints):
-            return recipe, joints.meeting(*recipe.meets) if recipe.meets else None
-    return None
-
-
-def refuse_recipes(joints: RemainingJoints, point: str) -> NotApplicableError:
-    """Return the reason against joints that no recipe fits: how the first three lie to each other."""
+    for joints in orders:
+        for recipe in RECIPES:
+            if recipe.fits(joints):
+                meeting = joints.meeting(*recipe.meets) if recipe.meets else None
+                return joints, recipe, meeting
+    joints = orders[0]
     relations = f"{_relation(joints, 0, 1)}, and {_relation(joints, 1, 2)}"
     names = ", ".join(joints.names[:3])
-    return NotApplicableError(f"no closed form moves {point} by {names}: {relations}")
+    raise NotApplicableError(f"no closed form moves {point} by {names}: {relations}")
 
 
 def _relation(joints: RemainingJoints, i: int, j: int) -> str:

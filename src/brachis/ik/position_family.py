@@ -19,16 +19,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.ik.arm import Arm, RemainingJoints
-from brachis.ik.determinant_branches import SINGULAR
-from brachis.ik.factored_solver import FactoredSolver, fit
-from brachis.ik.point_recipes import choose_recipe, refuse_recipes
+from brachis.ik.branches import SINGULAR, FactoredSolver, fit
+from brachis.ik.point_recipes import choose_recipe
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Screw
 from brachis.ik.vectors import EXACT
 from brachis.robot import TaskMap
 from brachis.robot.task_map import Pose
-
-_POINT = "the tool"
 
 
 class PositioningSolver(FactoredSolver):
@@ -49,6 +46,9 @@ class PositioningSolver(FactoredSolver):
         No recipe fits.
     """
 
+    letters = "abc"
+    point = "the tool"
+
     def __init__(
         self,
         geometry: ChainGeometry,
@@ -56,19 +56,11 @@ class PositioningSolver(FactoredSolver):
         three: RemainingJoints,
         rows: Sequence[int],
     ) -> None:
-        joints = three
-        choice = choose_recipe(joints)
-        if choice is None:
-            joints = three.reverse()
-            choice = choose_recipe(joints)
-        if choice is None:
-            raise refuse_recipes(three, _POINT)
-        self.recipe, self._meeting = choice
+        joints, self.recipe, self._meeting = choose_recipe(
+            self.point, three, three.reverse()
+        )
         self._order = np.argsort(rows)
         super().__init__(geometry, redundant, joints, self.recipe.factors)
-
-    def _names(self) -> dict[str, str]:
-        return {**dict(zip("abc", self._joints.names, strict=True)), "point": _POINT}
 
     def _arm(self, screws: tuple[Screw, ...], tool: np.ndarray) -> Arm:
         return Arm(screws, tool, self._meeting.at(screws) if self._meeting else tool)

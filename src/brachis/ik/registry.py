@@ -283,8 +283,6 @@ def check_answers(
     task_map: TaskMap,
     redundant: tuple[int, ...],
     solver: IKSolver,
-    *,
-    postures: int = 100,
 ) -> None:
     """Put a solver's answers for random postures into Pinocchio's forward kinematics.
 
@@ -296,8 +294,6 @@ def check_answers(
     redundant : tuple of int
         Indices of the redundant joints.
     solver : IKSolver
-    postures : int, optional
-        How many.
 
     Raises
     ------
@@ -306,7 +302,7 @@ def check_answers(
         the posture itself.
     """
     low, high = _ranges_to_check(robot)
-    q = np.random.default_rng(1).uniform(low, high, (postures, robot.n))
+    q = np.random.default_rng(1).uniform(low, high, (100, robot.n))
     if len(set(solver.branches)) < len(solver.branches):
         raise NotApplicableError(
             f"its branches share labels: {', '.join(solver.branches)}"

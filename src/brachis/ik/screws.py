@@ -91,18 +91,15 @@ class Circle:
         The two follow each other along the axis `slot`; NaN where there is none.
         """
         level = level - dot(direction, self.middle)
-        return np.concatenate(
-            cosine_roots(dot(direction, self.arm), dot(direction, self.across), level),
-            axis=slot,
+        return cosine_roots(
+            dot(direction, self.arm), dot(direction, self.across), level, slot
         )
 
     def distance(self, other: np.ndarray, squared: np.ndarray, slot: int) -> np.ndarray:
         """Angles at a distance from another position: approaching it at the first, leaving it at the second."""
         away = other - self.middle
         level = 0.5 * (dot(away, away) + dot(self.arm, self.arm) - squared)
-        return np.concatenate(
-            cosine_roots(dot(away, self.arm), dot(away, self.across), level), axis=slot
-        )
+        return cosine_roots(dot(away, self.arm), dot(away, self.across), level, slot)
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ import numpy as np
 
 from brachis.common.arrays import cross
 from brachis.ik.arm import Arm, RemainingJoints
-from brachis.ik.factored_solver import Factor, FactoredSolver, fit
-from brachis.ik.point_recipes import choose_recipe, refuse_recipes
+from brachis.ik.branches import Factor, FactoredSolver, fit
+from brachis.ik.point_recipes import choose_recipe
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Circle, Screw
 from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
@@ -70,6 +70,8 @@ class SphericalWristSolver(FactoredSolver):
         The last three axes do not meet, or no recipe fits.
     """
 
+    letters = "abcuvw"
+
     def __init__(
         self, geometry: ChainGeometry, redundant: tuple[int, ...], six: RemainingJoints
     ) -> None:
@@ -83,16 +85,9 @@ class SphericalWristSolver(FactoredSolver):
                 else f"the axes of {names} do not meet in a point (they miss it by {six.miss(3, 4, 5):.2g} m)"
             )
         self._centre = centre
-        self._point = f"the point where the axes of {names} meet"
-        choice = choose_recipe(six)
-        if choice is None:
-            raise refuse_recipes(six, self._point)
-        self.recipe, self._meeting = choice
+        self.point = f"the point where the axes of {names} meet"
+        _, self.recipe, self._meeting = choose_recipe(self.point, six)
         super().__init__(geometry, redundant, six, (*self.recipe.factors, _WRIST))
-
-    def _names(self) -> dict[str, str]:
-        letters = dict(zip("abcuvw", self._joints.names, strict=True))
-        return {**letters, "point": self._point}
 
     def _arm(self, screws: tuple[Screw, ...], _tool: np.ndarray | None = None) -> Arm:
         centre = self._centre.at(screws)

@@ -62,21 +62,16 @@ def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndar
     return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
 
 
-def cosine_roots(
-    a: np.ndarray, b: np.ndarray, c: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Angles at which ``a cos + b sin = c``.
+def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.ndarray:
+    """Angles in [-2 pi, 2 pi] at which ``a cos + b sin = c``.
 
-    Returns
-    -------
-    rising, falling : (...) ndarray
-        In [-2 pi, 2 pi]; the left side's derivative ``b cos - a sin`` is positive at the first one, negative at the
-        second. NaN where there is none.
+    The two follow each other along the axis `slot`: the left side's derivative ``b cos - a sin`` is positive at the
+    first one, negative at the second. NaN where there is none.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         half = np.arccos(c / np.sqrt(a * a + b * b))
     middle = np.arctan2(b, a)
-    return middle - half, middle + half
+    return np.concatenate([middle - half, middle + half], axis=slot)
 
 
 def meeting_point(

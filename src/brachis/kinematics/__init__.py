@@ -1,12 +1,23 @@
 """Joint maps: joint motion and its derivatives from curves y, such as (s, q_r)."""
 
 from brachis.ik.newton import Newton, null_spaces, solve_each
-from brachis.kinematics.chart import CHART, ChartMap, ChartRows
-from brachis.kinematics.charting import chart_around, moving_most, transversality
+from brachis.kinematics.chart import (
+    CHART,
+    ChartMap,
+    ChartRows,
+    chart_around,
+    moving_most,
+    transversality,
+)
 from brachis.kinematics.closed_form import ClosedFormMap
 from brachis.kinematics.interpolation import Nodes, interpolate
-from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
-from brachis.kinematics.joint_space import DirectJointMap, JointSpaceMap
+from brachis.kinematics.joint_map import (
+    DirectJointMap,
+    JointDerivatives,
+    JointMap,
+    JointSpaceMap,
+    JointState,
+)
 
 __all__ = [
     "CHART",

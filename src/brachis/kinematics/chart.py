@@ -1,47 +1,44 @@
 """Joint motion along a path as a function of y = (s, sigma), in a chart around a known joint path.
 
-The self-motion of the arm is measured by r linear functions of the joints,
+The rows C of sigma = C(s) q - p(s) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is
+regular there, and as far around it as its least singular value stays away from zero. Where one C does for the whole
+path, it is constant and p = 0. Postures follow by Newton's method. The formulas of the motion stand in `path_map`.
 
-    sigma = C(s) q - p(s),
-
-whose rows C (r, n) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is regular there,
-and as far around it as its least singular value stays away from zero. Where one C does for the whole path, it is
-constant and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed
-form in place of Newton's method (`closed_form`). With xi = dz/ds and derivatives by s alone, e = C' q - p' and
-e' = C'' q - p'':
-
-    G = dq/dy       = J_aug^-1 [xi, 0; -e, I]
-    qdot            = G ydot
-    qddot           = G yddot + J_aug^-1 (xi_ds sdot^2 - Jdot qdot;  -2 C' qdot sdot - e' sdot^2)
-
-and, by differentiating J_aug qdot and J_aug qddot,
-
-    dqdot/dy        = J_aug^-1 (-V_q G + [xi_ds sdot, 0];  -C' G sdot - [C' qdot + e' sdot, 0])
-    dqddot/dydot    = J_aug^-1 (-A_v G + [2 xi_ds sdot, 0];  -2 C' G sdot - [2 C' qdot + 2 e' sdot, 0])
-    dqddot/dy       = J_aug^-1 (-A_q G - A_v dqdot/dy + [xi_dds sdot^2 + xi_ds sddot, 0];
-                                -2 C' sdot dqdot/dy - (C'' sdot^2 + C' sddot) G
-                                - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0])
-
-with V_q, A_q, A_v the derivatives of task velocity and acceleration (`TaskMap`).
-
-The linear functions of the joints that measure self-motion in a chart: sigma = C(s) q - p(s).
+The self-motion at a posture is the null space of the task Jacobian, with an orthonormal basis N (n, r). Rows C are
+transversal where C N is regular; with orthonormal rows the least singular value of C N is 1 where they span the null
+space itself and 0 where they miss a part of it. The best constant rows are the leading eigenvectors of the mean of
+N N^T. Where these are not transversal enough, rows follow the null space, continued from place to place by the rotation
+that brings its basis nearest to the one before (orthogonal Procrustes problem; P. H. Schoenemann, Psychometrika 31,
+1966).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.ik.newton import Newton
-from brachis.kinematics.joint_map import JointDerivatives, PathState
+from brachis.ik.newton import Newton, null_spaces
+from brachis.kinematics.joint_map import apply_each
+from brachis.kinematics.path_map import Bend, PathMap, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 
-ORDERS = 4
-"""Value and three derivatives by s."""
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+CHART = "chart"
+"""Label in the place of a branch's."""
 DEGREE = 5
+"""Of the splines through rows that follow the null space."""
+_SINGULAR = 1e-9
+"""A reference with a smaller least singular value is singular all along; its chart has no margin anywhere."""
+_ENOUGH = 0.35
+"""Least transversality of rows along the reference."""
+_PLACES = (9, 17, 33, 65, 129)
+"""Numbers of places through which rows that follow the null space are led, as few as are enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,67 +100,36 @@ class ChartRows:
         )
         return tuple(int(joint) for joint in np.argmax(rows, axis=1)) if unit else ()
 
-    def _orders(self, s: np.ndarray, orders: int) -> np.ndarray:
-        """[C, p] and its derivatives, (orders, K, r, n + 1)."""
-        if self.knots is None:
-            values = np.zeros((orders, len(s), *self.coefficients.shape[1:]))
-            values[0] = self.coefficients[0]
-            return values
+    def _spline(self) -> BSpline:
         from scipy.interpolate import BSpline
 
-        spline = BSpline(self.knots, self.coefficients, DEGREE)
-        return np.array([spline(s, nu=order) for order in range(orders)])
+        return BSpline(np.asarray(self.knots), self.coefficients, DEGREE)
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """C, (K, r, n), and p, (K, r), at path coordinates (K,)."""
-        (values,) = self._orders(s, 1)
+        if self.knots is None:
+            shape = (len(s), *self.coefficients.shape[1:])
+            values = np.broadcast_to(self.coefficients, shape)
+        else:
+            values = self._spline()(s)
         return values[:, :, :-1], values[:, :, -1]
 
     def values(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Sigma, (K, r), in postures (K, n) at path coordinates (K,)."""
         rows, offset = self.at(s)
-        return np.einsum("kij,kj->ki", rows, q) - offset
+        return apply_each(rows, q) - offset
 
-    def orders(self, s: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """C and three derivatives by s, (4, K, r, n), and the derivatives of C q - p by s alone, (3, K, r)."""
-        values = self._orders(s, ORDERS)
+    def bend(self, s: np.ndarray, q: np.ndarray) -> Bend | None:
+        """How rows change along the path, in postures (K, n) at path coordinates (K,); None where they do not."""
+        if self.knots is None:
+            return None
+        spline = self._spline()
+        values = np.array([spline(s, nu=order) for order in (1, 2, 3)])
         rows = values[..., :-1]
-        return rows, np.einsum("okij,kj->oki", rows[1:], q) - values[1:, ..., -1]
+        return Bend(rows, np.einsum("okij,kj->oki", rows, q) - values[..., -1])
 
 
-CHART = "chart"
-"""Label in the place of a branch's."""
-_NEAR = 0.8
-"""rad or m; how far from the reference its own self-motion tells where a posture is."""
-_PLACES = 33
-"""Places along the reference at which its typical least singular value is taken."""
-_SINGULAR = 1e-9
-"""A reference with a smaller least singular value is singular all along; its chart has no margin anywhere."""
-
-
-@dataclass(frozen=True)
-class ChartState(PathState):
-    """Motion of all joints along a path at K times; `inverse` is J_aug^-1, (K, n, n).
-
-    Attributes
-    ----------
-    rows : (4, K, r, n) ndarray
-        C and its derivatives by s.
-    drift : (3, K, r) ndarray
-        e, e' and e''.
-    least : (K,) ndarray
-        Least singular value of J_aug.
-    singular : (K, n) ndarray
-        Its right singular vector.
-    """
-
-    rows: np.ndarray
-    drift: np.ndarray
-    least: np.ndarray
-    singular: np.ndarray
-
-
-class ChartMap:
+class ChartMap(PathMap):
     """Robot, path and chart put together: the `JointMap` with y = (s, sigma).
 
     Parameters
@@ -179,6 +145,9 @@ class ChartMap:
         Postures q_ref there, so near each other that straight lines join them.
     """
 
+    branch_label = CHART
+    no_posture = "the chart has no posture there"
+
     def __init__(
         self,
         task_map: TaskMap,
@@ -187,17 +156,27 @@ class ChartMap:
         s: np.ndarray,
         reference: np.ndarray,
     ) -> None:
-        self.robot = task_map.robot
-        self.task_map, self.path, self.rows = task_map, path, rows
-        self.s, self.reference = s, reference
+        from scipy.interpolate import make_interp_spline
+
+        robot = task_map.robot
+        self.robot = robot
+        self.task_map = task_map
+        self.path = path
+        self.rows = rows
+        self.r = rows.r
+        self.redundant_joints = tuple(robot.joint_names[i] for i in rows.selected)
+        self.s = s
+        self.reference = reference
         self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
-        null_motion = self._inverse_at(s, reference)[:, :, task_map.m :]
-        self._table = np.concatenate(
-            [reference, rows.values(s, reference), null_motion.reshape(len(s), -1)],
-            axis=1,
+        augmented = self._augmented_at(s, reference)
+        inverse = np.linalg.pinv(augmented, rcond=_SINGULAR)  # not regular throughout
+        self_motion = inverse[:, :, task_map.m :].reshape(len(s), -1)
+        sigma = rows.values(s, reference)
+        self._lines = make_interp_spline(
+            s, np.concatenate([reference, sigma, self_motion], axis=1), k=1
         )
-        even = np.linspace(0.0, 1.0, _PLACES)
+        even = np.linspace(0.0, 1.0, 33)
         augmented = self._augmented_at(even, self._between(even)[0])
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
         self._typical = max(float(np.median(least)), _SINGULAR)
@@ -210,38 +189,12 @@ class ChartMap:
             [self._newton.task_coordinates(q)[1], self.rows.at(s)[0]], axis=1
         )
 
-    def _inverse_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """J_aug^-1, (K, n, n); a pseudo-inverse, as some are singular where a reference is not regular throughout."""
-        return np.asarray(np.linalg.pinv(self._augmented_at(s, q), rcond=_SINGULAR))
-
     def _between(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Postures (K, n), sigma (K, r) and dq/dsigma (K, n, r) of the reference, by straight lines in between."""
-        right = np.clip(np.searchsorted(self.s, s, side="right"), 1, len(self.s) - 1)
-        part = ((s - self.s[right - 1]) / (self.s[right] - self.s[right - 1])).clip(
-            0.0, 1.0
-        )[:, None]
-        n, r = self.robot.n, self.r
-        table = (1.0 - part) * self._table[right - 1] + part * self._table[right]
-        return (
-            table[:, :n],
-            table[:, n : n + r],
-            table[:, n + r :].reshape(len(s), n, r),
-        )
-
-    @property
-    def r(self) -> int:
-        """Degree of redundancy."""
-        return self.rows.r
-
-    @property
-    def redundant_joints(self) -> tuple[str, ...]:
-        """Names of the joints that sigma selects; none where it is another measure of self-motion."""
-        return tuple(self.robot.joint_names[joint] for joint in self.rows.selected)
-
-    @property
-    def branch_label(self) -> str:
-        """What the margin is called."""
-        return CHART
+        n = self.robot.n
+        table = self._lines(s.clip(self.s[0], self.s[-1]))
+        q, sigma, self_motion = np.split(table, [n, n + self.r], axis=1)
+        return q, sigma, self_motion.reshape(len(s), n, self.r)
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN where that is NaN."""
@@ -258,162 +211,146 @@ class ChartMap:
         *,
         near: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Joint positions, (K, n), where the curves are y, (K, 1 + r), at any times.
-
-        Parameters
-        ----------
-        y : (K, 1 + r) ndarray
-        sample : PathSample, optional
-            The path at ``y[:, 0]`` if already known.
-        near : (K, n) ndarray, optional
-            Postures known to be near; without them the search begins at the reference.
-
-        Returns
-        -------
-        (K, n) ndarray
-            NaN where there is no answer near the reference.
-        """
+        """Joint positions, (K, n), at any times; without `near` the search begins at the reference."""
         s = y[:, 0]
         targets = (sample or self.path.sample(s)).target
         rows, offset = self.rows.at(s)
         wanted = y[:, 1:] + offset
         if near is not None:
             return self._newton.solve(targets, near, rows, wanted)
-        reference, sigma, null_motion = self._between(s)
-        aside = np.einsum("kij,kj->ki", null_motion, y[:, 1:] - sigma)
-        near_enough = np.abs(aside).max(axis=1, initial=0.0) < _NEAR
-        return self._newton.solve(
-            targets,
-            np.where(near_enough[:, None], reference + aside, reference),
-            rows,
-            wanted,
-        )
+        reference, sigma, self_motion = self._between(s)
+        aside = apply_each(self_motion, y[:, 1:] - sigma)
+        # Within 0.8 rad or m the reference's own self-motion says where a posture is.
+        near_enough = np.abs(aside).max(axis=1, initial=0.0) < 0.8
+        guess = np.where(near_enough[:, None], reference + aside, reference)
+        return self._newton.solve(targets, guess, rows, wanted)
 
-    def state(
-        self,
-        y: np.ndarray,
-        ydot: np.ndarray,
-        yddot: np.ndarray,
-        ydddot: np.ndarray,
-        *,
-        t: np.ndarray | None = None,
-        near: np.ndarray | None = None,
-    ) -> ChartState:
-        """See `JointMap`."""
-        sample = self.path.sample(y[:, 0])
-        q = self.postures(y, sample, near=near)
-        if not np.isfinite(q).all():
-            raise UnreachableError("the chart has no posture there")
-        twists = self.task_map.twists(q)
-        rows, drift = self.rows.orders(y[:, 0], q)
-        augmented = np.concatenate([self.task_map.jacobian(twists), rows[0]], axis=1)
+    def bend(self, s: np.ndarray, q: np.ndarray) -> Bend | None:
+        """Return how the rows change along the path."""
+        return self.rows.bend(s, q)
+
+    def invert(self, s: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        """Invert J_aug."""
+        augmented = np.concatenate([jacobian, self.rows.at(s)[0]], axis=1)
         if (np.sign(np.linalg.det(augmented)) != self._side).any():
             raise UnreachableError(
-                "the motion leaves the sheet of postures that the chart is laid on"
+                "the motion leaves the chart: det J_aug changes its sign"
             )
         try:
-            inverse = np.linalg.inv(augmented)
+            return np.asarray(np.linalg.inv(augmented))
         except np.linalg.LinAlgError as error:
             raise UnreachableError("the chart is singular") from error
-        m, sdot = self.task_map.m, ydot[:, :1]
-        right = np.zeros((len(q), self.robot.n, 1 + self.r))
-        right[:, :m, 0], right[:, m:, 0] = sample.xi, -drift[0]
-        right[:, m:, 1:] = np.eye(self.r)
-        gradient = inverse @ right
-        qdot = np.einsum("kij,kj->ki", gradient, ydot)
-        bent = -2.0 * sdot * np.einsum("kij,kj->ki", rows[1], qdot) - drift[1] * sdot**2
-        given = np.concatenate(
-            [sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1
-        )
-        qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum(
-            "kij,kj->ki", inverse, given
-        )
-        least = _least_singular(inverse)
-        return ChartState(
-            self,
-            y,
-            ydot,
-            yddot,
-            ydddot,
-            q,
-            qdot,
-            qddot,
-            gradient,
-            sample,
-            twists,
-            inverse,
-            rows,
-            drift,
-            *least,
-        )
-
-    def derivatives(self, state: ChartState) -> JointDerivatives:
-        """Exact derivatives of a state; see the module's formulas."""
-        task = self.task_map.derivatives(state.twists, state.qdot, state.qddot)
-        sdot, sddot, gradient, sample = (
-            state.ydot[:, :1],
-            state.yddot[:, :1],
-            state.gradient,
-            state.path,
-        )
-        _, first, second, _ = state.rows
-        _, e_ds, e_dds = state.drift
-        along = sdot[:, :, None]
-
-        by_s = np.einsum("kij,kj->ki", first, state.qdot)
-        rows = -first @ gradient * along
-        rows[:, :, 0] -= by_s + e_ds * sdot
-        qdot_y = self._solved(
-            state, -task.velocity_q @ gradient, rows, sample.xi_ds * sdot
-        )
-
-        rows = -2.0 * first @ gradient * along
-        rows[:, :, 0] -= 2.0 * (by_s + e_ds * sdot)
-        qddot_ydot = self._solved(
-            state, -task.acceleration_qdot @ gradient, rows, 2.0 * sample.xi_ds * sdot
-        )
-
-        rows = (
-            -2.0 * first @ qdot_y * along
-            - (second * along**2 + first * sddot[:, :, None]) @ gradient
-        )
-        rows[:, :, 0] -= (
-            np.einsum("kij,kj->ki", first, state.qddot) + e_dds * sdot**2 + e_ds * sddot
-        )
-        rows[:, :, 0] -= 2.0 * sdot * np.einsum("kij,kj->ki", second, state.qdot)
-        right = -task.acceleration_q @ gradient - task.acceleration_qdot @ qdot_y
-        qddot_y = self._solved(
-            state, right, rows, sample.xi_dds * sdot**2 + sample.xi_ds * sddot
-        )
-        return JointDerivatives(qdot_y, qddot_y, qddot_ydot)
-
-    def _solved(
-        self, state: ChartState, task: np.ndarray, rows: np.ndarray, by_s: np.ndarray
-    ) -> np.ndarray:
-        """J_aug^-1 (task + [by_s, 0]; rows), with parts (K, m, c), (K, r, c) and (K, m)."""
-        task[:, :, 0] += by_s
-        return state.inverse @ np.concatenate([task, rows], axis=1)
 
     def start_margins(self) -> np.ndarray:
-        """See `JointMap`."""
+        """Margin of the reference at its beginning."""
         return np.array([self._start_margin])
 
-    def margins(self, state: ChartState) -> np.ndarray:
-        """See `JointMap`: the least singular value of J_aug, (K, 1), as a part of its median along the reference."""
-        return state.least[:, None] / self._typical
+    def margins(self, state: PathState) -> np.ndarray:
+        """Least singular value of J_aug, (K, 1), as a part of its median along the reference."""
+        return state.least_singular[0][:, None] / self._typical
 
-    def margin_gradient(self, state: ChartState) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointMap`: for singular vectors u and v of the least singular value it changes by u^T dJ_aug v."""
-        v = state.singular
-        u = state.least[:, None] * np.einsum("kji,kj->ki", state.inverse, v)
+    def margin_gradient(self, state: PathState) -> tuple[np.ndarray, np.ndarray]:
+        """Differentiate by singular vectors u and v of the least singular value: it changes by u^T dJ_aug v."""
+        least, v = state.least_singular
+        u = least[:, None] * np.einsum("kji,kj->ki", state.inverse, v)
         m = self.task_map.m
         moved = self.task_map.velocity_slopes(state.twists, v)
-        by_s = np.einsum("ki,kij,kj->k", u[:, m:], state.rows[1], v)
         by_q = np.einsum("ki,kij->kj", u[:, :m], moved)
+        by_s = np.zeros(len(v))
+        if state.bend:
+            by_s = np.einsum("ki,kij,kj->k", u[:, m:], state.bend.rows[0], v)
         return by_q[:, None] / self._typical, by_s[:, None] / self._typical
 
 
-def _least_singular(inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least singular values (K,) of matrices, and their right singular vectors (K, n), from the inverses (K, n, n)."""
-    values, vectors = np.linalg.eigh(inverse @ np.swapaxes(inverse, 1, 2))
-    return 1.0 / np.sqrt(values[:, -1]), vectors[:, :, -1]
+def chart_around(
+    task_map: TaskMap,
+    path: Path,
+    s: np.ndarray,
+    reference: np.ndarray,
+    rows: ChartRows | None = None,
+) -> ChartMap:
+    """Lay a chart around a joint path.
+
+    Parameters
+    ----------
+    task_map : TaskMap
+    path : Path
+    s : (S,) ndarray
+        Path coordinates from 0 to 1; where they do not grow, the first one counts, and at 1 the last one.
+    reference : (S, n) ndarray
+        Postures there.
+    rows : ChartRows, optional
+        Chosen here if not given.
+
+    Returns
+    -------
+    ChartMap
+
+    Raises
+    ------
+    UnreachableError
+        The null space turns faster than rows can follow, as it does beside singularities of the arm.
+    """
+    kept = _growing(s)
+    s = s[kept]
+    reference = reference[kept]
+    if rows is not None:
+        return ChartMap(task_map, path, rows, s, reference)
+    null = null_spaces(Newton(task_map).task_coordinates(reference)[1])
+    r = null.shape[2]
+    constant = np.linalg.eigh(np.einsum("kir,kjr->ij", null, null))[1][:, ::-1][:, :r].T
+    if transversality(constant[None], null).min(initial=np.inf) >= _ENOUGH:
+        return ChartMap(task_map, path, ChartRows.constant(constant), s, reference)
+    following = np.swapaxes(_continue_bases(null), 1, 2)
+    for count in _PLACES:
+        places = np.unique(
+            np.linspace(0, len(s) - 1, min(count, len(s))).round().astype(int)
+        )
+        if len(places) <= DEGREE:
+            continue
+        chosen = ChartRows.along(s[places], following[places], reference[places])
+        if transversality(chosen.at(s)[0], null).min() >= _ENOUGH:
+            return ChartMap(task_map, path, chosen, s, reference)
+    raise UnreachableError(
+        "the task Jacobian is nearly singular along the reference: no chart fits around it"
+    )
+
+
+def _growing(s: np.ndarray) -> np.ndarray:
+    """Return where path coordinates (S,) have grown since the one before, and the first and the last place."""
+    furthest = np.maximum.accumulate(s)
+    apart = 1e-7
+    grown = np.append(True, np.diff(furthest) > apart) & (s < s[-1] - apart)
+    grown[0] = grown[-1] = True
+    return np.flatnonzero(grown)
+
+
+def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
+    """Least singular value of C N, (K,), of rows (K, r, n) and bases (K, n, r); infinite without redundancy."""
+    if not null.shape[2]:
+        return np.full(len(null), np.inf)
+    return np.asarray(np.linalg.svd(rows @ null, compute_uv=False)[:, -1])
+
+
+def moving_most(null: np.ndarray) -> np.ndarray:
+    """For null spaces, (K, n, r), the r joints, (K, r), ascending, whose rows span most, by pivoting."""
+    left = null.copy()
+    chosen = []
+    for _ in range(null.shape[2]):
+        joint = np.argmax(np.linalg.norm(left, axis=2), axis=1)
+        chosen.append(joint)
+        row = left[np.arange(len(left)), joint]
+        unit = row / np.maximum(np.linalg.norm(row, axis=1, keepdims=True), 1e-300)
+        left = left - np.einsum("knr,kr->kn", left, unit)[:, :, None] * unit[:, None]
+    return np.sort(
+        np.array(chosen, dtype=int).reshape(null.shape[2], len(null)).T, axis=1
+    )
+
+
+def _continue_bases(null: np.ndarray) -> np.ndarray:
+    """Turn each basis, (S, n, r), within its null space to be nearest to the one before."""
+    turned = null.copy()
+    for k in range(1, len(null)):
+        left, _, right = np.linalg.svd(null[k].T @ turned[k - 1])
+        turned[k] = null[k] @ left @ right
+    return turned

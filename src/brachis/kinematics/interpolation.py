@@ -19,19 +19,8 @@ from brachis.kinematics.joint_map import JointMap, JointState
 
 Curves = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
-_PIECES = 4
-"""Pieces of the longest interval at first; shorter ones have fewer: rounding shows in the jerk of short pieces."""
 _POSITION_TOLERANCE = 1e-11
-_ACCELERATION_TOLERANCE, _JERK_TOLERANCE = 1e-6, 1e-5
-_LARGEST_ERROR = 1e-9
-_ROUNDS = 8
-_JUST_BEFORE = 1e-11
-_ROUNDING = 60.0 * np.finfo(float).eps
-"""Jerk of a piece of 1 s that comes of the rounding of positions of 1 rad."""
-_NOISE = 1e-12
-"""Of positions near a branch boundary, rad or m, at most."""
-_GAIN = 0.5
-"""Halving a piece leaves at most this part of a gap that is no noise."""
+"""Gap between pieces and closed form that is small enough, rad or m."""
 
 
 @dataclass(frozen=True)
@@ -81,42 +70,40 @@ def interpolate(
     UnreachableError
         The motion leaves the branch between the breaks.
     """
-    steps = np.ceil(_PIECES * np.diff(breaks) / np.diff(breaks).max()).astype(int)
+    # Four pieces in the longest interval; shorter ones have fewer: rounding shows in the jerk of short pieces.
+    steps = np.ceil(4 * np.diff(breaks) / np.diff(breaks).max()).astype(int)
     pieces = [
         np.linspace(a, b, n, endpoint=False)
         for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)
     ]
     times = np.append(np.concatenate(pieces), breaks[-1])
-    error, inherited = np.inf, np.full(len(times) - 1, np.inf)
-    for _ in range(_ROUNDS):
+    inherited = np.full(len(times) - 1, np.inf)
+    for _ in range(8):
         middle = 0.5 * (times[1:] + times[:-1])
         merged = np.sort(np.concatenate([times, middle]))
         state = joint_map.state(*curves(merged), t=merged)
         before = state.qddot
         if jumps:
-            shift = _JUST_BEFORE * breaks[-1] * (np.arange(len(merged)) > 0)
+            shift = 1e-11 * breaks[-1] * (np.arange(len(merged)) > 0)
             before = joint_map.state(*curves(merged - shift), near=state.q).qddot
-        excess, noise, error = _excess(times, state, before, jumps=jumps)
-        # What halving did not lessen, and what is as small as noise, is noise.
-        bad = (excess > 1.0) & ((excess > noise) | (excess < _GAIN * inherited))
+        gaps, noises = _measure_gaps(times, state, before, orders=2 if jumps else 3)
+        excess = gaps.max(axis=0)
+        noise = noises.max(axis=0)
+        # What halving did not lessen by half, and what is as small as noise, is noise.
+        bad = (excess > 1.0) & ((excess > noise) | (excess < 0.5 * inherited))
         if not bad.any():
             break
         times = np.union1d(times, middle[bad])
         inherited = np.repeat(np.where(bad, excess, 0.0), 1 + bad)
-    if error > _LARGEST_ERROR:
+    error = _POSITION_TOLERANCE * float(gaps[0].max())
+    if error > 1e-9:
         raise UnreachableError("the motion is too sharp for polynomial pieces")
     # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
-    return Nodes(
-        merged,
-        _positions(joint_map, curves, merged, state, before),
-        state.qdot,
-        state.qddot,
-        before,
-        error,
-    )
+    q = _sum_positions(joint_map, curves, merged, state, before)
+    return Nodes(merged, q, state.qdot, state.qddot, before, error)
 
 
-def _positions(
+def _sum_positions(
     joint_map: JointMap,
     curves: Curves,
     times: np.ndarray,
@@ -129,10 +116,10 @@ def _positions(
     What the sum is off at the end is shared by the pieces so that it adds the same jerk to each.
     """
     h = np.diff(times)[:, None]
-    jerk = joint_map.state(
-        *curves(np.sort(np.concatenate([times, times[:-1] + 0.5 * h[:, 0]])))
-    ).qdddot[1::2]
-    v, change = state.qdot, before[1:] - state.qddot[:-1]
+    with_middles = np.sort(np.concatenate([times, times[:-1] + 0.5 * h[:, 0]]))
+    jerk = joint_map.state(*curves(with_middles)).qdddot[1::2]
+    v = state.qdot
+    change = before[1:] - state.qddot[:-1]
     way = (
         0.5 * h * (v[:-1] + v[1:])
         - h**2 / 12.0 * change
@@ -144,62 +131,38 @@ def _positions(
     return np.where(np.abs(q - state.q).max(axis=0) <= _POSITION_TOLERANCE, q, state.q)
 
 
-def _excess(
-    times: np.ndarray, state: JointState, before: np.ndarray, *, jumps: bool
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Gaps of every piece in units of their tolerances, the largest of them, (L,); the same of noise; that of q."""
-    h = np.diff(times)
-    gap_q, gap_qddot = _middle_gaps(times, state, before)
-    tolerances = [
-        _POSITION_TOLERANCE,
-        _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max()),
-    ]
-    gaps, noises = [gap_q, gap_qddot], [np.full(len(h), _NOISE), 6.0 * _NOISE / h**2]
-    if not jumps:
-        tolerances.append(_JERK_TOLERANCE * (1.0 + np.abs(state.qdddot).max()))
-        gaps.append(_jerk_gaps(times, state))
-        noises.append(60.0 * _NOISE / h**3)
-    in_units = (
-        np.array(values) / np.array(tolerances)[:, None] for values in (gaps, noises)
-    )
-    excess, noise = (values.max(axis=0) for values in in_units)
-    return excess, noise, float(gap_q.max())
-
-
-def _middle_gaps(
-    times: np.ndarray, state: JointState, before: np.ndarray
+def _measure_gaps(
+    times: np.ndarray, state: JointState, before: np.ndarray, orders: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Largest differences of position and acceleration in the middle of every piece, (L,) each.
+    """Largest gaps of every piece in position, acceleration and jerk, and their noise, in units of tolerances.
 
     States alternate between nodes and middles. In the middle of a quintic Hermite piece of length h:
     q = (q0 + q1)/2 + 5h/32 (v0 - v1) + h^2/64 (a0 + a1),  qddot = 3 (v1 - v0) / (2h) - (a0 + a1)/4.
+    At its beginning qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
+
+    Returns
+    -------
+    gaps, noises : (orders, L) ndarray
+        Of 2 or 3 orders.
     """
     h = np.diff(times)[:, None]
-    q, v = state.q[::2], state.qdot[::2]
+    q = state.q[::2]
+    v = state.qdot[::2]
     ends = state.qddot[:-1:2] + before[2::2]
-    position = (
-        0.5 * (q[1:] + q[:-1])
-        - 5.0 * h / 32.0 * np.diff(v, axis=0)
-        + h**2 / 64.0 * ends
-    )
-    acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends
-    return np.abs(position - state.q[1::2]).max(axis=1), np.abs(
-        acceleration - state.qddot[1::2]
-    ).max(axis=1)
-
-
-def _jerk_gaps(times: np.ndarray, state: JointState) -> np.ndarray:
-    """Largest difference of jerk at the beginning of every piece, (L,), beyond what rounding makes of it.
-
-    There a quintic Hermite piece of length h has
-    qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
-    """
-    h = np.diff(times)[:, None]
-    q, v, a = state.q[::2], state.qdot[::2], state.qddot[::2]
-    jerk = (
-        60.0 * np.diff(q, axis=0) / h**3
-        - (36.0 * v[:-1] + 24.0 * v[1:]) / h**2
-        - (9.0 * a[:-1] - 3.0 * a[1:]) / h
-    )
-    rounding = _ROUNDING * (1.0 + np.abs(q).max()) / h**3
-    return np.asarray((np.abs(jerk - state.qdddot[:-1:2]) - rounding).max(axis=1))
+    position = 0.5 * (q[1:] + q[:-1]) - 5.0 * h / 32.0 * np.diff(v, axis=0)
+    position += h**2 / 64.0 * ends - state.q[1::2]
+    acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends - state.qddot[1::2]
+    gaps = [np.abs(position), np.abs(acceleration)]
+    # Positions near a branch boundary have a noise of 1e-12 rad or m at most.
+    noises = [1e-12 + 0.0 * h, 6e-12 / h**2]
+    tolerances = [_POSITION_TOLERANCE, 1e-6 * (1.0 + np.abs(state.qddot).max())]
+    if orders == 3:
+        a = state.qddot[::2]
+        jerk = 60.0 * np.diff(q, axis=0) / h**3 - (9.0 * a[:-1] - 3.0 * a[1:]) / h
+        jerk -= (36.0 * v[:-1] + 24.0 * v[1:]) / h**2 + state.qdddot[:-1:2]
+        rounding = 60.0 * np.finfo(float).eps * (1.0 + np.abs(q).max()) / h**3
+        gaps.append(np.abs(jerk) - rounding)
+        noises.append(60e-12 / h**3)
+        tolerances.append(1e-5 * (1.0 + np.abs(state.qdddot).max()))
+    scale = np.array(tolerances)[:, None]
+    return np.max(gaps, axis=2) / scale, np.array(noises)[:, :, 0] / scale

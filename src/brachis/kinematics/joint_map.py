@@ -11,16 +11,17 @@ d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
 
 of which only the last is new; it is taken by differences along the motion.
 
-Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`); along a path of all joints
-y = (s) (`joint_space`). Without a path y = q (`direct`). Everything that lays down, solves and refines a program takes
-any of them.
+Along a path of the tool y = (s, q_r), and the closed form gives the other joints (`closed_form`), or y = (s, sigma)
+(`chart`); along a path of all joints y = (s), and without a path y = q. Everything that lays down,
+solves and refines a program takes any of them.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,11 @@ from brachis.common.arrays import rates
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
+
+
+def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Apply K matrices (K, i, j) to K vectors (K, j)."""
+    return np.einsum("kij,kj->ki", matrices, vectors)
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,9 @@ class JointState(SharedTorques):
     @property
     def s(self) -> np.ndarray:
         """Path coordinate, (K,); NaN where there is no path."""
-        return np.full(len(self.y), np.nan)
+        if self.joint_map.path is None:
+            return np.full(len(self.y), np.nan)
+        return self.y[:, 0]
 
     @cached_property
     def derivatives(self) -> JointDerivatives:
@@ -69,13 +77,10 @@ class JointState(SharedTorques):
     def qdddot(self) -> np.ndarray:
         """Jerk of all joints, (K, n)."""
         exact = self.derivatives
-        pairs = (
-            (exact.qddot_y, self.ydot),
-            (exact.qddot_ydot, self.yddot),
-            (self.gradient, self.ydddot),
-        )
         return np.asarray(
-            sum(np.einsum("kij,kj->ki", slope, part) for slope, part in pairs)
+            apply_each(exact.qddot_y, self.ydot)
+            + apply_each(exact.qddot_ydot, self.yddot)
+            + apply_each(self.gradient, self.ydddot)
         )
 
     @cached_property
@@ -87,29 +92,6 @@ class JointState(SharedTorques):
             return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
 
         return rates(slopes, (self.y, self.ydot, self.yddot, self.ydddot))[0]
-
-
-@dataclass(frozen=True)
-class PathState(JointState):
-    """Motion of all joints along a path at K times.
-
-    Attributes
-    ----------
-    path : PathSample
-    twists : (6, K, n) ndarray
-        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
-    inverse : (K, a, a) ndarray
-        Of the matrix that is solved for the joints which follow: J_nr^-1 with a = m, or J_aug^-1 with a = n.
-    """
-
-    path: PathSample
-    twists: np.ndarray
-    inverse: np.ndarray
-
-    @property
-    def s(self) -> np.ndarray:
-        """Path coordinate, (K,)."""
-        return self.y[:, 0]
 
 
 @dataclass(frozen=True)
@@ -126,7 +108,7 @@ class JointDerivatives:
     qddot_ydot: np.ndarray
 
 
-class JointMap(Protocol):
+class JointMap(ABC):
     """Joint motion as a function of curves y, with c = 1 + r along a path, and c = n without one.
 
     Attributes
@@ -146,24 +128,20 @@ class JointMap(Protocol):
 
     robot: Robot
     start: np.ndarray
+    path: Path | None = None
+    r: int = 0
+    redundant_joints: tuple[str, ...] = ()
+    branch_label: str = ""
 
-    @property
-    def path(self) -> Path | None: ...  # noqa: D102
-    @property
-    def r(self) -> int: ...  # noqa: D102
-    @property
-    def redundant_joints(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def branch_label(self) -> str: ...  # noqa: D102
-
+    @abstractmethod
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of the curves, (c,), in a posture, (n,), at path coordinate s; NaN stays NaN."""
-        ...
 
+    @abstractmethod
     def postures(self, y: np.ndarray) -> np.ndarray:
         """Joint positions, (K, n), at successive times with curves (K, c); NaN where there is no answer."""
-        ...
 
+    @abstractmethod
     def state(
         self,
         y: np.ndarray,
@@ -189,20 +167,123 @@ class JointMap(Protocol):
         UnreachableError
             There is no answer at one of the times.
         """
-        ...
 
+    @abstractmethod
     def derivatives(self, state: Any) -> JointDerivatives:
         """Exact derivatives of a state that this map gave."""
-        ...
 
     def start_margins(self) -> np.ndarray:
         """Margins, (b,), of the start to where the map ends to be computable; b = 0 where it never does."""
-        ...
+        return np.empty(0)
 
     def margins(self, state: Any) -> np.ndarray:
         """Margins, (K, b), of a state that this map gave; see `start_margins`."""
-        ...
+        return np.empty((len(state.q), 0))
 
     def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
         """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""
-        ...
+        return np.empty((len(state.q), 0, self.robot.n)), None
+
+
+@dataclass(frozen=True)
+class JointSpaceState(JointState):
+    """Joint motion at K times, and the path there."""
+
+    path: PathSample
+
+
+class JointSpaceMap(JointMap):
+    """A path of all joints, q = q(s), as a `JointMap`: only s(t) is chosen, y = (s).
+
+    With q_ds, q_dds and q_ddds the path's derivatives by s,
+
+        G = q_ds,    qdot = q_ds sdot,    qddot = q_ds sddot + q_dds sdot^2
+        dqdot/ds = q_dds sdot,    dqddot/dsdot = 2 q_dds sdot,    dqddot/ds = q_dds sddot + q_ddds sdot^2
+
+    Parameters
+    ----------
+    robot : Robot
+    path : Path
+        Its target are the joint positions.
+    """
+
+    path: Path
+
+    def __init__(self, robot: Robot, path: Path) -> None:
+        self.robot = robot
+        self.path = path
+        self.start = path.sample(np.zeros(1)).target[0]
+
+    def coordinates(self, s: float, _q: np.ndarray) -> np.ndarray:
+        """Return s as the only curve."""
+        return np.array([s])
+
+    def postures(self, y: np.ndarray) -> np.ndarray:
+        """Return the path's target."""
+        return self.path.sample(y[:, 0]).target
+
+    def state(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        ydddot: np.ndarray,
+        **_turns: object,
+    ) -> JointSpaceState:
+        """Return the motion along the path; in which turns joints are, it says itself."""
+        path = self.path.sample(y[:, 0])
+        qdot = path.xi * ydot
+        qddot = path.xi * yddot + path.xi_ds * ydot**2
+        gradient = path.xi[:, :, None]
+        curves = (y, ydot, yddot, ydddot)
+        return JointSpaceState(self, *curves, path.target, qdot, qddot, gradient, path)
+
+    def derivatives(self, state: JointSpaceState) -> JointDerivatives:
+        """Return the exact derivatives; see the formulas above."""
+        path = state.path
+        qdot_y = path.xi_ds * state.ydot
+        qddot_y = path.xi_dds * state.ydot**2 + path.xi_ds * state.yddot
+        parts = (qdot_y, qddot_y, 2.0 * qdot_y)
+        return JointDerivatives(*(part[:, :, None] for part in parts))
+
+
+class DirectJointMap(JointMap):
+    """The identity as a `JointMap`, for free moves.
+
+    Parameters
+    ----------
+    robot : Robot
+    start : (n,) ndarray
+        Posture at, or near, the beginning.
+    """
+
+    def __init__(self, robot: Robot, start: np.ndarray) -> None:
+        self.robot = robot
+        self.start = start
+        self.r = robot.n
+        self.redundant_joints = robot.joint_names
+
+    def coordinates(self, _s: float, q: np.ndarray) -> np.ndarray:
+        """Return the posture."""
+        return q
+
+    def postures(self, y: np.ndarray) -> np.ndarray:
+        """Return the curves."""
+        return y
+
+    def state(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        ydddot: np.ndarray,
+        **_turns: object,
+    ) -> JointState:
+        """Return the curves as the motion; in which turns joints are, they say themselves."""
+        gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))
+        return JointState(self, y, ydot, yddot, ydddot, y, ydot, yddot, gradient)
+
+    def derivatives(self, state: JointState) -> JointDerivatives:
+        """Return zeros: all derivatives but G vanish."""
+        zeros = np.zeros_like(state.gradient)
+        return JointDerivatives(zeros, zeros, zeros)

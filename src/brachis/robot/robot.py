@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self, TypedDict, Unpack
@@ -419,21 +419,42 @@ class Robot(Summary):
             )
         return q
 
+    def place_joints(
+        self, q: np.ndarray, qdot: np.ndarray | None = None
+    ) -> Iterator[pin.Data]:
+        """Give Pinocchio's placements of all joints and of the tool frame, and velocities, posture after posture.
+
+        Parameters
+        ----------
+        q : (K, n) ndarray
+        qdot : (K, n) ndarray, optional
+
+        Yields
+        ------
+        pin.Data
+            One workspace for all: what is kept has to be copied.
+        """
+        model = self.model
+        data = model.createData()
+        tool = self.frame_id
+        q = np.asarray(q, dtype=float)
+        for motion in zip(q, *([] if qdot is None else [qdot]), strict=True):
+            pin.forwardKinematics(model, data, *motion)
+            pin.updateFramePlacement(model, data, tool)
+            yield data
+
     def tool_placement(self, q: np.ndarray) -> pin.SE3:
         """Placement of the tool frame in the world frame at one posture `q`, (n,)."""
-        data = self.model.createData()
-        pin.framesForwardKinematics(self.model, data, np.asarray(q, dtype=float))
+        (data,) = self.place_joints(np.asarray(q)[None])
         return data.oMf[self.frame_id].copy()
 
     def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame in the world frame, from postures (K, n)."""
-        data = self.model.createData()
-        frame = self.frame_id
         positions = np.empty((len(q), 3))
         rotations = np.empty((len(q), 3, 3))
-        for k, posture in enumerate(q):
-            pin.forwardKinematics(self.model, data, posture)
-            placement = pin.updateFramePlacement(self.model, data, frame)
+        tool = self.frame_id
+        for k, data in enumerate(self.place_joints(q)):
+            placement = data.oMf[tool]
             positions[k] = placement.translation
             rotations[k] = placement.rotation
         return positions, rotations

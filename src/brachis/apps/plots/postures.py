@@ -26,12 +26,10 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     They go through the base, every joint before and after its motion (one point if it is revolute) and the tool.
     """
     model = robot.model
-    data = model.createData()
     base = int(model.getFrameId(robot.base_frame))
     bones = np.empty((len(q), 2 * robot.n + 2, 3))
-    for points, posture in zip(bones, q, strict=True):
-        pin.framesForwardKinematics(model, data, posture)
-        points[0] = data.oMf[base].translation
+    for points, data in zip(bones, robot.place_joints(q), strict=True):
+        points[0] = model.frames[base].placement.translation
         for joint in range(1, robot.n + 1):
             before = data.oMi[model.parents[joint]] * model.jointPlacements[joint]
             points[2 * joint - 1] = before.translation

@@ -219,13 +219,10 @@ class Placements:
 
 def placements(robot: Robot, q: np.ndarray) -> Placements:
     """Forward kinematics of postures `q`, (K, n)."""
-    model = robot.model
-    data = model.createData()
     frames = np.empty((len(q), robot.n + 2, 7))
-    for rows, posture in zip(frames, q, strict=True):
-        pin.forwardKinematics(model, data, posture)
-        tool = pin.updateFramePlacement(model, data, robot.frame_id)
-        rows[:] = [pin.SE3ToXYZQUAT(placement) for placement in (*data.oMi, tool)]
+    for rows, data in zip(frames, robot.place_joints(q), strict=True):
+        placed = (*data.oMi, data.oMf[robot.frame_id])
+        rows[:] = [pin.SE3ToXYZQUAT(placement) for placement in placed]
     return Placements(frames[..., :3], frames[..., [6, 3, 4, 5]])
 
 

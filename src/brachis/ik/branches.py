@@ -1,9 +1,12 @@
-"""What closed forms have in common that solve for one joint after the other, so that factors of det J_nr appear.
+"""Closed forms whose branches det J_nr tells apart: by its factors, or by its sign alone.
 
-Each step brings a component or a distance of a position to a given value. The derivatives of these conditions, each
-with respect to its step's joint, are the factors of det J_nr, up to its sign: a step's two answers differ by the sign
-of its factor, and meet where it vanishes. Divided by their largest size the factors are the branch margins, so that a
-branch ends exactly where J_nr is singular.
+Two answers meet only where det J_nr vanishes, so that the branches follow from its sign; divided by its largest size it
+is the branch margin. Some families have several answers of one sign: along a motion continuity tells these apart.
+
+Where a closed form solves for one joint after the other, factors of det J_nr appear. Each step brings a component or a
+distance of a position to a given value. The derivatives of these conditions, each with respect to its step's joint, are
+the factors, up to the sign: a step's two answers differ by the sign of its factor, and meet where it vanishes. Divided
+by their largest size the factors are the branch margins, so that a branch ends exactly where J_nr is singular.
 
 A step in which all joints slide has one answer; if its factor changes sign with the redundant joints, ``left`` and
 ``right`` are two branches of which one exists at a time.
@@ -20,10 +23,67 @@ from typing import TypeVar
 import numpy as np
 
 from brachis.ik.arm import Arm, RemainingJoints
-from brachis.ik.determinant_branches import largest_size
 from brachis.ik.protocol import IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews, Poses, Screw
 from brachis.ik.vectors import EXACT, wrap
+
+SINGULAR = "J_nr is singular everywhere"
+"""The reason against a decomposition whose determinant is zero in all postures."""
+
+
+def largest_size(values: np.ndarray) -> float:
+    """Return the largest size of det J_nr at random postures.
+
+    Raises
+    ------
+    NotApplicableError
+        J_nr is singular in all of them.
+    """
+    size = float(np.abs(values).max())
+    if size < EXACT:
+        raise NotApplicableError(SINGULAR)
+    return size
+
+
+class DeterminantSolver(IKSolver):
+    """What closed forms have in common whose branches are the signs of det J_nr.
+
+    Parameters
+    ----------
+    chain : ChainGeometry
+    joints : sequence of int
+        The non-redundant ones, ascending.
+    name : str
+        What the labels begin with.
+    postures : (K, n) ndarray, optional
+        Random ones, by which the determinant is sized up.
+    """
+
+    def __init__(
+        self,
+        chain: ChainGeometry,
+        joints: Sequence[int],
+        name: str = "determinant",
+        postures: np.ndarray | None = None,
+    ) -> None:
+        self.branches: tuple[str, ...] = (f"{name}_positive", f"{name}_negative")
+        self._chain = chain
+        self._joints = list(joints)
+        if postures is None:
+            rng = np.random.default_rng(0)
+            postures = rng.uniform(-np.pi, np.pi, (64, chain.n))
+        self._random = self._determinants(postures)
+        self._scale = largest_size(self._random)
+
+    def _determinants(self, q: np.ndarray) -> np.ndarray:
+        """Det J_nr, (K,), in postures (K, n)."""
+        return self._chain.screws_at(q).determinant(self._joints)
+
+    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """Return det J_nr, (K, 1), divided by its largest size, with the sign of the branch."""
+        sign = 1.0 if branch == 0 else -1.0
+        values = self._determinants(q)
+        return sign * values[:, None] / self._scale
 
 
 @dataclass(frozen=True)
@@ -59,7 +119,17 @@ class FactoredSolver(IKSolver):
         In the order in which they are solved for.
     factors : tuple of Factor
         Of the steps.
+
+    Attributes
+    ----------
+    letters : str
+        What the joints are called in `Factor.vanishes`, in their order.
+    point : str
+        What the point that a, b, c place is called.
     """
+
+    letters: str
+    point: str = ""
 
     def __init__(
         self,
@@ -102,10 +172,6 @@ class FactoredSolver(IKSolver):
     @abstractmethod
     def _arm(self, screws: tuple[Screw, ...], tool: np.ndarray) -> Arm:
         """Put in the points that the joints' screws and the tool's position (3, ...) give."""
-
-    @abstractmethod
-    def _names(self) -> dict[str, str]:
-        """Names of the joints, by the letters in `Factor.vanishes`, and of the ``point`` that a, b, c place."""
 
     @abstractmethod
     def _steps(
@@ -171,7 +237,8 @@ class FactoredSolver(IKSolver):
         """Say which factor of det J_nr vanishes at all postures; empty if there is none."""
         for factor, size in zip(self._factors, self._scales, strict=True):
             if size < EXACT:
-                return f": {factor.vanishes.format(**self._names())}"
+                names = dict(zip(self.letters, self._joints.names, strict=True))
+                return f": {factor.vanishes.format(**names, point=self.point)}"
         return ""
 
 
