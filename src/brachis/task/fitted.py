@@ -68,7 +68,7 @@ class Wanted:
 
 
 def segments_along(
-    points: Points, wanted: Wanted, told: tuple[str, ...] = ()
+    points: Points, wanted: Wanted, notes: tuple[str, ...] = ()
 ) -> list[SplineSegment | BSplineSegment]:
     """Return the segments along points, whose first one is where they start.
 
@@ -76,7 +76,7 @@ def segments_along(
     ----------
     points : Points
     wanted : Wanted
-    told : tuple of str, optional
+    notes : tuple of str, optional
         What was found out when the points were read.
 
     Raises
@@ -104,12 +104,12 @@ def segments_along(
                 where=wanted.where,
                 hint="Give a tolerance, or leave the feed rates out",
             )
-        return [_spline_through(points, check_interpolation(points, told), wanted)]
+        return [_spline_through(points, check_interpolation(points, notes), wanted)]
     position, orientation, corner = (
         getattr(wanted.tolerance, name) for name in FitTolerance.model_fields
     )
     curves, report = fit_curves(
-        points, Tolerance(position, orientation, corner or position), told
+        points, Tolerance(position, orientation, corner or position), notes
     )
     if len(curves) > 1:
         _check_corners(report, wanted)
@@ -234,7 +234,7 @@ def _read(
     settings = segment.csv
     if task.task_space == "joints":
         return [_along_joints(segment, where, folder)]
-    points, told = _points_of(settings, task, f"{where}.csv.file", folder)
+    points, notes = _points_of(settings, task, f"{where}.csv.file", folder)
     wanted = Wanted(
         source=settings.file,
         where=where,
@@ -244,7 +244,7 @@ def _read(
         orientation=segment.orientation,
         blend=segment.blend,
     )
-    return segments_along(points, wanted, told)
+    return segments_along(points, wanted, notes)
 
 
 def _points_of(
@@ -254,14 +254,15 @@ def _points_of(
     from brachis.task.points.tables import (
         allowed_columns,
         points_of,
+        read_columns,
         read_table,
-        understood,
     )
 
     path = folder / settings.file
     text = read_text(
         path, where=where, folder=folder, found=settings.file, largest=_LARGEST_FILE
     )
+    rows = task.task_space
     if path.suffix.lower() in SUFFIXES:
         if settings.orientation is not None:
             raise TaskError(
@@ -270,17 +271,15 @@ def _points_of(
                 allowed="no csv.orientation",
                 where=where,
             )
-        points, told = read_gcode(text, task.task_space, str(path))
+        points, notes = read_gcode(text, rows, str(path))
     else:
-        rows = task.task_space
-        check = partial(understood, rows=rows, stated=settings.orientation)
+        check = partial(read_columns, rows=rows, stated=settings.orientation)
         table = read_table(text, str(path), allowed_columns(rows), check)
-        points, of_units = points_of(
-            table, rows, settings.units, str(path), settings.orientation
-        )
-        told = (*table.told, *of_units)
+        columns = check(table.header, f"{path}: line {table.header_line}")
+        points, of_units = points_of(table, columns, settings.units, str(path))
+        notes = (*table.notes, *of_units)
     _check_count(len(points), path)
-    return points, told
+    return points, notes
 
 
 def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegment:

@@ -338,7 +338,7 @@ def read_recording(
     _check_times(t, table, source)
     _check_angles(q, robot, units, source)
     told = [
-        *table.told,
+        *table.notes,
         f"units: {', '.join(dict.fromkeys(part.unit for part in (time, *parts)))}",
     ]
     ignored = [name for i, name in enumerate(table.header) if i not in columns]
