@@ -86,7 +86,6 @@ def segments_along(
     """
     # Imported here: tasks without points need neither NumPy nor SciPy.
     from brachis.task.points.curves import check_interpolation, fit_curves
-    from brachis.task.points.least_squares import Tolerance
 
     if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
         raise TaskError(
@@ -105,12 +104,7 @@ def segments_along(
                 hint="Give a tolerance, or leave the feed rates out",
             )
         return [_spline_through(points, check_interpolation(points, notes), wanted)]
-    position, orientation, corner = (
-        getattr(wanted.tolerance, name) for name in FitTolerance.model_fields
-    )
-    curves, report = fit_curves(
-        points, Tolerance(position, orientation, corner or position), notes
-    )
+    curves, report = fit_curves(points, wanted.tolerance, notes)
     if len(curves) > 1:
         _check_corners(report, wanted)
     report = report.model_copy(update={"source": wanted.source})

@@ -110,6 +110,11 @@ class FitTolerance(Model):
         description="Largest distance of a point from the path where a corner is rounded. Null: `position`.",
     )
 
+    @property
+    def at_corners(self) -> float:
+        """The largest distance where a corner is rounded, m."""
+        return self.corner or self.position
+
 
 class PointFile(Model):
     """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""

@@ -14,9 +14,9 @@ import numpy as np
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import write_count
-from brachis.task.points.least_squares import lengths_along
+from brachis.task.points.checks import Scatter
+from brachis.task.points.fit import lengths_along
 from brachis.task.points.points import QUATERNION, Array, Indices, Points
-from brachis.task.points.scatter import Scatter
 
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
@@ -215,7 +215,7 @@ _LONG = 5.0
 
 def fill_gaps(points: Points) -> tuple[Points, tuple[str, ...]]:
     """Put points on the straight ways that are five times longer than usual, and say how many ways there are."""
-    chords = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
+    chords = points.steps
     usual = float(np.median(chords))
     long = chords > _LONG * usual
     if len(points) < 20 or not np.any(long):

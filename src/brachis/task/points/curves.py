@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import TaskError
-from brachis.task.point_data import FitReport, FoundCorner
+from brachis.task.point_data import FitReport, FitTolerance, FoundCorner
 from brachis.task.points.checks import (
+    Scatter,
     of_size,
     refuse_repetitions,
     refuse_spikes,
+    scatter_of,
     without_repetitions,
 )
 from brachis.task.points.corners import (
@@ -28,10 +30,8 @@ from brachis.task.points.corners import (
     fill_gaps,
     find_corners,
 )
-from brachis.task.points.fit import deviations, fit_points
-from brachis.task.points.least_squares import Fit, Tolerance
+from brachis.task.points.fit import Fit, deviations, fit_points
 from brachis.task.points.points import Array, Points
-from brachis.task.points.scatter import Scatter, scatter_of
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -74,7 +74,7 @@ class Stretch:
 def fit_between(
     points: Points,
     corners: tuple[Corner, ...],
-    tolerance: Tolerance,
+    tolerance: FitTolerance,
     scatter: Scatter,
     doubt: str | None = None,
 ) -> list[Stretch]:
@@ -121,7 +121,7 @@ def fit_between(
 
 
 def _measure_deviations(
-    points: Points, fit: Fit, tolerance: Tolerance
+    points: Points, fit: Fit, tolerance: FitTolerance
 ) -> tuple[Array, Array]:
     """Return distances and angles of points from their fit, by another formula than the fit's.
 
@@ -149,7 +149,7 @@ def _measure_deviations(
 
 
 def blend_between(
-    first: Stretch, second: Stretch, corner: Corner, tolerance: Tolerance
+    first: Stretch, second: Stretch, corner: Corner, tolerance: FitTolerance
 ) -> float:
     """Return the size of the blend that keeps all points near a corner within the tolerance, m.
 
@@ -161,25 +161,25 @@ def blend_between(
     corner_at = first.points.describe(len(first.points) - 1)
     wrong = first.points.wrong
     shortest = min(first.length, second.length)
-    widest = blend_size(corner.angle, tolerance.corner, shortest)
+    widest = blend_size(corner.angle, tolerance.at_corners, shortest)
     taken = max(
         float(first.distances[first.sigma > first.length - widest].max(initial=0.0)),
         float(second.distances[second.sigma < widest].max(initial=0.0)),
     )
-    left = tolerance.corner - taken
-    if left < 0.05 * tolerance.corner:
+    left = tolerance.at_corners - taken
+    if left < 0.05 * tolerance.at_corners:
         raise wrong(
             -1,
             f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance",
             found=f"points {1e3 * taken:.3g} mm from the fit at {corner_at}",
-            allowed=f"{1e3 * tolerance.corner:.3g} mm",
+            allowed=f"{1e3 * tolerance.at_corners:.3g} mm",
             hint="Give a larger tolerance.corner",
         )
     return blend_size(corner.angle, left, shortest)
 
 
 def _fit_one(
-    points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str | None
+    points: Points, tolerance: FitTolerance, scatter: Scatter, doubt: str | None
 ) -> Fit:
     """Fit one curve.
 
@@ -301,14 +301,14 @@ class FittedCurve:
 
 
 def fit_curves(
-    points: Points, tolerance: Tolerance, told: tuple[str, ...] = ()
+    points: Points, tolerance: FitTolerance, told: tuple[str, ...] = ()
 ) -> tuple[tuple[FittedCurve, ...], FitReport]:
     """Return smooth curves within a tolerance of points, and what was found.
 
     Parameters
     ----------
     points : Points
-    tolerance : Tolerance
+    tolerance : FitTolerance
     told : tuple of str, optional
         What was found out before.
 
@@ -322,7 +322,7 @@ def fit_curves(
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = fill_gaps(points)
-    corners = find_corners(points, scatter, tolerance.corner)
+    corners = find_corners(points, scatter, tolerance.at_corners)
     doubt = of_size(points)
     stretches = fit_between(points, corners, tolerance, scatter, doubt)
     blends = [
@@ -363,7 +363,7 @@ def fit_curves(
 
 def _report(
     stretches: list[Stretch],
-    tolerance: Tolerance,
+    tolerance: FitTolerance,
     *,
     points: int,
     source: str,
@@ -411,7 +411,7 @@ def check_interpolation(points: Points, told: tuple[str, ...] = ()) -> FitReport
     refuse_repetitions(points)
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, 0.0)
-    length = float(np.linalg.norm(np.diff(points.position, axis=0), axis=1).sum())
+    length = float(points.steps.sum())
     if scatter.curvature * length > _ROUGH:
         raise TaskError(
             "the points are too rough for a curve through all of them: its curvature would be noise",
