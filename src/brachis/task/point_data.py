@@ -30,7 +30,7 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
         number = quantity(value, units)
         if number is None:
             raise refuse(
-                "no quantity",
+                "not a quantity",
                 found=value,
                 allowed=f"a number with a unit ({', '.join(units)}), as {example}",
             )
@@ -174,18 +174,22 @@ class FitReport(Model):
     points: Count = Field(description="Number of points.")
     length: NonNegative = Field(description="Length of the path, m.")
     position_error: NonNegative = Field(
-        description="Largest distance of a point from the path, m, beside corners."
+        default=0.0,
+        description="Largest distance of a point from the path, m, beside corners.",
     )
     position_rms: NonNegative = Field(
-        description="Root mean square of the distances, m."
+        default=0.0, description="Root mean square of the distances, m."
     )
     position_tolerance: NonNegative = Field(
-        description="What was allowed, m; 0 where all points are passed."
+        default=0.0, description="What was allowed, m; 0 where all points are passed."
     )
     orientation_error: NonNegative = Field(
-        description="Largest angle between given and fitted orientation, rad."
+        default=0.0,
+        description="Largest angle between given and fitted orientation, rad.",
     )
-    orientation_tolerance: NonNegative = Field(description="What was allowed, rad.")
+    orientation_tolerance: NonNegative = Field(
+        default=0.0, description="What was allowed, rad."
+    )
     intervals: Count = Field(
         description="Number of knot intervals of all curves of these points."
     )

@@ -27,8 +27,15 @@ from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace, Pose
 from brachis.robots import locate
-from brachis.task import FitTolerance, Segment, Task, load_task
-from brachis.task.fitted import Wanted, segments_along
+from brachis.task import (
+    CsvSegment,
+    FitTolerance,
+    PointFile,
+    Segment,
+    Task,
+    load_task,
+)
+from brachis.task.fitted import segments_along
 from brachis.task.points.points import Points
 from brachis.trajectory import Recovered, Trajectory
 from brachis.trajectory.recovered import LARGEST, check_tolerance
@@ -100,7 +107,7 @@ def recover_path(
     chosen = _evenly(length)
     try:
         segments = segments_along(
-            _points(task_map, values[chosen], chosen), _wanted(tolerance)
+            _points(task_map, values[chosen], chosen), _wanted(tolerance), "path"
         )
     except TaskError as error:
         raise PathError(
@@ -149,11 +156,11 @@ def _points(task_map: TaskMap, values: np.ndarray, chosen: np.ndarray) -> Points
     return Points(position, turning, None, chosen, "the tool's path", "sample")
 
 
-def _wanted(tolerance: float) -> Wanted:
+def _wanted(tolerance: float) -> CsvSegment:
     share = _SHARE * tolerance
-    allowed = FitTolerance(position=share, orientation=share, corner=None)
-    source = "the recorded motion"
-    return Wanted(source, "path", allowed, "refuse", relative=False, orientation=None)
+    allowed = FitTolerance(position=share, orientation=share)
+    file = PointFile(file="the recorded motion", tolerance=allowed, corner="refuse")
+    return CsvSegment(csv=file)
 
 
 def _nearest(
