@@ -313,7 +313,8 @@ def rows(model: type) -> Iterator[str]:
 
 
 def _row(name: str, field: FieldInfo) -> str:
-    return f"| `{name}` | {_default(field)} | {(field.description or '').replace('|', ' or ')} |"
+    description = " ".join((field.description or "").split())
+    return f"| `{name}` | {_default(field)} | {description.replace('|', ' or ')} |"
 
 
 def _default(field: FieldInfo) -> str:

@@ -55,11 +55,18 @@ LARGEST = 1e12
 
 
 class Model(BaseModel):
-    """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity."""
+    """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity.
+
+    The docstring below a field is its description in the documentation, the JSON schema and messages.
+    """
 
     # Instances are checked again, because a program can make limits that nobody has checked.
     model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always"
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        revalidate_instances="always",
+        use_attribute_docstrings=True,
     )
 
     if not TYPE_CHECKING:

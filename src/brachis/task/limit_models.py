@@ -144,25 +144,20 @@ class LimitKeywords(TypedDict, total=False):
 class LimitScale(Model):
     """Factors on the limits, to keep a distance from them."""
 
-    torque: Positive = Field(
-        default=1.0, description="Factor on all torque and force limits, curves too."
-    )
-    velocity: Positive = Field(
-        default=1.0, description="Factor on all velocity limits."
-    )
-    acceleration: Positive = Field(
-        default=1.0, description="Factor on all acceleration limits."
-    )
-    power: Positive = Field(
-        default=1.0, description="Factor on all power limits, the total one too."
-    )
-    rms_torque: Positive = Field(
-        default=1.0, description="Factor on all limits of root-mean-square torques."
-    )
-    jerk: Positive = Field(default=1.0, description="Factor on all jerk limits.")
-    torque_rate: Positive = Field(
-        default=1.0, description="Factor on all limits of torque rates."
-    )
+    torque: Positive = 1.0
+    """Factor on all torque and force limits, curves too."""
+    velocity: Positive = 1.0
+    """Factor on all velocity limits."""
+    acceleration: Positive = 1.0
+    """Factor on all acceleration limits."""
+    power: Positive = 1.0
+    """Factor on all power limits, the total one too."""
+    rms_torque: Positive = 1.0
+    """Factor on all limits of root-mean-square torques."""
+    jerk: Positive = 1.0
+    """Factor on all jerk limits."""
+    torque_rate: Positive = 1.0
+    """Factor on all limits of torque rates."""
 
 
 @dataclass(frozen=True, init=False)
@@ -292,12 +287,10 @@ class SpeedTable(Model):
     A step is two speeds at the same place; at the place itself the lower one of them holds.
     """
 
-    s: Annotated[_PathCoordinates, Field(min_length=1)] = Field(
-        description="Path coordinates, 0 to 1, ascending; the same one twice in a row is a step."
-    )
-    speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)] = Field(
-        description="Largest speed at each of them, m/s."
-    )
+    s: Annotated[_PathCoordinates, Field(min_length=1)]
+    """Path coordinates, 0 to 1, ascending; the same one twice in a row is a step."""
+    speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
+    """Largest speed at each of them, m/s."""
 
     @model_validator(mode="after")
     def _is_a_table(self) -> SpeedTable:
@@ -346,22 +339,19 @@ def _between(pair: tuple[float, float]) -> tuple[float, float]:
 class ProcessSpeed(Model):
     """A constant speed of the tool over a part of the path: what a glue nozzle or a laser needs."""
 
-    speed: Speed = Field(description="Speed of the tool frame's origin, m/s.")
+    speed: Speed
+    """Speed of the tool frame's origin, m/s."""
     s: Annotated[
         tuple[
             Annotated[Number, Field(ge=0.0, lt=1.0)],
             Annotated[Number, Field(gt=0.0, le=1.0)],
         ],
         AfterValidator(_between),
-    ] = Field(
-        description="[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. "
-        "A part may begin or end with the path where boundary.start_speed or end_speed is its speed, or the motion is "
-        "periodic."
-    )
-    tolerance: Annotated[Share, Field(ge=1e-3, le=0.5)] = Field(
-        default=0.01,
-        description="Largest deviation either way, as a share of the speed: 1 %, or 0.01.",
-    )
+    ]
+    """[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. A part may begin
+    or end with the path where boundary.start_speed or end_speed is its speed, or the motion is periodic."""
+    tolerance: Annotated[Share, Field(ge=1e-3, le=0.5)] = 0.01
+    """Largest deviation either way, as a share of the speed: 1 %, or 0.01."""
 
 
 class ToolLimits(Model):
@@ -370,30 +360,20 @@ class ToolLimits(Model):
     speed: Annotated[
         Speed | SpeedTable | None,
         ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
-    ] = Field(
-        default=None,
-        description="Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. "
-        "Null: none.",
-    )
-    feed: tuple[SpeedTable, ...] = Field(
-        default=(),
-        description="Tables of largest speeds over parts of the path, and none beyond their first and last places; "
-        "written by brachis from the feed rates of the path's points.",
-    )
-    acceleration: Speed | None = Field(
-        default=None, description="Largest acceleration, m/s^2. Null: none."
-    )
-    angular_speed: Speed | None = Field(
-        default=None,
-        description="Largest speed at which the tool turns, rad/s; its free roll does not count. Null: none.",
-    )
+    ] = None
+    """Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. Null: none."""
+    feed: tuple[SpeedTable, ...] = ()
+    """Tables of largest speeds over parts of the path, and none beyond their first and last places; written by brachis
+    from the feed rates of the path's points."""
+    acceleration: Speed | None = None
+    """Largest acceleration, m/s^2. Null: none."""
+    angular_speed: Speed | None = None
+    """Largest speed at which the tool turns, rad/s; its free roll does not count. Null: none."""
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
-    ] = Field(
-        default=(),
-        description="Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such, in order and "
-        "with a gap in between in which the speed may change.",
-    )
+    ] = ()
+    """Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such, in order and with a gap in
+    between in which the speed may change."""
 
     @field_validator("process_speed")
     @classmethod

@@ -141,7 +141,8 @@ class Target(Attitude):
 class ToolPose(Attitude):
     """A place of the tool: its position, and its orientation in exactly one of these conventions."""
 
-    position: Vector3 = Field(description="x, y, z, m.")
+    position: Vector3
+    """x, y, z, m."""
 
     @model_validator(mode="before")
     @classmethod
@@ -176,45 +177,42 @@ class Transform(Protocol):
 class Rotation(Model):
     """A rotation about an axis."""
 
-    axis: Direction = Field(
-        description="Axis of the rotation, right-hand rule; any length but zero."
-    )
-    angle_deg: Number = Field(
-        description="Angle of the rotation, degrees, signed; it may exceed a turn."
-    )
-    frame: Literal["path", "tool"] = Field(
-        default="path",
-        description="Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's.",
-    )
+    axis: Direction
+    """Axis of the rotation, right-hand rule; any length but zero."""
+    angle_deg: Number
+    """Angle of the rotation, degrees, signed; it may exceed a turn."""
+    frame: Literal["path", "tool"] = "path"
+    """Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's."""
     profile: Profile = "uniform"
 
 
 class Tangent(Model):
     """Turning with the tangent."""
 
-    up: Direction | None = Field(
-        default=None,
-        description="Direction, in the path's frame, that the tool keeps its attitude to; not along the tangent. Null: "
-        "the axis of an arc or circle, z for other segments.",
-    )
+    up: Direction | None = None
+    """Direction, in the path's frame, that the tool keeps its attitude to; not along the tangent. Null: the axis of an
+    arc or circle, z for other segments."""
 
 
 class Rotate(Model):
     """The tool turns about an axis that stands still."""
 
-    rotate: Rotation = Field(description="The rotation.")
+    rotate: Rotation
+    """The rotation."""
 
 
 class TurnTo(Model):
     """The tool turns to an orientation, the shortest way."""
 
-    to: Target = Field(description="Orientation at the segment's end.")
+    to: Target
+    """Orientation at the segment's end."""
 
 
 class AlongTangent(Model):
     """The tool turns with the tangent."""
 
-    tangent: Tangent = Field(description="What the tool keeps its attitude to.")
+    tangent: Tangent
+    """What the tool keeps its attitude to."""
 
 
 Turning = Annotated[
