@@ -171,70 +171,31 @@ class LimitSpec:
     2.0
     """
 
-    torque: Annotated[
-        UrdfLimit,
-        Field(
-            description="Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none."
-        ),
-    ] = FROM_URDF
-    velocity: Annotated[
-        UrdfLimit,
-        Field(
-            description="Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none."
-        ),
-    ] = FROM_URDF
-    acceleration: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none."
-        ),
-    ] = None
-    position: Annotated[
-        PositionLimit,
-        Field(
-            description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none."
-        ),
-    ] = FROM_URDF
-    scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(
-        default_factory=LimitScale
-    )
-    power: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest mechanical power, torque x speed either way, W. Absent or null: none."
-        ),
-    ] = None
-    total_power: Annotated[
-        Positive | None,
-        Field(
-            description="Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."
-        ),
-    ] = None
-    rms_torque: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest root mean square of the torque over the whole motion, N m (force, N): what heats a "
-            "motor. Absent or null: none."
-        ),
-    ] = None
-    torque_speed: Annotated[
-        dict[Name, TorqueCurve | None] | None,
-        Field(
-            description="Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, "
-            "rad/s and N m at the joint (m/s, N), joined by a line that never rises; the last slope goes on to zero "
-            "torque. The same both ways, driving and braking. Absent or null: none."
-        ),
-    ] = None
-    jerk: Annotated[
-        OwnLimit,
-        Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none."),
-    ] = None
-    torque_rate: Annotated[
-        OwnLimit,
-        Field(
-            description="Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none."
-        ),
-    ] = None
+    torque: UrdfLimit = FROM_URDF
+    """Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none."""
+    velocity: UrdfLimit = FROM_URDF
+    """Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none."""
+    acceleration: OwnLimit = None
+    """Largest acceleration, rad/s^2 (m/s^2). Absent or null: none."""
+    position: PositionLimit = FROM_URDF
+    """[low, high], rad (m); null for an open end. Absent: URDF. Null: none."""
+    scale: LimitScale = field(default_factory=LimitScale)
+    """Factors on the limits."""
+    power: OwnLimit = None
+    """Largest mechanical power, torque x speed either way, W. Absent or null: none."""
+    total_power: Positive | None = None
+    """Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."""
+    rms_torque: OwnLimit = None
+    """Largest root mean square of the torque over the whole motion, N m (force, N): what heats a motor. Absent or null:
+    none."""
+    torque_speed: dict[Name, TorqueCurve | None] | None = None
+    """Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, rad/s and N m at the
+    joint (m/s, N), joined by a line that never rises; the last slope goes on to zero torque. The same both ways,
+    driving and braking. Absent or null: none."""
+    jerk: OwnLimit = None
+    """Largest jerk, rad/s^3 (m/s^3). Absent or null: none."""
+    torque_rate: OwnLimit = None
+    """Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none."""
 
     __pydantic_config__ = Model.model_config
 
