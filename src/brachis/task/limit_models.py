@@ -19,7 +19,6 @@ from typing import Annotated, Any, Final, Literal, Protocol, TypedDict, Unpack
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     field_validator,
@@ -36,6 +35,7 @@ from brachis.task.fields import (
     Number,
     Positive,
     Share,
+    must,
     plain,
     refuse,
 )
@@ -51,33 +51,22 @@ class Array(Protocol):
         """Return plain numbers."""
 
 
-def _increasing(
-    pair: tuple[float | None, float | None],
-) -> tuple[float | None, float | None]:
-    low, high = pair
-    if low is not None and high is not None and low >= high:
-        raise refuse(
-            "the lower limit must be below the upper one",
-            found=pair,
-            allowed="[low, high] with low < high",
-        )
-    return pair
-
-
-Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increasing)]
-
-
-def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
-    if not pair[0] < 0.0 < pair[1]:
-        raise refuse(
-            "a pair of limits lies around zero",
-            found=pair,
-            allowed="[lower, upper] with lower < 0 < upper",
-        )
-    return pair
-
-
-_Pair = Annotated[tuple[Number, Number], AfterValidator(_around_zero)]
+Interval = Annotated[
+    tuple[Number | None, Number | None],
+    must(
+        lambda pair: None in pair or pair[0] < pair[1],
+        "the lower limit must be below the upper one",
+        "[low, high] with low < high",
+    ),
+]
+_Pair = Annotated[
+    tuple[Number, Number],
+    must(
+        lambda pair: pair[0] < 0.0 < pair[1],
+        "a pair of limits lies around zero",
+        "[lower, upper] with lower < 0 < upper",
+    ),
+]
 _Entry = Annotated[
     Positive | _Pair, ByForm("a number > 0, or a pair [lower, upper] around zero")
 ]
@@ -287,16 +276,6 @@ def _as_sequence(value: object) -> object:
     return value if isinstance(value, list) else [value]
 
 
-def _between(pair: tuple[float, float]) -> tuple[float, float]:
-    if not pair[0] < pair[1]:
-        raise refuse(
-            "the part of the path is empty",
-            found=pair,
-            allowed="[begin, end] with begin < end",
-        )
-    return pair
-
-
 class ProcessSpeed(Model):
     """A constant speed of the tool over a part of the path: what a glue nozzle or a laser needs."""
 
@@ -307,7 +286,11 @@ class ProcessSpeed(Model):
             Annotated[Number, Field(ge=0.0, lt=1.0)],
             Annotated[Number, Field(gt=0.0, le=1.0)],
         ],
-        AfterValidator(_between),
+        must(
+            lambda pair: pair[0] < pair[1],
+            "the part of the path is empty",
+            "[begin, end] with begin < end",
+        ),
     ]
     """[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. A part may begin
     or end with the path where boundary.start_speed or end_speed is its speed, or the motion is periodic."""

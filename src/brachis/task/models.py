@@ -25,6 +25,7 @@ from brachis.task.fields import (
     Name,
     NonEmpty,
     Number,
+    must,
     or_form,
     plain,
     refuse,
@@ -53,8 +54,6 @@ Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
-_MOST_SEGMENTS = 3000
-"""Segments of a path: with their blends about as many pieces as a motion can be verified on."""
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -62,30 +61,19 @@ def _expand_position(space: _Space) -> _Space:
     return POSITION_ROWS if space == "position" else space
 
 
-def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(names)) < len(names):
-        raise refuse("a name occurs twice", found=names, allowed="each name once")
-    return names
-
-
-def _yaw_last(rows: tuple[str, ...]) -> tuple[str, ...]:
-    if "yaw" in rows and (len(rows) != 3 or rows[-1] != "yaw"):
-        raise refuse(
-            "yaw needs exactly two position rows, and comes last",
-            found=rows,
-            allowed="for example [x, y, yaw]",
-        )
-    return rows
-
-
+_EACH_ONCE = must(
+    lambda names: len(set(names)) == len(names),
+    "a name occurs twice",
+    "each name once",
+)
+_YAW_LAST = must(
+    lambda rows: "yaw" not in rows or (len(rows) == 3 and rows[-1] == "yaw"),
+    "yaw needs exactly two position rows, and comes last",
+    "for example [x, y, yaw]",
+)
 TaskSpace = Annotated[
     Literal["position", "pose", "pose_free_roll", "joints"]
-    | Annotated[
-        tuple[Row, ...],
-        Field(min_length=1),
-        AfterValidator(_each_once),
-        AfterValidator(_yaw_last),
-    ],
+    | Annotated[NonEmpty[Row], _EACH_ONCE, _YAW_LAST],
     ByForm(_SPACE_FORMS),
     AfterValidator(_expand_position),
 ]
@@ -119,7 +107,7 @@ FreePosture = Annotated[
 
 
 RedundantJoints = Annotated[
-    Literal["auto"] | Annotated[tuple[Name, ...], AfterValidator(_each_once)],
+    Literal["auto"] | Annotated[tuple[Name, ...], _EACH_ONCE],
     ByForm("auto, or a list of joint names"),
 ]
 
@@ -174,9 +162,9 @@ class Task(Model):
     """What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all of x, y, z); pose;
     pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is one of all joints, in the
     order of the chain (rad, m), and only its timing is planned."""
-    path: Annotated[
-        tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)
-    ] = Field(json_schema_extra=_add_forms_of_paths)
+    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)] = Field(
+        json_schema_extra=_add_forms_of_paths
+    )
     """Segments of the path, in order; a list of points, all rows of the task space each, is the spline through them
     that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame of their own: {frame:
     NAME, segments: [...]}."""

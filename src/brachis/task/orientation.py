@@ -21,23 +21,20 @@ from pydantic import (
     model_validator,
 )
 
-from brachis.task.fields import ByForm, ByKey, Model, Number, refuse
+from brachis.task.fields import ByForm, ByKey, Model, Number, must, refuse
 from brachis.task.points.units import CONVENTIONS, choices
 
 Vector3 = tuple[Number, Number, Number]
 
 
-def _check_direction(vector: Vector3) -> Vector3:
-    if math.hypot(*vector) < 1e-9:
-        raise refuse(
-            "a direction cannot have zero length",
-            found=list(vector),
-            allowed="any other vector; its length is of no importance",
-        )
-    return vector
-
-
-Direction = Annotated[Vector3, AfterValidator(_check_direction)]
+Direction = Annotated[
+    Vector3,
+    must(
+        lambda vector: math.hypot(*vector) >= 1e-9,
+        "a direction cannot have zero length",
+        "any other vector; its length does not matter",
+    ),
+]
 Profile = Annotated[
     Literal["uniform", "smooth"],
     Field(
@@ -47,8 +44,8 @@ Profile = Annotated[
 ]
 
 
-def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | None:
-    length = 1.0 if quaternion is None else math.hypot(*quaternion)
+def _unit_length(quaternion: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*quaternion)
     if abs(length - 1.0) > 0.01:
         raise refuse(
             f"the quaternion's length is {length:.6g}",
@@ -59,7 +56,7 @@ def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | No
 
 
 _Quaternion = Annotated[
-    tuple[Number, Number, Number, Number] | None, AfterValidator(_unit_length)
+    tuple[Number, Number, Number, Number], AfterValidator(_unit_length)
 ]
 _DEGREES = "_deg"
 
@@ -87,8 +84,8 @@ class Attitude(Model):
         json_schema_extra=lambda schema: schema.update(oneOf=_ONE_OF)
     )
 
-    quaternion_wxyz: _Quaternion = _about("quaternion_wxyz")
-    quaternion_xyzw: _Quaternion = _about("quaternion_xyzw")
+    quaternion_wxyz: _Quaternion | None = _about("quaternion_wxyz")
+    quaternion_xyzw: _Quaternion | None = _about("quaternion_xyzw")
     rotation_vector: Vector3 | None = _about("rotation_vector")
     rpy_deg: Vector3 | None = _about("rpy")
     kuka_abc_deg: Vector3 | None = _about("kuka_abc")

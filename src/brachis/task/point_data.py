@@ -6,7 +6,6 @@ from math import degrees
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     Strict,
@@ -15,7 +14,16 @@ from pydantic import (
 )
 
 from brachis.errors import write_count
-from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
+from brachis.task.fields import (
+    Count,
+    Flag,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    must,
+    refuse,
+)
 from brachis.task.points.units import ANGLES, CONVENTIONS, LENGTHS, choices, quantity
 
 _LISTED = 10
@@ -63,18 +71,14 @@ Angle = Annotated[
 ]
 
 
-def _check_convention(word: str) -> str:
-    if word not in CONVENTIONS:
-        raise refuse(
-            "this convention of an orientation is not known",
-            found=word,
-            allowed=choices(),
-        )
-    return word
-
-
 OrientationWord = Annotated[
-    Name, AfterValidator(_check_convention), WithJsonSchema({"enum": list(CONVENTIONS)})
+    Name,
+    must(
+        CONVENTIONS.__contains__,
+        "this convention of an orientation is not known",
+        choices(),
+    ),
+    WithJsonSchema({"enum": list(CONVENTIONS)}),
 ]
 
 

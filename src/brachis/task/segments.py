@@ -17,7 +17,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     model_validator,
@@ -34,6 +33,7 @@ from brachis.task.fields import (
     Number,
     Positive,
     Vector,
+    must,
     refuse,
     required_keys,
 )
@@ -148,14 +148,10 @@ def _as_list(value: object) -> object:
 Coordinates = Annotated[Vector, BeforeValidator(_as_list)]
 
 
-def _not_zero(turns: float) -> float:
-    if turns == 0:
-        raise refuse(
-            "a circle without turns has zero length",
-            found=turns,
-            allowed="a number other than 0",
-        )
-    return turns
+Turns = Annotated[
+    Number,
+    must(bool, "a circle without turns has zero length", "a number other than 0"),
+]
 
 
 class LineTo(Model):
@@ -205,7 +201,7 @@ class CircleTurns(Model):
     """Whole or fractional turns about a centre."""
 
     center: Centre
-    turns: Annotated[Number, AfterValidator(_not_zero)] = 1.0
+    turns: Turns = 1.0
     """Number of turns, signed as an arc's angle; not zero."""
     normal: Normal = None
     yaw: Yaw = "fixed"
@@ -215,7 +211,7 @@ class HelixTurns(Model):
     """Turns about an axis that climb along it, in three position rows."""
 
     center: Centre
-    turns: Annotated[Number, AfterValidator(_not_zero)] = 1.0
+    turns: Turns = 1.0
     """Number of turns, signed about the normal; not zero."""
     pitch: Number
     """Climb of each turn along the normal, m; negative: against it."""
