@@ -70,11 +70,7 @@ class Fit:
     @property
     def intervals(self) -> np.ndarray:
         """The interval of every point, (n,)."""
-        return np.clip(
-            np.searchsorted(self.breaks, self.sigma, side="right") - 1,
-            0,
-            len(self.breaks) - 2,
-        )
+        return np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
 
 
 def _fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
@@ -110,16 +106,13 @@ def _fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
         raise ValueError("the knots are too dense for the points")
     control_points = spline.c + origin
     control_points[[0, -1]] = columns[[0, -1]]
-    return _measure(
-        points, BSpline(knots * length, control_points, DEGREE), breaks, sigma
-    )
+    spline = BSpline(knots * length, control_points, DEGREE)
+    return _measure(points, spline, breaks, sigma)
 
 
 def _clamp_knots(breaks: Array) -> Array:
     """Return the knots of a spline of the degree of all fits, with the ends repeated."""
-    return np.concatenate(
-        [np.repeat(breaks[0], DEGREE), breaks, np.repeat(breaks[-1], DEGREE)]
-    )
+    return np.pad(breaks, DEGREE, mode="edge")
 
 
 def _measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fit:
@@ -140,13 +133,8 @@ def _measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fi
         sigma[[0, -1]] = breaks[[0, -1]]
     values = spline(sigma)
     distances = np.linalg.norm(values[:, :dimension] - points.position, axis=1)
-    return Fit(
-        spline,
-        breaks,
-        sigma,
-        distances,
-        angles_between(values[:, dimension:], points.turning),
-    )
+    angles = angles_between(values[:, dimension:], points.turning)
+    return Fit(spline, breaks, sigma, distances, angles)
 
 
 def _position_of(spline: BSpline, dimension: int) -> BSpline:
@@ -161,7 +149,7 @@ def _over_arc_length(fit: Fit, dimension: int) -> tuple[Array, Array]:
     slope = _position_of(fit.spline, dimension).derivative()
     speed, between = (np.linalg.norm(slope(at), axis=1) for at in (fine, middle))
     steps = np.diff(fine) * (speed[:-1] + 4.0 * between + speed[1:]) / 6.0
-    lengths = np.concatenate([[0.0], np.cumsum(steps)])
+    lengths = np.cumsum(np.append(0.0, steps))
     return np.interp(fit.sigma, fine, lengths), np.interp(fit.breaks, fine, lengths)
 
 
@@ -174,22 +162,19 @@ def lengths_along(position: Array, deviation: float) -> Array:
     count = len(position)
     block = _block(position, deviation)
     if block == 1:
-        chords = steps_of(position)
-        return np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-9))])
+        return np.cumsum(np.append(0.0, np.maximum(steps_of(position), 1e-9)))
     edges = np.arange(0, count + 1, block)
     edges[-1] = count
-    sums = np.concatenate(
-        [np.zeros((1, position.shape[1])), np.cumsum(position - position[0], axis=0)]
-    )
+    moved = np.pad(position - position[0], ((1, 0), (0, 0)))
+    sums = np.cumsum(moved, axis=0)
     sizes = np.diff(edges)[:, None]
     means = position[0] + np.diff(sums[edges], axis=0) / sizes
     centres = (edges[:-1] + edges[1:] - 1) / 2.0
     corners = np.concatenate([position[:1], means, position[-1:]])
     chords = np.maximum(steps_of(corners), 1e-9)
     index = np.concatenate([[-0.5], centres, [count - 0.5]])
-    lengths = np.interp(
-        np.arange(count), index, np.concatenate([[0.0], np.cumsum(chords)])
-    )
+    at_index = np.cumsum(np.append(0.0, chords))
+    lengths = np.interp(np.arange(count), index, at_index)
     return np.asarray(lengths - lengths[0])
 
 
@@ -198,8 +183,7 @@ def _block(position: Array, deviation: float) -> int:
     count = len(position)
     block = 1
     while deviation > 0.0 and 8 * block < count:
-        ends = position[::block]
-        step = float(np.median(steps_of(ends)))
+        step = float(np.median(steps_of(position[::block])))
         if step > 20.0 * deviation / block**0.5:
             break
         block *= 2
