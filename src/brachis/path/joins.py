@@ -185,7 +185,7 @@ def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
     before, after, length = at_join(first, second)
     jump = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)
     if jump:
-        return join, jump, f"Set {join.rounding}"
+        return Corner(join, jump, f"Set {join.rounding}")
     unit = "rad" if on_the_spot[0] else "m"
     jump = _turning_mismatch(before, after, length, unit)
     advice = "Set profile: smooth where the tool turns"
