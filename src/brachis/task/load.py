@@ -122,17 +122,10 @@ def with_keys(
     content: Mapping[str, Any], changes: Mapping[str, object]
 ) -> dict[str, Any]:
     """Return a task, not checked yet, with dotted keys set; `content` is left as it is."""
-    changed = _copy(content)
+    changed: Any = plain(content)
     for key, value in changes.items():
         set_key(changed, key, value)
     return changed
-
-
-def _copy(value: Any) -> Any:
-    """Copy mappings and lists, which are what `set_key` writes into, and nothing else."""
-    if isinstance(value, Mapping):
-        return {key: _copy(each) for key, each in value.items()}
-    return [_copy(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 Source = str | os.PathLike[str] | Mapping[str, object] | Task

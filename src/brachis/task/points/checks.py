@@ -12,7 +12,13 @@ import numpy as np
 
 from brachis.errors import TaskError, write_count
 from brachis.task.point_data import FitTolerance
-from brachis.task.points.points import QUATERNION, Array, Points, angles_between
+from brachis.task.points.points import (
+    QUATERNION,
+    Array,
+    Points,
+    angles_between,
+    shares_along,
+)
 
 SAME = 1e-9
 """What a path takes for standing still, m or rad."""
@@ -211,8 +217,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
     here = position[1:-1]
     after = position[2:]
     side = after - before
-    lengths = np.maximum(np.sum(side**2, axis=1), SAME**2)
-    share = np.clip(np.sum((here - before) * side, axis=1) / lengths, 0.0, 1.0)
+    share = shares_along(here, before, side)
     off = np.linalg.norm(here - before - share[:, None] * side, axis=1)
     around = 4
     chords = np.pad(points.steps, around, mode="reflect")

@@ -21,7 +21,13 @@ import numpy as np
 
 from brachis.task.point_data import FitTolerance
 from brachis.task.points.checks import Scatter
-from brachis.task.points.points import Array, Points, angles_between, steps_of
+from brachis.task.points.points import (
+    Array,
+    Points,
+    angles_between,
+    shares_along,
+    steps_of,
+)
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -371,9 +377,8 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     breaks = np.unique(spline.t)
     count = max(64, 20_000 // (len(breaks) - 1))
     sides = np.arange(count) / count
-    sigma = np.append(
-        (breaks[:-1, None] + np.diff(breaks)[:, None] * sides).ravel(), breaks[-1]
-    )
+    inside = breaks[:-1, None] + np.diff(breaks)[:, None] * sides
+    sigma = np.append(inside.ravel(), breaks[-1])
     dimension = points.position.shape[1]
     place = spline(sigma)[:, :dimension]
     nearest = _nearest(points.position, place)
@@ -382,13 +387,9 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     for offset in (-1, 0):
         first = np.clip(nearest + offset, 0, len(place) - 2)
         side = place[first + 1] - place[first]
-        share = np.sum((points.position - place[first]) * side, axis=1) / np.maximum(
-            np.sum(side**2, axis=1), 1e-300
-        )
-        share = np.clip(share, 0.0, 1.0)
-        away = np.linalg.norm(
-            points.position - place[first] - share[:, None] * side, axis=1
-        )
+        share = shares_along(points.position, place[first], side)
+        nearest_place = place[first] + share[:, None] * side
+        away = np.linalg.norm(points.position - nearest_place, axis=1)
         nearer = away < distances
         distances[nearer] = away[nearer]
         at[nearer] = (sigma[first] + share * (sigma[first + 1] - sigma[first]))[nearer]

@@ -98,6 +98,12 @@ def steps_of(position: Array) -> Array:
     return steps
 
 
+def shares_along(points: Array, begin: Array, side: Array) -> Array:
+    """Return where points, (n, p), are nearest to the sides that begin at `begin`, as shares of these, (n,)."""
+    lengths = np.maximum(np.sum(side**2, axis=1), 1e-300)
+    return np.clip(np.sum((points - begin) * side, axis=1) / lengths, 0.0, 1.0)
+
+
 def angles_between(one: Array, other: Array) -> Array:
     """Return the angles, (n,), rad, between what `Points.turning` holds, (n, q) both; zero where it holds nothing."""
     if one.shape[1] != QUATERNION:
