@@ -11,7 +11,7 @@ from brachis.errors import TaskError
 from brachis.task.point_data import FitTolerance
 from brachis.task.points.checks import (
     decimals_of,
-    of_size,
+    plausibility_note,
     refuse_spikes,
     scatter_of,
     without_repetitions,
@@ -65,9 +65,13 @@ def test_a_factor_of_a_thousand_is_named():
 
 
 def test_a_whole_file_in_other_units_is_doubted():
-    assert of_size(points(wave(100))) is None
-    assert "mm for m? Set units: {length: mm}" in str(of_size(points(1e3 * wave(100))))
-    assert "m for mm? Set units: {length: m}" in str(of_size(points(1e-5 * wave(100))))
+    assert plausibility_note(points(wave(100))) is None
+    assert "mm for m? Set units: {length: mm}" in str(
+        plausibility_note(points(1e3 * wave(100)))
+    )
+    assert "m for mm? Set units: {length: m}" in str(
+        plausibility_note(points(1e-5 * wave(100)))
+    )
 
 
 def test_repeated_rows_are_left_out_and_listed():

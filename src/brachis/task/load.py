@@ -292,15 +292,11 @@ def _with_start(task: Task, source: str) -> Task:
     if task.start != "free" or task.path_start is not None:
         return task
     place = task.start_place
-    first = task.path[0]
     changes: dict[str, object] = {"path_start": place}
     if task.task_space == "joints" and place is not None:
-        names = getattr(getattr(first, first.kind), "joints", None)
-        changes = {
-            "start": {
-                "joints": dict(zip(names, place, strict=True)) if names else place
-            }
-        }
+        names = getattr(task.path[0].shape, "joints", None)
+        posture = dict(zip(names, place, strict=True)) if names else place
+        changes = {"start": {"joints": posture}}
     try:
         return Task.model_validate(task.model_copy(update=changes))
     except ValidationError as error:

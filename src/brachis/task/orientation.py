@@ -114,15 +114,10 @@ class Attitude(Model):
     @property
     def convention_and_numbers(self) -> tuple[str, tuple[float, ...]]:
         """Name of the convention in `brachis.task.points.units`, and the numbers: quaternions, or angles in rad."""
-        key, values = next(
-            (key, value)
-            for key in Attitude.model_fields
-            if (value := getattr(self, key)) is not None
-        )
+        stated = self.model_dump(include=set(Attitude.model_fields))
+        ((key, values),) = stated.items()
         if key.endswith(_DEGREES):
-            return key.removesuffix(_DEGREES), tuple(
-                math.radians(angle) for angle in values
-            )
+            return key.removesuffix(_DEGREES), tuple(map(math.radians, values))
         return key, values
 
 

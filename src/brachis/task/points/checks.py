@@ -236,7 +236,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
         )
 
 
-def of_size(points: Points) -> str | None:
+def plausibility_note(points: Points) -> str | None:
     """Say that the whole path looks like mm where m are stated, or the other way round; None where it does not."""
     extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
     if extent > 100.0:  # paths of robots are shorter

@@ -65,13 +65,13 @@ def find_corners(
     for_direction = 12.0 * spacing * (scatter.deviation / direction) ** 2
     width = max(for_direction ** (1.0 / 3.0), 2.0 * tolerance)
     least = 4 if noisy else 1
-    angle, doubt = _turning(points.position, u, width, least)
+    angle, uncertainty = _turning(points.position, u, width, least)
     wide, _ = _turning(points.position, u, 2.0 * width, 2 * least)
     # Over twice the distance a smooth curve turns by twice the angle, a corner by the same one.
     sharp = (wide > 0.0) & (wide < 1.5 * angle)
     # A polygon that turns by this much from one side to the next is not a smooth curve.
     sharp |= angle > np.deg2rad(50.0)
-    sharp &= angle > np.maximum(LEAST_ANGLE, 8.0 * scatter.deviation * doubt)
+    sharp &= angle > np.maximum(LEAST_ANGLE, 8.0 * scatter.deviation * uncertainty)
     peaks = _peaks(angle, sharp, u, width, least)
     return tuple(
         _locate(points, u, i, float(angle[i]), width, least, tolerance / 4.0)
@@ -90,18 +90,18 @@ def _turning(
     last = len(u) - 1
     begins = np.minimum(np.searchsorted(u, u - width), index - least)
     ends = np.maximum(np.searchsorted(u, u + width, side="right") - 1, index + least)
-    before, doubt = _directions(position, u, np.clip(begins, 0, last), index)
+    before, uncertainty = _directions(position, u, np.clip(begins, 0, last), index)
     after, other = _directions(position, u, index, np.clip(ends, 0, last))
     apart = np.linalg.norm(before - after, axis=1)
     angle = 2.0 * np.arctan2(apart, np.linalg.norm(before + after, axis=1))
     angle[(index < least) | (index > last - least)] = 0.0
-    return angle, np.hypot(doubt, other)
+    return angle, np.hypot(uncertainty, other)
 
 
 def _directions(
     position: Array, u: Array, first: Indices, last: Indices
 ) -> tuple[Array, Array]:
-    """Return unit vectors along the lines that fit points `first` to `last`, (n, p), and their doubts, (n,)."""
+    """Return unit vectors along lines that fit points `first` to `last`, (n, p), and how uncertain they are, (n,)."""
     at = u[:, None]
     moment = np.hstack([np.ones_like(at), at, at**2, position, at * position])
     sums = np.cumsum(np.pad(moment, ((1, 0), (0, 0))), axis=0)

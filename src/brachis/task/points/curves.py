@@ -12,7 +12,7 @@ from brachis.errors import TaskError
 from brachis.task.point_data import FitReport, FitTolerance, FoundCorner
 from brachis.task.points.checks import (
     Scatter,
-    of_size,
+    plausibility_note,
     refuse_repetitions,
     refuse_spikes,
     scatter_of,
@@ -84,11 +84,11 @@ def _fit_between(
     corners: tuple[Corner, ...],
     tolerance: FitTolerance,
     scatter: Scatter,
-    doubt: str | None,
+    note: str | None,
 ) -> list[FittedCurve]:
     """Cut points at their corners and fit a curve between every two of them.
 
-    `doubt` says what looks implausible in the points; it is the hint of the error.
+    `note` says what looks implausible in the points; it is the hint of the error.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def _fit_between(
             if at_end is not None:
                 position[row] = at_end.place
         whole = replace(whole, position=position)
-        fit = _fit_one(whole, tolerance, scatter, doubt)
+        fit = _fit_one(whole, tolerance, scatter, note)
         distances, angles = _measure_deviations(whole, fit, tolerance)
         curves.append(FittedCurve(whole, given, fit, distances[given], angles[given]))
     return curves
@@ -181,7 +181,7 @@ def _blend_between(
 
 
 def _fit_one(
-    points: Points, tolerance: FitTolerance, scatter: Scatter, doubt: str | None
+    points: Points, tolerance: FitTolerance, scatter: Scatter, note: str | None
 ) -> Fit:
     """Fit one curve.
 
@@ -197,7 +197,7 @@ def _fit_one(
             "no smooth curve follows these points",
             found=f"{error}, from {points.describe(0)}",
             allowed="points that move on from each to the next",
-            hint=doubt or "Does the path turn back, or stand still, near there?",
+            hint=note or "Does the path turn back, or stand still, near there?",
         ) from error
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
@@ -221,7 +221,7 @@ def _fit_one(
         f"no smooth curve is within the tolerance of {kind}",
         found=f"{found} at {points.describe(i)}",
         allowed=allowed,
-        hint=doubt or hint,
+        hint=note or hint,
     )
 
 
@@ -279,8 +279,8 @@ def fit_curves(
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = fill_gaps(points)
     corners = find_corners(points, scatter, tolerance.at_corners)
-    doubt = of_size(points)
-    curves = _fit_between(points, corners, tolerance, scatter, doubt)
+    note = plausibility_note(points)
+    curves = _fit_between(points, corners, tolerance, scatter, note)
     starts = np.cumsum([0.0, *(curve.length for curve in curves)]).tolist()
     found = []
     for i, corner in enumerate(corners):
@@ -308,7 +308,7 @@ def fit_curves(
         intervals=sum(len(curve.fit.breaks) - 1 for curve in curves),
         corners=tuple(found),
         told=(*notes, *repeated, *filled, *[str(scatter)] * (scatter.deviation > 0.0)),
-        doubt=doubt,
+        doubt=note,
         profile=_profile(along, distances, angles),
     )
     return tuple(curves), report
@@ -356,5 +356,5 @@ def check_interpolation(points: Points, notes: tuple[str, ...] = ()) -> FitRepor
         length=length,
         intervals=len(points) - 1,
         told=notes,
-        doubt=of_size(points),
+        doubt=plausibility_note(points),
     )
