@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -46,9 +46,13 @@ from brachis.task.segments import (
 
 PAGE = Path(__file__).parent / "task_files.md"
 
+LIMITS = dataclass(LimitSpec)
+for _name, _key in TypeAdapter(LimitSpec).json_schema()["properties"].items():
+    LIMITS.__pydantic_fields__[_name].description = _key["description"]
+
 PARTS: dict[str, type] = {
     "robot": RobotSettings,
-    "robot.limits": dataclass(LimitSpec),
+    "robot.limits": LIMITS,
     "robot.limits.scale": LimitScale,
     "robot.friction": FrictionSettings,
     "robot.payload": Payload,
@@ -313,7 +317,8 @@ def rows(model: type) -> Iterator[str]:
 
 
 def _row(name: str, field: FieldInfo) -> str:
-    return f"| `{name}` | {_default(field)} | {(field.description or '').replace('|', ' or ')} |"
+    description = " ".join((field.description or "").split())
+    return f"| `{name}` | {_default(field)} | {description.replace('|', ' or ')} |"
 
 
 def _default(field: FieldInfo) -> str:

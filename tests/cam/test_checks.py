@@ -8,10 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
-from brachis.task.points.checks import of_size, refuse_spikes, without_repetitions
+from brachis.task.point_data import FitTolerance
+from brachis.task.points.checks import (
+    decimals_of,
+    plausibility_note,
+    refuse_spikes,
+    scatter_of,
+    without_repetitions,
+)
 from brachis.task.points.curves import check_interpolation, fit_curves
-from brachis.task.points.least_squares import Tolerance
-from brachis.task.points.scatter import decimals_of, scatter_of
 from support.seams import bent, points, wave
 
 MM = 1e-3
@@ -60,9 +65,13 @@ def test_a_factor_of_a_thousand_is_named():
 
 
 def test_a_whole_file_in_other_units_is_doubted():
-    assert of_size(points(wave(100))) is None
-    assert "mm for m? Set units: {length: mm}" in str(of_size(points(1e3 * wave(100))))
-    assert "m for mm? Set units: {length: m}" in str(of_size(points(1e-5 * wave(100))))
+    assert plausibility_note(points(wave(100))) is None
+    assert "mm for m? Set units: {length: mm}" in str(
+        plausibility_note(points(1e3 * wave(100)))
+    )
+    assert "m for mm? Set units: {length: m}" in str(
+        plausibility_note(points(1e-5 * wave(100)))
+    )
 
 
 def test_repeated_rows_are_left_out_and_listed():
@@ -141,4 +150,4 @@ def test_orientations_that_scatter_are_told_from_smooth_ones():
         TaskError,
         match=r"tolerance of orientation; .*orientations that scatter by 0.05\d* deg",
     ):
-        fit_curves(given, Tolerance(0.05 * MM, 1e-3, 0.05 * MM))
+        fit_curves(given, FitTolerance(position=0.05 * MM, orientation=1e-3))

@@ -10,10 +10,10 @@ from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
 from brachis.errors import TaskError
+from brachis.task.point_data import FitTolerance
 from brachis.task.points import curves
 from brachis.task.points.curves import fit_curves
 from brachis.task.points.fit import deviations, fit_points
-from brachis.task.points.least_squares import Tolerance
 from support.seams import bent, brute_distances, points, wave
 
 MM = 1e-3
@@ -21,8 +21,8 @@ MM = 1e-3
 
 def tolerance(
     position: float, orientation: float = 1e-3, corner: float | None = None
-) -> Tolerance:
-    return Tolerance(position, orientation, position if corner is None else corner)
+) -> FitTolerance:
+    return FitTolerance(position=position, orientation=orientation, corner=corner)
 
 
 CASES = [

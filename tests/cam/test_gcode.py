@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from brachis.errors import TaskError
+from brachis.task.point_data import FitTolerance
 from brachis.task.points.curves import fit_curves
 from brachis.task.points.gcode import read_gcode
-from brachis.task.points.least_squares import Tolerance
 
 
 def points_of(text, rows="position"):
@@ -80,7 +80,9 @@ def test_whole_circles_and_long_arcs(motion, side):
 
 def test_a_program_is_fitted_with_its_corners():
     points, _ = points_of(PROGRAM)
-    curves, report = fit_curves(points, Tolerance(0.02e-3, 1e-3, 0.1e-3))
+    curves, report = fit_curves(
+        points, FitTolerance(position=0.02e-3, orientation=1e-3, corner=0.1e-3)
+    )
     assert [corner.row for corner in report.corners] == [5]
     assert report.position_error <= 0.02e-3
     assert curves[1].speeds[0][0] == (0.0, 0.01)
@@ -144,4 +146,4 @@ def test_an_arc_that_begins_backwards_is_told_with_its_line(end):
     with pytest.raises(
         TaskError, match=r"line 3: the path turns back, by 17.* degrees"
     ):
-        fit_curves(points, Tolerance(5e-5, 1.0, 5e-3))
+        fit_curves(points, FitTolerance(position=5e-5, orientation=0.5, corner=5e-3))

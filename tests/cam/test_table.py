@@ -12,8 +12,8 @@ from brachis.task.point_data import FileUnits
 from brachis.task.points.tables import (
     allowed_columns,
     points_of,
+    read_columns,
     read_table,
-    understood,
 )
 
 
@@ -23,11 +23,11 @@ def read(text, rows="pose", units=None, orientation=None):
         text,
         "a.csv",
         allowed,
-        lambda header, where: understood(header, where, rows, orientation),
+        lambda header, where: read_columns(header, where, rows, orientation),
     )
-    return points_of(
-        table, rows, units or FileUnits(), "a.csv", orientation
-    ), table.told
+    where = f"a.csv: line {table.header_line}"
+    columns = read_columns(table.header, where, rows, orientation)
+    return points_of(table, columns, units or FileUnits(), "a.csv"), table.notes
 
 
 @pytest.mark.parametrize(

@@ -222,7 +222,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"points": wave(5), "orientations": np.ones((5, 3, 3))},
-        r"row 0: no rotation matrix",
+        r"row 0: not a rotation matrix",
     ),
     (
         {"points": wave(5), "orientations": np.ones((5, 2))},
@@ -235,10 +235,10 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"points": wave(5), "speed": np.zeros(5)}, r"row 0: a speed must be positive"),
     (
         {"points": wave(5), "tolerance": {"position": "5 kg"}},
-        r"tolerance: position: no quantity; found '5 kg'.*0.05 mm",
+        r"tolerance.position: not a quantity; found '5 kg'.*0.05 mm",
     ),
     ({"points": wave(5), "tolerance": {"positions": 1.0}}, r"tolerance"),
-    ({"points": wave(5), "units": {"length": "furlong"}}, r"units: length"),
+    ({"points": wave(5), "units": {"length": "furlong"}}, r"units.length"),
     (
         {
             "points": bent(300)[0],

@@ -271,7 +271,9 @@ def test_frames_that_do_not_fit() -> None:
             {"frame": "table", "segments": SEGMENTS},
             frames={"workpiece": PLACE, "table": PLACE},
         )  # type: ignore[arg-type]
-    with pytest.raises(TaskError, match="path_frame: a path of joints is in no frame"):
+    with pytest.raises(
+        TaskError, match="path_frame: a path of joints cannot be in a frame"
+    ):
         written([{"line": {"by": [0.1]}}], task_space="joints")
     with pytest.raises(
         TaskError,

@@ -263,7 +263,7 @@ def test_the_tangent_of_a_circle_has_a_constant_twist(segment: dict[str, Any]) -
         sample.xi, np.broadcast_to(sample.xi[0], (40, 6)), atol=1e-11
     )
     np.testing.assert_allclose(sample.xi_ds, 0.0, atol=1e-10)
-    angle = path.length / path.pieces[0].curve.curve.radius  # type: ignore[attr-defined]
+    angle = path.length * path.pieces[0].curve.curve.turn  # type: ignore[attr-defined]
     np.testing.assert_allclose(
         np.linalg.norm(sample.xi, axis=1), np.hypot(path.length, angle), atol=1e-11
     )

@@ -134,7 +134,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"units": {"length": "feet"}}, r"path\[0\].csv.units.length.*found 'feet'"),
     (
         {"tolerance": {"position": "0.1"}},
-        r"path\[0\].csv.tolerance.position: no quantity; found '0.1'.*0.05 mm",
+        r"path\[0\].csv.tolerance.position: not a quantity; found '0.1'.*0.05 mm",
     ),
     ({"tolerance": {"position": 0}}, r"path\[0\].csv.tolerance.position"),
     ({"tolerance": {}}, r"path\[0\].csv.tolerance.position"),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from math import factorial, floor, perm
+from math import floor
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from brachis.common.arrays import with_like_signs
 from brachis.path.context import stands_still
@@ -46,12 +47,9 @@ class SepticCurve:
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the polynomial and its derivatives by sigma, shape (order + 1, K, m)."""
         u = sigma / self.length
-        return np.stack(
-            [
-                _powers(u, k) @ self.coefficients / self.length**k
-                for k in range(order + 1)
-            ]
-        )
+        terms = (polyder(self.coefficients, k) for k in range(order + 1))
+        values = [polyval(u, c).T / self.length**k for k, c in enumerate(terms)]
+        return np.stack(values)
 
 
 def septic(start: Array, end: Array, length: float) -> SepticCurve:
@@ -65,19 +63,10 @@ def septic(start: Array, end: Array, length: float) -> SepticCurve:
         Range of sigma.
     """
     scale = length ** np.arange(4)[:, None]
-    low = start * scale / np.array([factorial(k) for k in range(4)])[:, None]
-    at_end = np.stack([_powers(np.ones(1), k)[0] for k in range(4)])
+    low = start * scale / np.array([1.0, 1.0, 2.0, 6.0])[:, None]
+    at_end = np.stack([polyder(np.eye(8), k).sum(axis=0) for k in range(4)])
     high = np.linalg.solve(at_end[:, 4:], end * scale - at_end[:, :4] @ low)
     return SepticCurve(np.concatenate([low, high]), length)
-
-
-def _powers(u: Array, order: int) -> Array:
-    """Return the derivatives of the powers of the normalised parameter, shape (K, 8)."""
-    exponents = np.arange(8)
-    factors = np.array(
-        [perm(k, order) if k >= order else 0 for k in exponents], dtype=float
-    )
-    return factors * u[:, None] ** np.maximum(exponents - order, 0)
 
 
 def blend_rows(first: Curve, second: Curve, size: float, join: Join) -> Curve:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
@@ -123,25 +123,18 @@ class RowCoordinates:
         PathError
             The segment has zero length, or does not fit these coordinates.
         """
+        context = SegmentContext(f"path[{index}]", start, self.rows)
         found = f"task_space [{', '.join(self.rows)}]"
+        hint = "Set task_space: pose"
         if isinstance(segment, TurnSegment):
-            hint = "Set task_space: pose"
+            problem = "a turn is for task spaces of poses"
             if YAW in self.rows:
                 hint = "Use line: {by: [0, 0, ...]} to turn yaw"
-            raise PathError(
-                "a turn is for task spaces of poses",
-                found=found,
-                where=f"path[{index}].turn",
-                hint=hint,
-            )
+            raise context.wrong(problem, ".turn", found=found, hint=hint)
         if segment.orientation is not None:
-            raise PathError(
-                "an orientation along a segment is for task spaces of poses",
-                found=found,
-                where=f"path[{index}].orientation",
-                hint="Set task_space: pose",
-            )
-        context = SegmentContext(f"path[{index}].{segment.kind}", start, self.rows)
+            problem = "an orientation along a segment is for task spaces of poses"
+            raise context.wrong(problem, ".orientation", found=found, hint=hint)
+        context = replace(context, key=f"{context.key}.{segment.kind}")
         return BUILDERS[type(segment.shape)](segment.shape, context)
 
 

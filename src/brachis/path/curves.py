@@ -85,59 +85,58 @@ def _line(
 
 @dataclass(frozen=True, eq=False)
 class ArcCurve:
-    """An arc ``center + cos(sigma / radius) outward + sin(sigma / radius) forward``, with yaw linear in sigma.
+    """An arc, or a helix, ``center + cos(turn sigma) outward + sin(turn sigma) forward + slope sigma``.
 
     Attributes
     ----------
-    center : ndarray, shape (2,) or (3,)
-        Centre, m.
-    outward, forward : ndarray, shape of `center`
-        From the centre to the start, and in the direction of motion there; both as long as the radius, m.
+    center : ndarray, shape (m,)
+        Centre, m; where yaw is a row, yaw at the start, rad.
+    outward, forward : ndarray, shape (m,)
+        From the centre to the start, and in the direction of the turn there; both as long as the radius, m.
     length : float
-        Length of the arc, m.
-    yaw : tuple of float, optional
-        Yaw at the start (rad) and its slope (rad/m), where yaw is a row.
+        Length of the curve, m.
+    turn : float
+        Angle per unit sigma, rad/m.
+    slope : ndarray, shape (m,)
+        Climb along the axis per unit sigma; of yaw rad/m.
     """
 
     center: Array
     outward: Array
     forward: Array
     length: float
-    yaw: tuple[float, float] | None = None
-
-    @property
-    def radius(self) -> float:
-        """Radius, m."""
-        return float(np.linalg.norm(self.outward))
+    turn: float
+    slope: Array
 
     @property
     def normal(self) -> Array:
-        """Unit vector of the axis about which the arc turns, for three position rows."""
-        normal: Array = np.cross(self.outward, self.forward) / self.radius**2
-        return normal
+        """Unit vector of the axis about which the curve turns, for three position rows."""
+        normal: Array = np.cross(self.outward, self.forward)
+        return normal / np.linalg.norm(normal)
 
     @property
     def knots(self) -> Array:
         """Every quarter turn: the arc is analytic, but a quadrature needs several intervals on many turns."""
-        quarters = int(np.ceil(self.length / self.radius / (np.pi / 2)))
+        quarters = int(np.ceil(self.length * self.turn / (np.pi / 2)))
         return np.linspace(0.0, self.length, max(quarters, 1) + 1)
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the arc and its derivatives by sigma, shape (order + 1, K, m)."""
-        rows = self.center.size
-        result = np.zeros((order + 1, sigma.size, rows + (self.yaw is not None)))
-        angle = sigma[:, None] / self.radius
-        for k in range(order + 1):
-            # Each derivative turns the position vector by a quarter and divides it by the radius.
-            turned = angle + k * np.pi / 2
-            result[k, :, :rows] = (
-                np.cos(turned) * self.outward + np.sin(turned) * self.forward
-            ) / self.radius**k
-        result[0, :, :rows] += self.center
-        if self.yaw is not None:
-            result[0, :, rows] = self.yaw[0] + self.yaw[1] * sigma
-            result[1:2, :, rows] = self.yaw[1]
+        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        # Each derivative turns the position vector by a quarter and multiplies it by the angle per unit sigma.
+        orders = np.arange(order + 1)[:, None, None]
+        angle = self.turn * sigma[:, None] + orders * np.pi / 2
+        result = np.cos(angle) * self.outward + np.sin(angle) * self.forward
+        result *= self.turn**orders
+        result[0] += self.center + sigma[:, None] * self.slope
+        result[1:2] += self.slope
         return result
+
+
+def _arc(center: Array, outward: Array, forward: Array, angle: float) -> ArcCurve:
+    """Return the arc by an angle, rad, without climb or yaw."""
+    radius = float(np.linalg.norm(outward))
+    nothing = np.zeros_like(center)
+    return ArcCurve(center, outward, forward, radius * angle, 1.0 / radius, nothing)
 
 
 def arc_center(shape: ArcCenter, context: SegmentContext) -> ArcCurve:
@@ -191,7 +190,7 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
     if via_angle > angle:
         forward = -forward
         angle = 2 * np.pi - angle
-    arc = ArcCurve(start + to_center, outward, forward, radius * angle)
+    arc = _arc(start + to_center, outward, forward, angle)
     return _with_yaw(arc, shape.yaw, context)
 
 
@@ -228,8 +227,7 @@ def _about_center(
         center = center + (normal @ outward) * normal
         outward = context.position - center
         forward = np.cross(normal, outward)
-    length = abs(angle) * float(np.linalg.norm(outward))
-    return ArcCurve(center, outward, np.sign(angle) * forward, length)
+    return _arc(center, outward, np.sign(angle) * forward, abs(angle))
 
 
 def _normal(
@@ -263,8 +261,13 @@ def _with_yaw(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
     tangent = turning == "tangent"
     if "yaw" in context.rows:
         sense = float(np.sign(np.linalg.det([arc.outward, arc.forward])))
-        slope = sense / arc.radius if tangent else 0.0
-        return replace(arc, yaw=(float(context.start[-1]), slope))
+        return replace(
+            arc,
+            center=np.append(arc.center, context.start[-1]),
+            outward=np.append(arc.outward, 0.0),
+            forward=np.append(arc.forward, 0.0),
+            slope=np.append(arc.slope, sense * arc.turn if tangent else 0.0),
+        )
     if tangent:
         raise context.wrong(
             "yaw is not a row of the task space",
@@ -276,51 +279,12 @@ def _with_yaw(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
     return arc
 
 
-@dataclass(frozen=True, eq=False)
-class HelixCurve:
-    """A circular arc that climbs along its axis, over its own length sigma.
-
-    Attributes
-    ----------
-    arc : ArcCurve
-        The projection along the axis.
-    rise : ndarray, shape (3,)
-        From start to end along the axis, m.
-    """
-
-    arc: ArcCurve
-    rise: Array
-
-    @property
-    def length(self) -> float:
-        """Length of the helix, m."""
-        return float(np.hypot(self.arc.length, np.linalg.norm(self.rise)))
-
-    @property
-    def normal(self) -> Array:
-        """Unit vector of the axis about which the helix turns."""
-        return self.arc.normal
-
-    @property
-    def knots(self) -> Array:
-        """Every quarter turn, as of the arc."""
-        return self.arc.knots * (self.length / self.arc.length)
-
-    def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the helix and its derivatives by sigma, shape (order + 1, K, 3)."""
-        part = self.arc.length / self.length
-        result = (
-            self.arc.derivatives(part * sigma, order)
-            * (part ** np.arange(order + 1))[:, None, None]
-        )
-        result[0] += (sigma / self.length)[:, None] * self.rise
-        result[1:2] += self.rise / self.length
-        return result
-
-
-def helix(shape: HelixTurns, context: SegmentContext) -> HelixCurve:
+def helix(shape: HelixTurns, context: SegmentContext) -> ArcCurve:
     """Return the climbing turns about an axis."""
     context.need_rows("a helix", 3)
     arc = _about_center(shape, 2 * np.pi * shape.turns, context)
     axis = np.asarray(shape.normal) / np.linalg.norm(shape.normal)
-    return HelixCurve(arc, abs(shape.turns) * shape.pitch * axis)
+    rise = abs(shape.turns) * shape.pitch * axis
+    length = float(np.hypot(arc.length, np.linalg.norm(rise)))
+    turn = arc.turn * arc.length / length
+    return replace(arc, length=length, turn=turn, slope=rise / length)

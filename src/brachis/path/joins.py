@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,19 +78,8 @@ class Join:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Corner:
-    """A join where curves do not continue each other.
-
-    Attributes
-    ----------
-    join : Join
-        Where.
-    found : str
-        What jumps, in words.
-    advice : str
-        What to try.
-    """
+class Corner(NamedTuple):
+    """A join where curves do not continue each other; what jumps, in words; what to try."""
 
     join: Join
     found: str
@@ -154,16 +144,15 @@ def refuse_corners(corners: Sequence[Corner]) -> None:
     """Raise a `PathError` for the first of the corners, naming the others, if there are any."""
     if not corners:
         return
-    corner = corners[0]
-    join = corner.join
-    others = ", ".join(other.join.blend_key for other in corners[1:])
+    join, found, advice = corners[0]
+    others = ", ".join(other.blend_key for other, *_ in corners[1:])
     raise PathError(
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
-        found=corner.found,
+        found=found,
         allowed="segments that continue each other, or a blend",
         where=join.where,
-        hint=corner.advice + (f"; likewise {others}" if others else ""),
+        hint=advice + (f"; likewise {others}" if others else ""),
     )
 
 

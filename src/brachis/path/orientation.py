@@ -11,7 +11,7 @@ import numpy as np
 from brachis.errors import PathError
 from brachis.path.blends import septic
 from brachis.path.context import ZERO_LENGTH, place
-from brachis.path.curves import ArcCurve, HelixCurve, LineCurve
+from brachis.path.curves import ArcCurve, LineCurve
 from brachis.path.pose import smallest
 from brachis.path.protocol import Array, Curve, Orientation
 from brachis.path.rotations import (
@@ -187,7 +187,7 @@ def orientation_along(
     up = np.array([0.0, 0.0, 1.0])
     if given is not None:
         up = np.array(given) / np.linalg.norm(given)
-    elif isinstance(curve, ArcCurve | HelixCurve):
+    elif isinstance(curve, ArcCurve):
         up = curve.normal
     return _with_tangent(curve, up, start, key)
 

@@ -49,31 +49,20 @@ def unit(vector: Array) -> Array:
     inverse = np.zeros_like(squared)
     inverse[0] = 1.0 / np.sqrt(squared[0])
     for k in range(len(vector) - 1):
-        right = (
-            sum(comb(k, i) * squared[i + 1] * inverse[k - i] for i in range(k + 1))
-            / -2.0
-        )
-        left = sum(
-            comb(k, i) * squared[i] * inverse[k + 1 - i] for i in range(1, k + 1)
-        )
-        inverse[k + 1] = (right - left) / squared[0]
+        first = sum(comb(k, i) * squared[i + 1] * inverse[k - i] for i in range(k + 1))
+        terms = (comb(k, i) * squared[i] * inverse[k + 1 - i] for i in range(1, k + 1))
+        inverse[k + 1] = (first / -2.0 - sum(terms)) / squared[0]
     return product(vector, inverse, "...i,...->...i")
 
 
 def sine_cosine(angle: Array) -> tuple[Array, Array]:
     """Return the derivatives of the sine and the cosine of an angle, shape (order + 1, ...)."""
-    sine = np.zeros_like(angle)
-    cosine = np.zeros_like(angle)
-    sine[0] = np.sin(angle[0])
-    cosine[0] = np.cos(angle[0])
+    both = np.zeros(angle.shape, dtype=complex)  # exp(i angle)
+    both[0] = np.exp(1j * angle[0])
     for k in range(len(angle) - 1):
-        sine[k + 1] = sum(
-            comb(k, i) * angle[i + 1] * cosine[k - i] for i in range(k + 1)
-        )
-        cosine[k + 1] = -sum(
-            comb(k, i) * angle[i + 1] * sine[k - i] for i in range(k + 1)
-        )
-    return sine, cosine
+        terms = (comb(k, i) * angle[i + 1] * both[k - i] for i in range(k + 1))
+        both[k + 1] = 1j * sum(terms)
+    return both.imag, both.real
 
 
 # Of the three axes, the matrices of the cross product: row i of that of axis k is axis i x axis k.

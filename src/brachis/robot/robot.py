@@ -419,27 +419,16 @@ class Robot(Summary):
             )
         return q
 
-    def place_joints(
-        self, q: np.ndarray, qdot: np.ndarray | None = None
-    ) -> Iterator[pin.Data]:
-        """Give Pinocchio's placements of all joints and of the tool frame, and velocities, posture after posture.
+    def place_joints(self, q: np.ndarray) -> Iterator[pin.Data]:
+        """Yield Pinocchio's placements of all joints and of the tool frame in postures (K, n), one after the other.
 
-        Parameters
-        ----------
-        q : (K, n) ndarray
-        qdot : (K, n) ndarray, optional
-
-        Yields
-        ------
-        pin.Data
-            One workspace for all: what is kept has to be copied.
+        They share one workspace: copy what you keep.
         """
         model = self.model
         data = model.createData()
         tool = self.frame_id
-        q = np.asarray(q, dtype=float)
-        for motion in zip(q, *([] if qdot is None else [qdot]), strict=True):
-            pin.forwardKinematics(model, data, *motion)
+        for posture in np.asarray(q, dtype=float):
+            pin.forwardKinematics(model, data, posture)
             pin.updateFramePlacement(model, data, tool)
             yield data
 

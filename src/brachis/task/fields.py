@@ -28,6 +28,7 @@ from typing import (
 )
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -55,11 +56,18 @@ LARGEST = 1e12
 
 
 class Model(BaseModel):
-    """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity."""
+    """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity.
+
+    The docstring below a field is its description in the documentation, the JSON schema and messages.
+    """
 
     # Instances are checked again, because a program can make limits that nobody has checked.
     model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always"
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        revalidate_instances="always",
+        use_attribute_docstrings=True,
     )
 
     if not TYPE_CHECKING:
@@ -201,6 +209,17 @@ def refuse(
     # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
     facts = {"key": key, "found": found, "allowed": allowed, "absent": absent}
     return PydanticCustomError(REFUSED, "{problem}", {"problem": problem, **facts})
+
+
+def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterValidator:
+    """Return what refuses values for which `holds` is false, and says what is wrong and what is allowed."""
+
+    def check(value: Any) -> Any:
+        if not holds(value):
+            raise refuse(problem, found=value, allowed=allowed)
+        return value
+
+    return AfterValidator(check)
 
 
 def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Unpack
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     field_validator,
@@ -36,6 +35,7 @@ from brachis.task.fields import (
     Number,
     Positive,
     Share,
+    must,
     plain,
     refuse,
 )
@@ -45,33 +45,22 @@ FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the URDF supplies it."""
 
 
-def _increasing(
-    pair: tuple[float | None, float | None],
-) -> tuple[float | None, float | None]:
-    low, high = pair
-    if low is not None and high is not None and low >= high:
-        raise refuse(
-            "the lower limit must be below the upper one",
-            found=pair,
-            allowed="[low, high] with low < high",
-        )
-    return pair
-
-
-Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increasing)]
-
-
-def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
-    if not pair[0] < 0.0 < pair[1]:
-        raise refuse(
-            "a pair of limits lies around zero",
-            found=pair,
-            allowed="[lower, upper] with lower < 0 < upper",
-        )
-    return pair
-
-
-_Pair = Annotated[tuple[Number, Number], AfterValidator(_around_zero)]
+Interval = Annotated[
+    tuple[Number | None, Number | None],
+    must(
+        lambda pair: None in pair or pair[0] < pair[1],
+        "the lower limit must be below the upper one",
+        "[low, high] with low < high",
+    ),
+]
+_Pair = Annotated[
+    tuple[Number, Number],
+    must(
+        lambda pair: pair[0] < 0.0 < pair[1],
+        "a pair of limits lies around zero",
+        "[lower, upper] with lower < 0 < upper",
+    ),
+]
 _Entry = Annotated[
     Positive | _Pair, ByForm("a number > 0, or a pair [lower, upper] around zero")
 ]
@@ -151,23 +140,14 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     2.0
     """
 
-    scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(
-        default_factory=LimitScale
-    )
-    total_power: Annotated[
-        Positive | None,
-        Field(
-            description="Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."
-        ),
-    ] = None
-    torque_speed: Annotated[
-        dict[Name, TorqueCurve | None] | None,
-        Field(
-            description="Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, "
-            "rad/s and N m at the joint (m/s, N), joined by a line that never rises; the last slope goes on to zero "
-            "torque. The same both ways, driving and braking. Absent or null: none."
-        ),
-    ] = None
+    scale: LimitScale = field(default_factory=LimitScale)
+    """Factors on the limits."""
+    total_power: Positive | None = None
+    """Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."""
+    torque_speed: dict[Name, TorqueCurve | None] | None = None
+    """Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, rad/s and N m at the
+    joint (m/s, N), joined by a line that never rises; the last slope goes on to zero torque. The same both ways,
+    driving and braking. Absent or null: none."""
 
     __pydantic_config__ = Model.model_config
 
@@ -201,12 +181,10 @@ class SpeedTable(Model):
     A step is two speeds at the same place; at the place itself the lower one of them holds.
     """
 
-    s: Annotated[_PathCoordinates, Field(min_length=1)] = Field(
-        description="Path coordinates, 0 to 1, ascending; the same one twice in a row is a step."
-    )
-    speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)] = Field(
-        description="Largest speed at each of them, m/s."
-    )
+    s: Annotated[_PathCoordinates, Field(min_length=1)]
+    """Path coordinates, 0 to 1, ascending; the same one twice in a row is a step."""
+    speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
+    """Largest speed at each of them, m/s."""
 
     @model_validator(mode="after")
     def _is_a_table(self) -> SpeedTable:
@@ -242,35 +220,26 @@ def _as_sequence(value: object) -> object:
     return value if isinstance(value, list) else [value]
 
 
-def _between(pair: tuple[float, float]) -> tuple[float, float]:
-    if not pair[0] < pair[1]:
-        raise refuse(
-            "the part of the path is empty",
-            found=pair,
-            allowed="[begin, end] with begin < end",
-        )
-    return pair
-
-
 class ProcessSpeed(Model):
     """A constant speed of the tool over a part of the path: what a glue nozzle or a laser needs."""
 
-    speed: Speed = Field(description="Speed of the tool frame's origin, m/s.")
+    speed: Speed
+    """Speed of the tool frame's origin, m/s."""
     s: Annotated[
         tuple[
             Annotated[Number, Field(ge=0.0, lt=1.0)],
             Annotated[Number, Field(gt=0.0, le=1.0)],
         ],
-        AfterValidator(_between),
-    ] = Field(
-        description="[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. "
-        "A part may begin or end with the path where boundary.start_speed or end_speed is its speed, or the motion is "
-        "periodic."
-    )
-    tolerance: Annotated[Share, Field(ge=1e-3, le=0.5)] = Field(
-        default=0.01,
-        description="Largest deviation either way, as a share of the speed: 1 %, or 0.01.",
-    )
+        must(
+            lambda pair: pair[0] < pair[1],
+            "the part of the path is empty",
+            "[begin, end] with begin < end",
+        ),
+    ]
+    """[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. A part may begin
+    or end with the path where boundary.start_speed or end_speed is its speed, or the motion is periodic."""
+    tolerance: Annotated[Share, Field(ge=1e-3, le=0.5)] = 0.01
+    """Largest deviation either way, as a share of the speed: 1 %, or 0.01."""
 
 
 class ToolLimits(Model):
@@ -279,30 +248,20 @@ class ToolLimits(Model):
     speed: Annotated[
         Speed | SpeedTable | None,
         ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
-    ] = Field(
-        default=None,
-        description="Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. "
-        "Null: none.",
-    )
-    feed: tuple[SpeedTable, ...] = Field(
-        default=(),
-        description="Tables of largest speeds over parts of the path, and none beyond their first and last places; "
-        "written by brachis from the feed rates of the path's points.",
-    )
-    acceleration: Speed | None = Field(
-        default=None, description="Largest acceleration, m/s^2. Null: none."
-    )
-    angular_speed: Speed | None = Field(
-        default=None,
-        description="Largest speed at which the tool turns, rad/s; its free roll does not count. Null: none.",
-    )
+    ] = None
+    """Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. Null: none."""
+    feed: tuple[SpeedTable, ...] = ()
+    """Tables of largest speeds over parts of the path, and none beyond their first and last places; written by brachis
+    from the feed rates of the path's points."""
+    acceleration: Speed | None = None
+    """Largest acceleration, m/s^2. Null: none."""
+    angular_speed: Speed | None = None
+    """Largest speed at which the tool turns, rad/s; its free roll does not count. Null: none."""
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
-    ] = Field(
-        default=(),
-        description="Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such, in order and "
-        "with a gap in between in which the speed may change.",
-    )
+    ] = ()
+    """Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such, in order and with a gap in
+    between in which the speed may change."""
 
     @field_validator("process_speed")
     @classmethod

@@ -30,12 +30,14 @@ from brachis.task.yaml_reader import read_yaml
 class LimitsFile(Model):
     """What a limits file says."""
 
-    brachis_limits: Literal[1] = Field(description="Version of the format.")
-    source: Name = Field(description="Where the figures are from.")
-    joints: NonEmpty[Name] = Field(description="The joints that the file limits.")
-    limits: LimitSpec = Field(
-        description="As robot.limits, without scale; a list is in the order of joints, one number holds for all."
-    )
+    brachis_limits: Literal[1]
+    """Version of the format."""
+    source: Name
+    """Where the figures are from."""
+    joints: NonEmpty[Name]
+    """The joints that the file limits."""
+    limits: LimitSpec
+    """As robot.limits, without scale; a list is in the order of joints, one number holds for all."""
 
 
 _ROS_KINDS = {
@@ -107,17 +109,12 @@ class RosJointLimits(Model):
 class RosLimitsFile(Model):
     """What a file ``joint_limits.yaml`` of MoveIt, of ros2_control or of Universal Robots says."""
 
-    joint_limits: Annotated[dict[Name, RosJointLimits], Field(min_length=1)] = Field(
-        description="Limits by joint: has_velocity_limits, max_velocity and so on."
-    )
-    default_velocity_scaling_factor: Annotated[Positive, Field(le=1)] = Field(
-        default=1.0,
-        description="Counts as limits.scale.velocity, where the task does not give it.",
-    )
-    default_acceleration_scaling_factor: Annotated[Positive, Field(le=1)] = Field(
-        default=1.0,
-        description="Counts as limits.scale.acceleration, where the task does not give it.",
-    )
+    joint_limits: Annotated[dict[Name, RosJointLimits], Field(min_length=1)]
+    """Limits by joint: has_velocity_limits, max_velocity and so on."""
+    default_velocity_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
+    """Counts as limits.scale.velocity, where the task does not give it."""
+    default_acceleration_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
+    """Counts as limits.scale.acceleration, where the task does not give it."""
 
     @property
     def joints(self) -> dict[str, RosJointLimits]:

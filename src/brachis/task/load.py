@@ -122,17 +122,10 @@ def with_keys(
     content: Mapping[str, Any], changes: Mapping[str, object]
 ) -> dict[str, Any]:
     """Return a task, not checked yet, with dotted keys set; `content` is left as it is."""
-    changed = _copy(content)
+    changed: Any = plain(content)
     for key, value in changes.items():
         set_key(changed, key, value)
     return changed
-
-
-def _copy(value: Any) -> Any:
-    """Copy mappings and lists, which are what `set_key` writes into, and nothing else."""
-    if isinstance(value, Mapping):
-        return {key: _copy(each) for key, each in value.items()}
-    return [_copy(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 Source = str | os.PathLike[str] | Mapping[str, object] | Task
@@ -299,15 +292,11 @@ def _with_start(task: Task, source: str) -> Task:
     if task.start != "free" or task.path_start is not None:
         return task
     place = task.start_place
-    first = task.path[0]
     changes: dict[str, object] = {"path_start": place}
     if task.task_space == "joints" and place is not None:
-        names = getattr(getattr(first, first.kind), "joints", None)
-        changes = {
-            "start": {
-                "joints": dict(zip(names, place, strict=True)) if names else place
-            }
-        }
+        names = getattr(task.path[0].shape, "joints", None)
+        posture = dict(zip(names, place, strict=True)) if names else place
+        changes = {"start": {"joints": posture}}
     try:
         return Task.model_validate(task.model_copy(update=changes))
     except ValidationError as error:

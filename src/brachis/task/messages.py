@@ -141,7 +141,9 @@ def _description_at(location: tuple[str | int, ...], model: type[Model]) -> str 
     models = _models_at(location[: location.index(last)], model)
     fields = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
     found = [field.description for field in fields if field and field.description]
-    return f"{last}: {found[0].removesuffix('.')}" if len(found) == 1 else None
+    if len(found) != 1:
+        return None
+    return f"{last}: {' '.join(found[0].split()).removesuffix('.')}"
 
 
 def _is_echo(detail: ErrorDetails) -> bool:

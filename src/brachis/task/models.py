@@ -25,6 +25,7 @@ from brachis.task.fields import (
     Name,
     NonEmpty,
     Number,
+    must,
     or_form,
     plain,
     refuse,
@@ -53,8 +54,6 @@ Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
-_MOST_SEGMENTS = 3000
-"""Segments of a path: with their blends about as many pieces as a motion can be verified on."""
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -62,30 +61,19 @@ def _expand_position(space: _Space) -> _Space:
     return POSITION_ROWS if space == "position" else space
 
 
-def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(names)) < len(names):
-        raise refuse("a name occurs twice", found=names, allowed="each name once")
-    return names
-
-
-def _yaw_last(rows: tuple[str, ...]) -> tuple[str, ...]:
-    if "yaw" in rows and (len(rows) != 3 or rows[-1] != "yaw"):
-        raise refuse(
-            "yaw needs exactly two position rows, and comes last",
-            found=rows,
-            allowed="for example [x, y, yaw]",
-        )
-    return rows
-
-
+_EACH_ONCE = must(
+    lambda names: len(set(names)) == len(names),
+    "a name occurs twice",
+    "each name once",
+)
+_YAW_LAST = must(
+    lambda rows: "yaw" not in rows or (len(rows) == 3 and rows[-1] == "yaw"),
+    "yaw needs exactly two position rows, and comes last",
+    "for example [x, y, yaw]",
+)
 TaskSpace = Annotated[
     Literal["position", "pose", "pose_free_roll", "joints"]
-    | Annotated[
-        tuple[Row, ...],
-        Field(min_length=1),
-        AfterValidator(_each_once),
-        AfterValidator(_yaw_last),
-    ],
+    | Annotated[NonEmpty[Row], _EACH_ONCE, _YAW_LAST],
     ByForm(_SPACE_FORMS),
     AfterValidator(_expand_position),
 ]
@@ -102,9 +90,8 @@ JointValues = Annotated[
 class Posture(Model):
     """A configuration of the robot."""
 
-    joints: JointValues = Field(
-        description="Joint positions, rad (m): in the order of the chain, or by joint name."
-    )
+    joints: JointValues
+    """Joint positions, rad (m): in the order of the chain, or by joint name."""
 
 
 PathStart = Annotated[
@@ -120,7 +107,7 @@ FreePosture = Annotated[
 
 
 RedundantJoints = Annotated[
-    Literal["auto"] | Annotated[tuple[Name, ...], AfterValidator(_each_once)],
+    Literal["auto"] | Annotated[tuple[Name, ...], _EACH_ONCE],
     ByForm("auto, or a list of joint names"),
 ]
 
@@ -156,87 +143,60 @@ class Task(Model):
     (('x', 'y'), ('j3',))
     """
 
-    brachis: Literal[1] = Field(description="Version of the task format.")
-    robot: RobotSettings = Field(
-        default_factory=RobotSettings, description="The robot."
+    brachis: Literal[1]
+    """Version of the task format."""
+    robot: RobotSettings = Field(default_factory=RobotSettings)
+    """The robot."""
+    start: FreePosture
+    """Configuration at the start of the path: {joints: ...}, or free, which needs path_start. A path of joints that
+    begins with a waypoint needs none."""
+    path_start: PathStart = None
+    """Where the path begins: a list of all rows of the task space (m, yaw in rad); of a pose {position: [x, y, z],
+    rpy_deg: [...]}, or another convention of an orientation. Null: where the start posture's tool is; otherwise a start
+    posture whose tool is elsewhere is refused. With start: free it must be given, unless the path begins with a
+    waypoint."""
+    end: FreePosture = "free"
+    """Configuration at the end of the path: free, or {joints: ...}. Where its tool is up to 1e-6 m or rad off the
+    path's end, the nearest posture on the path is taken; where it is farther off, it is refused."""
+    task_space: TaskSpace
+    """What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all of x, y, z); pose;
+    pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is one of all joints, in the
+    order of the chain (rad, m), and only its timing is planned."""
+    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)] = Field(
+        json_schema_extra=_add_forms_of_paths
     )
-    start: FreePosture = Field(
-        description="Configuration at the start of the path: {joints: ...}, or free, which needs path_start. A path of "
-        "joints that begins with a waypoint needs none."
-    )
-    path_start: PathStart = Field(
-        default=None,
-        description="Where the path begins: a list of all rows of the task space (m, yaw in rad); of a pose {position: "
-        "[x, y, z], rpy_deg: [...]}, or another convention of an orientation. Null: where the start posture's tool is; "
-        "otherwise a start posture whose tool is elsewhere is refused. With start: free it must be given, unless the "
-        "path begins with a waypoint.",
-    )
-    end: FreePosture = Field(
-        default="free",
-        description="Configuration at the end of the path: free, or {joints: ...}. Where its tool is up to 1e-6 m or "
-        "rad off the path's end, the nearest posture on the path is taken; where it is farther off, it is refused.",
-    )
-    task_space: TaskSpace = Field(
-        description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all "
-        "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
-        "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
-    )
-    path: Annotated[
-        tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)
-    ] = Field(
-        description="Segments of the path, in order; a list of points, all rows of the task space each, is the spline "
-        "through them that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame "
-        "of their own: {frame: NAME, segments: [...]}.",
-        json_schema_extra=_add_forms_of_paths,
-    )
-    frames: dict[Name, Placement] = Field(
-        default={},
-        description="Where frames such as those of workpieces are in the world: by name, {xyz: ..., rpy_deg: ...}.",
-    )
-    path_frame: Name | None = Field(
-        default=None,
-        description="The one of the frames in which path and path_start are given: points, directions, orientations. "
-        "Null: the world.",
-    )
-    boundary: BoundarySettings = Field(
-        default_factory=BoundarySettings,
-        description="Speeds at both ends, or a motion that goes round for ever.",
-    )
-    tool_limits: ToolLimits = Field(
-        default_factory=ToolLimits, description="Limits on the motion of the tool."
-    )
-    custom_limits: dict[Name, dict[str, JsonValue]] = Field(
-        default={},
-        description="Limits of kinds that installed packages add (see docs/own_limit.md): their parameters, by kind.",
-    )
-    redundant_joints: RedundantJoints = Field(
-        default="auto",
-        description="Joints that are free along the path; auto tries every choice that has a closed form. With "
-        "pose_free_roll the virtual joint tool_roll, which rolls the tool, is one of the robot's; it may be left out.",
-    )
-    branch: Name = Field(
-        default="auto",
-        description="Label of the branch of the closed form; auto: the start's, and all of them with start: free.",
-    )
-    search: SearchSettings = Field(
-        default_factory=SearchSettings, description="Search."
-    )
-    spline: SplineSettings = Field(
-        default_factory=SplineSettings, description="B-splines."
-    )
+    """Segments of the path, in order; a list of points, all rows of the task space each, is the spline through them
+    that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame of their own: {frame:
+    NAME, segments: [...]}."""
+    frames: dict[Name, Placement] = Field(default={})
+    """Where frames such as those of workpieces are in the world: by name, {xyz: ..., rpy_deg: ...}."""
+    path_frame: Name | None = None
+    """The one of the frames in which path and path_start are given: points, directions, orientations. Null: the world.
+    """
+    boundary: BoundarySettings = Field(default_factory=BoundarySettings)
+    """Speeds at both ends, or a motion that goes round for ever."""
+    tool_limits: ToolLimits = Field(default_factory=ToolLimits)
+    """Limits on the motion of the tool."""
+    custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
+    """Limits of kinds that installed packages add (see docs/own_limit.md): their parameters, by kind."""
+    redundant_joints: RedundantJoints = "auto"
+    """Joints that are free along the path; auto tries every choice that has a closed form. With pose_free_roll the
+    virtual joint tool_roll, which rolls the tool, is one of the robot's; it may be left out."""
+    branch: Name = "auto"
+    """Label of the branch of the closed form; auto: the start's, and all of them with start: free."""
+    search: SearchSettings = Field(default_factory=SearchSettings)
+    """Search."""
+    spline: SplineSettings = Field(default_factory=SplineSettings)
+    """B-splines."""
     solver: Annotated[SolverSettings, BeforeValidator(expand_solver_name)] = Field(
-        default_factory=SolverSettings,
-        description="Solver: its name, or a mapping.",
-        json_schema_extra=or_form({"type": "string"}),
+        default_factory=SolverSettings, json_schema_extra=or_form({"type": "string"})
     )
-    refinement: RefinementSettings = Field(
-        default_factory=RefinementSettings, description="Refinement."
-    )
-    strict: bool | None = Field(
-        default=None,
-        description="Whether implausible figures (degrees for rad, mm for m) are errors: true, all of them; false: all "
-        "are warnings; null: a start posture that looks like degrees is an error, the others are warnings.",
-    )
+    """Solver: its name, or a mapping."""
+    refinement: RefinementSettings = Field(default_factory=RefinementSettings)
+    """Refinement."""
+    strict: bool | None = None
+    """Whether implausible figures (degrees for rad, mm for m) are errors: true, all of them; false: all are warnings;
+    null: a start posture that looks like degrees is an error, the others are warnings."""
 
     @field_validator("brachis", mode="before")
     @classmethod

@@ -21,23 +21,20 @@ from pydantic import (
     model_validator,
 )
 
-from brachis.task.fields import ByForm, ByKey, Model, Number, refuse
+from brachis.task.fields import ByForm, ByKey, Model, Number, must, refuse
 from brachis.task.points.units import CONVENTIONS, choices
 
 Vector3 = tuple[Number, Number, Number]
 
 
-def _check_direction(vector: Vector3) -> Vector3:
-    if math.hypot(*vector) < 1e-9:
-        raise refuse(
-            "a direction cannot have zero length",
-            found=list(vector),
-            allowed="any other vector; its length is of no importance",
-        )
-    return vector
-
-
-Direction = Annotated[Vector3, AfterValidator(_check_direction)]
+Direction = Annotated[
+    Vector3,
+    must(
+        lambda vector: math.hypot(*vector) >= 1e-9,
+        "a direction cannot have zero length",
+        "any other vector; its length does not matter",
+    ),
+]
 Profile = Annotated[
     Literal["uniform", "smooth"],
     Field(
@@ -47,8 +44,8 @@ Profile = Annotated[
 ]
 
 
-def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | None:
-    length = 1.0 if quaternion is None else math.hypot(*quaternion)
+def _unit_length(quaternion: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*quaternion)
     if abs(length - 1.0) > 0.01:
         raise refuse(
             f"the quaternion's length is {length:.6g}",
@@ -59,7 +56,7 @@ def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | No
 
 
 _Quaternion = Annotated[
-    tuple[Number, Number, Number, Number] | None, AfterValidator(_unit_length)
+    tuple[Number, Number, Number, Number], AfterValidator(_unit_length)
 ]
 _DEGREES = "_deg"
 
@@ -87,8 +84,8 @@ class Attitude(Model):
         json_schema_extra=lambda schema: schema.update(oneOf=_ONE_OF)
     )
 
-    quaternion_wxyz: _Quaternion = _about("quaternion_wxyz")
-    quaternion_xyzw: _Quaternion = _about("quaternion_xyzw")
+    quaternion_wxyz: _Quaternion | None = _about("quaternion_wxyz")
+    quaternion_xyzw: _Quaternion | None = _about("quaternion_xyzw")
     rotation_vector: Vector3 | None = _about("rotation_vector")
     rpy_deg: Vector3 | None = _about("rpy")
     kuka_abc_deg: Vector3 | None = _about("kuka_abc")
@@ -117,15 +114,10 @@ class Attitude(Model):
     @property
     def convention_and_numbers(self) -> tuple[str, tuple[float, ...]]:
         """Name of the convention in `brachis.task.points.units`, and the numbers: quaternions, or angles in rad."""
-        key, values = next(
-            (key, value)
-            for key in Attitude.model_fields
-            if (value := getattr(self, key)) is not None
-        )
+        stated = self.model_dump(include=set(Attitude.model_fields))
+        ((key, values),) = stated.items()
         if key.endswith(_DEGREES):
-            return key.removesuffix(_DEGREES), tuple(
-                math.radians(angle) for angle in values
-            )
+            return key.removesuffix(_DEGREES), tuple(map(math.radians, values))
         return key, values
 
 
@@ -141,7 +133,8 @@ class Target(Attitude):
 class ToolPose(Attitude):
     """A place of the tool: its position, and its orientation in exactly one of these conventions."""
 
-    position: Vector3 = Field(description="x, y, z, m.")
+    position: Vector3
+    """x, y, z, m."""
 
     @model_validator(mode="before")
     @classmethod
@@ -176,45 +169,42 @@ class Transform(Protocol):
 class Rotation(Model):
     """A rotation about an axis."""
 
-    axis: Direction = Field(
-        description="Axis of the rotation, right-hand rule; any length but zero."
-    )
-    angle_deg: Number = Field(
-        description="Angle of the rotation, degrees, signed; it may exceed a turn."
-    )
-    frame: Literal["path", "tool"] = Field(
-        default="path",
-        description="Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's.",
-    )
+    axis: Direction
+    """Axis of the rotation, right-hand rule; any length but zero."""
+    angle_deg: Number
+    """Angle of the rotation, degrees, signed; it may exceed a turn."""
+    frame: Literal["path", "tool"] = "path"
+    """Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's."""
     profile: Profile = "uniform"
 
 
 class Tangent(Model):
     """Turning with the tangent."""
 
-    up: Direction | None = Field(
-        default=None,
-        description="Direction, in the path's frame, that the tool keeps its attitude to; not along the tangent. Null: "
-        "the axis of an arc or circle, z for other segments.",
-    )
+    up: Direction | None = None
+    """Direction, in the path's frame, that the tool keeps its attitude to; not along the tangent. Null: the axis of an
+    arc or circle, z for other segments."""
 
 
 class Rotate(Model):
     """The tool turns about an axis that stands still."""
 
-    rotate: Rotation = Field(description="The rotation.")
+    rotate: Rotation
+    """The rotation."""
 
 
 class TurnTo(Model):
     """The tool turns to an orientation, the shortest way."""
 
-    to: Target = Field(description="Orientation at the segment's end.")
+    to: Target
+    """Orientation at the segment's end."""
 
 
 class AlongTangent(Model):
     """The tool turns with the tangent."""
 
-    tangent: Tangent = Field(description="What the tool keeps its attitude to.")
+    tangent: Tangent
+    """What the tool keeps its attitude to."""
 
 
 Turning = Annotated[

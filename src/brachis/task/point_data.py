@@ -6,7 +6,6 @@ from math import degrees
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     Strict,
@@ -15,7 +14,16 @@ from pydantic import (
 )
 
 from brachis.errors import write_count
-from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
+from brachis.task.fields import (
+    Count,
+    Flag,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    must,
+    refuse,
+)
 from brachis.task.points.units import ANGLES, CONVENTIONS, LENGTHS, choices, quantity
 
 _LISTED = 10
@@ -30,7 +38,7 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
         number = quantity(value, units)
         if number is None:
             raise refuse(
-                "no quantity",
+                "not a quantity",
                 found=value,
                 allowed=f"a number with a unit ({', '.join(units)}), as {example}",
             )
@@ -63,83 +71,66 @@ Angle = Annotated[
 ]
 
 
-def _check_convention(word: str) -> str:
-    if word not in CONVENTIONS:
-        raise refuse(
-            "this convention of an orientation is not known",
-            found=word,
-            allowed=choices(),
-        )
-    return word
-
-
 OrientationWord = Annotated[
-    Name, AfterValidator(_check_convention), WithJsonSchema({"enum": list(CONVENTIONS)})
+    Name,
+    must(
+        CONVENTIONS.__contains__,
+        "this convention of an orientation is not known",
+        choices(),
+    ),
+    WithJsonSchema({"enum": list(CONVENTIONS)}),
 ]
 
 
 class FileUnits(Model):
     """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
 
-    length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = Field(
-        default=None, description="Of positions. Null: as the header says, else m."
-    )
-    angle: Literal["rad", "mrad", "deg"] | None = Field(
-        default=None,
-        description="Of yaw and orientations. Null: as the header says; else rad, but for roll, pitch and yaw and the "
-        "angles of KUKA, Staubli and Fanuc, whose unit must be stated.",
-    )
-    speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = (
-        Field(
-            default=None,
-            description="Of a column of feed rates. Null: as the header says, which then must.",
-        )
-    )
+    length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = None
+    """Of positions. Null: as the header says, else m."""
+    angle: Literal["rad", "mrad", "deg"] | None = None
+    """Of yaw and orientations. Null: as the header says; else rad, but for roll, pitch and yaw and the angles of KUKA,
+    Staubli and Fanuc, whose unit must be stated."""
+    speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = None
+    """Of a column of feed rates. Null: as the header says, which then must."""
 
 
 class FitTolerance(Model):
     """How far points may be from the path; numbers with their unit (0.05 mm, 0.1 deg), or in m and rad."""
 
-    position: Length = Field(description="Largest distance of a point from the path.")
-    orientation: Angle = Field(
-        default=ANGLES["deg"] / 10.0,
-        description="Largest angle between a given orientation, or yaw, and the path's. 0.1 deg unless given.",
-    )
-    corner: Length | None = Field(
-        default=None,
-        description="Largest distance of a point from the path where a corner is rounded. Null: `position`.",
-    )
+    position: Length
+    """Largest distance of a point from the path."""
+    orientation: Angle = ANGLES["deg"] / 10.0
+    """Largest angle between a given orientation, or yaw, and the path's. 0.1 deg unless given."""
+    corner: Length | None = None
+    """Largest distance of a point from the path where a corner is rounded. Null: `position`."""
+
+    @property
+    def at_corners(self) -> float:
+        """The largest distance where a corner is rounded, m."""
+        return self.corner or self.position
 
 
 class PointFile(Model):
     """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
 
-    file: Name = Field(
-        description="CSV file, or G-code (.nc, .ngc, .gcode, .tap), relative to the task file's folder; its first row "
-        "is where the segment starts."
-    )
-    relative: Flag = Field(
-        default=False,
-        description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
-        "along the axes of the path's frame, rotations in the tool frame.",
-    )
+    file: Name
+    """CSV file, or G-code (.nc, .ngc, .gcode, .tap), relative to the task file's folder; its first row is where the
+    segment starts."""
+    relative: Flag = False
+    """Whether the rows count from the first one, so that the path may start anywhere: displacements along the axes of
+    the path's frame, rotations in the tool frame."""
     orientation: OrientationWord | None = Field(
         default=None,
         description="What the columns of the orientation mean (task spaces of poses), where their names do not say "
         f"it: {', '.join(CONVENTIONS)}.",
     )
-    units: FileUnits = Field(
-        default_factory=FileUnits, description="Units of its numbers."
-    )
-    tolerance: FitTolerance | None = Field(
-        default=None,
-        description="How far the rows may be from the path, which is then a fit with as few knots as that takes; for "
-        "many rows, and for such as scatter. Null: the path passes all of them.",
-    )
-    corner: Literal["blend", "refuse"] = Field(
-        default="blend",
-        description="With a tolerance, what becomes of corners: rounded within the tolerance, or refused and listed.",
-    )
+    units: FileUnits = Field(default_factory=FileUnits)
+    """Units of its numbers."""
+    tolerance: FitTolerance | None = None
+    """How far the rows may be from the path, which is then a fit with as few knots as that takes; for many rows, and
+    for such as scatter. Null: the path passes all of them."""
+    corner: Literal["blend", "refuse"] = "blend"
+    """With a tolerance, what becomes of corners: rounded within the tolerance, or refused and listed."""
 
     @field_validator("corner", mode="before")
     @classmethod
@@ -156,47 +147,45 @@ class PointFile(Model):
 class FoundCorner(Model):
     """A corner of the points."""
 
-    row: Count = Field(description="Line of the file, or index, of the nearest point.")
-    angle: Number = Field(description="Change of direction, rad.")
-    distance: Number = Field(description="Along the path from its first point, m.")
-    blend: NonNegative = Field(description="What its blend takes from either side, m.")
+    row: Count
+    """Line of the file, or index, of the nearest point."""
+    angle: Number
+    """Change of direction, rad."""
+    distance: Number
+    """Along the path from its first point, m."""
+    blend: NonNegative
+    """What its blend takes from either side, m."""
 
 
 class FitReport(Model):
     """Where a curve comes from, and how near it is to the points; written by brachis."""
 
-    source: Name = Field(description="File, or what the points were given as.")
-    points: Count = Field(description="Number of points.")
-    length: NonNegative = Field(description="Length of the path, m.")
-    position_error: NonNegative = Field(
-        description="Largest distance of a point from the path, m, beside corners."
-    )
-    position_rms: NonNegative = Field(
-        description="Root mean square of the distances, m."
-    )
-    position_tolerance: NonNegative = Field(
-        description="What was allowed, m; 0 where all points are passed."
-    )
-    orientation_error: NonNegative = Field(
-        description="Largest angle between given and fitted orientation, rad."
-    )
-    orientation_tolerance: NonNegative = Field(description="What was allowed, rad.")
-    intervals: Count = Field(
-        description="Number of knot intervals of all curves of these points."
-    )
-    corners: tuple[FoundCorner, ...] = Field(
-        default=(), description="Corners, in order."
-    )
-    told: tuple[str, ...] = Field(
-        default=(), description="What was found out about the data."
-    )
-    doubt: str | None = Field(
-        default=None, description="What looks implausible in the data."
-    )
-    profile: tuple[tuple[Number, Number, Number], ...] = Field(
-        default=(),
-        description="Along the path, m: the largest distance, m, and angle, rad, of the points there.",
-    )
+    source: Name
+    """File, or what the points were given as."""
+    points: Count
+    """Number of points."""
+    length: NonNegative
+    """Length of the path, m."""
+    position_error: NonNegative = 0.0
+    """Largest distance of a point from the path, m, beside corners."""
+    position_rms: NonNegative = 0.0
+    """Root mean square of the distances, m."""
+    position_tolerance: NonNegative = 0.0
+    """What was allowed, m; 0 where all points are passed."""
+    orientation_error: NonNegative = 0.0
+    """Largest angle between given and fitted orientation, rad."""
+    orientation_tolerance: NonNegative = 0.0
+    """What was allowed, rad."""
+    intervals: Count
+    """Number of knot intervals of all curves of these points."""
+    corners: tuple[FoundCorner, ...] = ()
+    """Corners, in order."""
+    told: tuple[str, ...] = ()
+    """What was found out about the data."""
+    doubt: str | None = None
+    """What looks implausible in the data."""
+    profile: tuple[tuple[Number, Number, Number], ...] = ()
+    """Along the path, m: the largest distance, m, and angle, rad, of the points there."""
 
     def __str__(self) -> str:
         """Say it in one line, lengths in mm."""

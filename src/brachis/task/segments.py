@@ -17,7 +17,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     model_validator,
@@ -34,6 +33,7 @@ from brachis.task.fields import (
     Number,
     Positive,
     Vector,
+    must,
     refuse,
     required_keys,
 )
@@ -60,32 +60,22 @@ _SMOOTH = 3
 class BSplineCurve(Model):
     """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` makes one of a curve."""
 
-    degree: Annotated[Count, Field(ge=_SMOOTH + 1, le=15)] = Field(
-        default=5, description="Degree."
-    )
-    knots: Vector = Field(
-        description="Knots, ascending: the first and the last one degree + 1 times, others up to degree - 3 times; "
-        "in m along the curve, where blends and speeds are to be so."
-    )
-    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 2)] = (
-        Field(
-            description="Control points: all rows of the task space (m, yaw in rad); in task spaces of poses "
-            "x, y, z, or x, y, z, qw, qx, qy, qz, whose orientation is that of the quaternion divided by its length."
-        )
-    )
-    relative: Flag = Field(
-        default=False,
-        description="Whether the curve is moved to the segment's start, wherever that is; as for csv.",
-    )
+    degree: Annotated[Count, Field(ge=_SMOOTH + 1, le=15)] = 5
+    """Degree."""
+    knots: Vector
+    """Knots, ascending: the first and the last one degree + 1 times, others up to degree - 3 times; in m along the
+    curve, where blends and speeds are to be so."""
+    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 2)]
+    """Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or x, y, z, qw, qx,
+    qy, qz, whose orientation is that of the quaternion divided by its length."""
+    relative: Flag = False
+    """Whether the curve is moved to the segment's start, wherever that is; as for csv."""
     joints: JointOrder = None
-    speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = Field(
-        default=(),
-        description="Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in "
-        "between; elsewhere no speed is prescribed.",
-    )
-    fit: FitReport | None = Field(
-        default=None, description="What the curve was fitted to; written by brachis."
-    )
+    speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = ()
+    """Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in between;
+    elsewhere no speed is prescribed."""
+    fit: FitReport | None = None
+    """What the curve was fitted to; written by brachis."""
 
     @property
     def has_quaternions(self) -> bool:
@@ -158,49 +148,41 @@ def _as_list(value: object) -> object:
 Coordinates = Annotated[Vector, BeforeValidator(_as_list)]
 
 
-def _not_zero(turns: float) -> float:
-    if turns == 0:
-        raise refuse(
-            "a circle without turns has zero length",
-            found=turns,
-            allowed="a number other than 0",
-        )
-    return turns
+Turns = Annotated[
+    Number,
+    must(bool, "a circle without turns has zero length", "a number other than 0"),
+]
 
 
 class LineTo(Model):
     """A straight line to a point."""
 
-    to: Coordinates = Field(
-        description="End point: all rows of the task space (m, yaw in rad)."
-    )
+    to: Coordinates
+    """End point: all rows of the task space (m, yaw in rad)."""
 
 
 class LineBy(Model):
     """A straight line by a displacement."""
 
-    by: Coordinates = Field(
-        description="Displacement: all rows of the task space (m, yaw in rad)."
-    )
+    by: Coordinates
+    """Displacement: all rows of the task space (m, yaw in rad)."""
 
 
 class LineHeading(Model):
     """A straight line of given length and direction, in the plane of two position rows; yaw stays."""
 
-    length: NonNegative = Field(description="Length, m.")
-    angle_deg: Number = Field(
-        description="Direction, degrees, from the first towards the second position row."
-    )
+    length: NonNegative
+    """Length, m."""
+    angle_deg: Number
+    """Direction, degrees, from the first towards the second position row."""
 
 
 class ArcCenter(Model):
     """A circular arc about a centre."""
 
     center: Centre
-    angle_deg: Number = Field(
-        description="Swept angle, degrees, signed: positive from the first towards the second position row, "
-        "or about the normal."
-    )
+    angle_deg: Number
+    """Swept angle, degrees, signed: positive from the first towards the second position row, or about the normal."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -208,10 +190,10 @@ class ArcCenter(Model):
 class ArcVia(Model):
     """A circular arc through a point to another one."""
 
-    via: Vector = Field(
-        description="A point between start and end, m: the position rows, without yaw."
-    )
-    to: Vector = Field(description="End point, m: the position rows, without yaw.")
+    via: Vector
+    """A point between start and end, m: the position rows, without yaw."""
+    to: Vector
+    """End point, m: the position rows, without yaw."""
     yaw: Yaw = "fixed"
 
 
@@ -219,9 +201,8 @@ class CircleTurns(Model):
     """Whole or fractional turns about a centre."""
 
     center: Centre
-    turns: Annotated[Number, AfterValidator(_not_zero)] = Field(
-        default=1.0, description="Number of turns, signed as an arc's angle; not zero."
-    )
+    turns: Turns = 1.0
+    """Number of turns, signed as an arc's angle; not zero."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -230,46 +211,32 @@ class HelixTurns(Model):
     """Turns about an axis that climb along it, in three position rows."""
 
     center: Centre
-    turns: Annotated[Number, AfterValidator(_not_zero)] = Field(
-        default=1.0, description="Number of turns, signed about the normal; not zero."
-    )
-    pitch: Number = Field(
-        description="Climb of each turn along the normal, m; negative: against it."
-    )
-    normal: Direction = Field(
-        default=(0.0, 0.0, 1.0),
-        description="Axis of rotation; right-hand rule. Any length but zero.",
-    )
+    turns: Turns = 1.0
+    """Number of turns, signed about the normal; not zero."""
+    pitch: Number
+    """Climb of each turn along the normal, m; negative: against it."""
+    normal: Direction = (0.0, 0.0, 1.0)
+    """Axis of rotation; right-hand rule. Any length but zero."""
 
 
 class SplineThrough(Model):
     """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
-    through: NonEmpty[Coordinates] = Field(
-        description="Waypoints: all rows of the task space each (m, yaw in rad)."
-    )
-    orientations: tuple[Attitude, ...] | None = Field(
-        default=None,
-        description="Orientation of the tool at each waypoint (task spaces of poses). Null: the segment's "
-        "`orientation` says how the tool turns.",
-    )
-    relative: Flag = Field(
-        default=False,
-        description="Whether the waypoints are relative to the segment's start: displacements along the axes of the "
-        "path's frame, rotations in the tool frame.",
-    )
-    starts_at: Vector | None = Field(
-        default=None,
-        description="Where the waypoints expect the segment to start: all rows of the task space. A start that is "
-        "elsewhere (by more than 1e-4 m or rad) is refused; with `relative` it is what the waypoints are relative to.",
-    )
-    starts_oriented: Attitude | None = Field(
-        default=None,
-        description="As `starts_at`, the orientation of the tool; beside `orientations`.",
-    )
-    fit: FitReport | None = Field(
-        default=None, description="Where the waypoints come from; written by brachis."
-    )
+    through: NonEmpty[Coordinates]
+    """Waypoints: all rows of the task space each (m, yaw in rad)."""
+    orientations: tuple[Attitude, ...] | None = None
+    """Orientation of the tool at each waypoint (task spaces of poses). Null: the segment's `orientation` says how the
+    tool turns."""
+    relative: Flag = False
+    """Whether the waypoints are relative to the segment's start: displacements along the axes of the path's frame,
+    rotations in the tool frame."""
+    starts_at: Vector | None = None
+    """Where the waypoints expect the segment to start: all rows of the task space. A start that is elsewhere (by more
+    than 1e-4 m or rad) is refused; with `relative` it is what the waypoints are relative to."""
+    starts_oriented: Attitude | None = None
+    """As `starts_at`, the orientation of the tool; beside `orientations`."""
+    fit: FitReport | None = None
+    """Where the waypoints come from; written by brachis."""
     joints: JointOrder = None
 
     @model_validator(mode="before")
@@ -324,10 +291,8 @@ _POSITIONS = 3
 class SegmentModel(Model):
     """What all segments share."""
 
-    blend: Positive | None = Field(
-        default=None,
-        description="Rounds the corner at the END of this segment: metres taken from it and from the next one.",
-    )
+    blend: Positive | None = None
+    """Rounds the corner at the END of this segment: metres taken from it and from the next one."""
 
     def __add__(
         self, other: SegmentModel | tuple[SegmentModel, ...]
@@ -369,11 +334,9 @@ class SegmentModel(Model):
 class MovingSegment(SegmentModel):
     """What all segments share along which the position moves."""
 
-    orientation: OrientationMode = Field(
-        default=None,
-        description="How the tool turns along the segment (task spaces of poses): fixed, tangent, {rotate: ...}, "
-        "{to: ...} or {tangent: ...}. Null: fixed, or as a spline's `orientations` say.",
-    )
+    orientation: OrientationMode = None
+    """How the tool turns along the segment (task spaces of poses): fixed, tangent, {rotate: ...}, {to: ...} or
+    {tangent: ...}. Null: fixed, or as a spline's `orientations` say."""
 
 
 class LineSegment(MovingSegment):

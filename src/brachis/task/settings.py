@@ -28,13 +28,10 @@ from brachis.task.orientation import Vector3
 class Placement(Model):
     """Where a frame is in another one."""
 
-    xyz: Vector3 = Field(
-        default=(0.0, 0.0, 0.0), description="Position of the origin, m."
-    )
-    rpy_deg: Vector3 = Field(
-        default=(0.0, 0.0, 0.0),
-        description="Roll, pitch, yaw, degrees, as in a URDF: about the fixed x, then y, then z axis.",
-    )
+    xyz: Vector3 = (0.0, 0.0, 0.0)
+    """Position of the origin, m."""
+    rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw, degrees, as in a URDF: about the fixed x, then y, then z axis."""
 
     @model_validator(mode="before")
     @classmethod
@@ -58,28 +55,29 @@ class Placement(Model):
 class InertiaMatrix(Model):
     """Moments and products of inertia about the centre of mass, in the axes of the tool frame."""
 
-    ixx: NonNegative = Field(description="Moment, kg m^2.")
-    iyy: NonNegative = Field(description="Moment, kg m^2.")
-    izz: NonNegative = Field(description="Moment, kg m^2.")
-    ixy: Number = Field(
-        default=0.0, description="Product, kg m^2, with the sign that URDFs have."
-    )
-    ixz: Number = Field(default=0.0, description="Product, kg m^2.")
-    iyz: Number = Field(default=0.0, description="Product, kg m^2.")
+    ixx: NonNegative
+    """Moment, kg m^2."""
+    iyy: NonNegative
+    """Moment, kg m^2."""
+    izz: NonNegative
+    """Moment, kg m^2."""
+    ixy: Number = 0.0
+    """Product, kg m^2, with the sign that URDFs have."""
+    ixz: Number = 0.0
+    """Product, kg m^2."""
+    iyz: Number = 0.0
+    """Product, kg m^2."""
 
 
 class Payload(Model):
     """A rigid body that is held to the tool frame."""
 
-    mass: Positive = Field(description="kg.")
-    com: Vector3 = Field(
-        default=(0.0, 0.0, 0.0),
-        description="Centre of mass in the tool frame as the URDF has it, m.",
-    )
-    inertia: InertiaMatrix | None = Field(
-        default=None,
-        description="Moments about the centre of mass, axes of the tool frame. Null: a point mass.",
-    )
+    mass: Positive
+    """kg."""
+    com: Vector3 = (0.0, 0.0, 0.0)
+    """Centre of mass in the tool frame as the URDF has it, m."""
+    inertia: InertiaMatrix | None = None
+    """Moments about the centre of mass, axes of the tool frame. Null: a point mass."""
 
 
 _WORDS: Final = {
@@ -140,80 +138,52 @@ UrdfFriction = Annotated[
 class FrictionSettings(Model):
     """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
-    armature: PerJoint = Field(
-        default=0.0, description="Inertia of the drive seen at the joint, kg m^2 (kg)."
-    )
-    rotor_inertia: PerJoint = Field(
-        default=0.0,
-        description="Inertia of the rotor about its own axis, kg m^2. With gear_ratio it takes the place of armature, "
-        "which is rotor_inertia * gear_ratio^2.",
-    )
-    gear_ratio: PerJointPositive | None = Field(
-        default=None,
-        description="Turns of the rotor per turn of the joint (prismatic: rad per m). Null: none.",
-    )
-    viscous: UrdfFriction = Field(
-        default=FROM_URDF,
-        description="Viscous friction, N m s/rad (N s/m). Absent: URDF's damping. Null: none.",
-    )
-    coulomb: UrdfFriction = Field(
-        default=FROM_URDF,
-        description="Coulomb friction, N m (N). Absent: URDF's friction. Null: none.",
-    )
-    coulomb_velocity: PerJointPositive = Field(
-        default=0.01,
-        description="Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s).",
-    )
+    armature: PerJoint = 0.0
+    """Inertia of the drive seen at the joint, kg m^2 (kg)."""
+    rotor_inertia: PerJoint = 0.0
+    """Inertia of the rotor about its own axis, kg m^2. With gear_ratio it takes the place of armature, which is
+    rotor_inertia * gear_ratio^2."""
+    gear_ratio: PerJointPositive | None = None
+    """Turns of the rotor per turn of the joint (prismatic: rad per m). Null: none."""
+    viscous: UrdfFriction = FROM_URDF
+    """Viscous friction, N m s/rad (N s/m). Absent: URDF's damping. Null: none."""
+    coulomb: UrdfFriction = FROM_URDF
+    """Coulomb friction, N m (N). Absent: URDF's friction. Null: none."""
+    coulomb_velocity: PerJointPositive = 0.01
+    """Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s)."""
 
 
 class RobotSettings(Model):
     """The robot: its URDF and what the task adds to it."""
 
-    urdf: Name | None = Field(
-        default=None,
-        description="URDF file, relative to the task file's folder. Required in a task file.",
-    )
-    tool_frame: Name | None = Field(
-        default=None,
-        description="Frame that follows the path. Null: the only leaf link.",
-    )
-    tool_offset: Placement = Field(
-        default_factory=Placement,
-        description="Where the frame that follows the path is in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}.",
-    )
-    base_frame: Name | None = Field(
-        default=None,
-        description="First frame of the chain. Null: the root of the URDF.",
-    )
-    mounting: Mounting = Field(
-        default_factory=Placement,
-        description="Where the URDF's root link is in the world: floor, wall (its z axis along the world's x axis), "
-        "ceiling (upside down, about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame.",
-    )
-    gravity: tuple[Number, Number, Number] = Field(
-        default=(0.0, 0.0, -9.81), description="Gravity [x, y, z], m/s^2, world frame."
-    )
-    locked_joints: dict[Name, Number] = Field(
-        default={}, description="Joints that stay at a value, rad (m), by name."
-    )
-    payload: Payload | None = Field(
-        default=None, description="Rigid body held to the tool frame. Null: none."
-    )
-    limits_file: Name | None = Field(
-        default=None,
-        description="File of joint limits, relative to the task file's folder, such as a maker's, or MoveIt's "
-        "joint_limits.yaml. What limits says itself counts, joint by joint where it names joints. Null: none.",
-    )
-    limits: LimitSpec = Field(default_factory=LimitSpec, description="Joint limits.")
-    speed_override: Annotated[Share, Field(gt=0.0)] = Field(
-        default=1.0,
-        description="Factor on all joint velocity limits beside limits.scale, for example 50 %, or 0.5. The motion is "
-        "planned anew for the slower joints, and is not the same motion played more slowly; torque, acceleration and "
-        "tool limits stay what they are.",
-    )
-    friction: FrictionSettings = Field(
-        default_factory=FrictionSettings, description="Drive inertia and friction."
-    )
+    urdf: Name | None = None
+    """URDF file, relative to the task file's folder. Required in a task file."""
+    tool_frame: Name | None = None
+    """Frame that follows the path. Null: the only leaf link."""
+    tool_offset: Placement = Field(default_factory=Placement)
+    """Where the frame that follows the path is in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}."""
+    base_frame: Name | None = None
+    """First frame of the chain. Null: the root of the URDF."""
+    mounting: Mounting = Field(default_factory=Placement)
+    """Where the URDF's root link is in the world: floor, wall (its z axis along the world's x axis), ceiling (upside
+    down, about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame."""
+    gravity: tuple[Number, Number, Number] = (0.0, 0.0, -9.81)
+    """Gravity [x, y, z], m/s^2, world frame."""
+    locked_joints: dict[Name, Number] = Field(default={})
+    """Joints that stay at a value, rad (m), by name."""
+    payload: Payload | None = None
+    """Rigid body held to the tool frame. Null: none."""
+    limits_file: Name | None = None
+    """File of joint limits, relative to the task file's folder, such as a maker's, or MoveIt's joint_limits.yaml. What
+    limits says itself counts, joint by joint where it names joints. Null: none."""
+    limits: LimitSpec = Field(default_factory=LimitSpec)
+    """Joint limits."""
+    speed_override: Annotated[Share, Field(gt=0.0)] = 1.0
+    """Factor on all joint velocity limits beside limits.scale, for example 50 %, or 0.5. The motion is planned anew for
+    the slower joints, and is not the same motion played more slowly; torque, acceleration and tool limits stay what
+    they are."""
+    friction: FrictionSettings = Field(default_factory=FrictionSettings)
+    """Drive inertia and friction."""
 
 
 _VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}
@@ -226,39 +196,22 @@ Intervals = Annotated[
 class SplineSettings(Model):
     """The B-splines of the path coordinate and the redundant joints."""
 
-    degree: Count = Field(
-        default=3,
-        ge=2,
-        le=7,
-        description="Degree; 3 gives continuous torque, 4 continuous torque rate.",
-    )
-    intervals: Intervals = Field(
-        default="auto",
-        description="Number of knot intervals; auto halves those that lose most time until two rounds together gain "
-        "less than half the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
-    )
-    tolerance: Positive = Field(
-        default=1.0e-3,
-        le=0.1,
-        description="With intervals: auto, how near, as a fraction of t_E, the end time is to be to that of many.",
-    )
-    knots: Literal["uniform", "free"] = Field(
-        default="uniform",
-        description="Equal intervals, or their lengths as variables of the optimisation.",
-    )
-    shortest_interval: Positive = Field(
-        default=0.1,
-        lt=1.0,
-        description="With knots: free, the least length of an interval, in mean intervals; never less than 5e-5 t_E.",
-    )
-    rest: Literal["velocity", "full", "jerk"] = Field(
-        default="full",
-        description="What vanishes at both ends: velocity alone; velocity and acceleration (full); or velocity, "
-        "acceleration and jerk, and with them the rates of the torques (jerk; degree 4 at least).",
-    )
-    points_per_interval: Count = Field(
-        default=3, ge=1, le=100, description="Collocation points per knot interval."
-    )
+    degree: Count = Field(default=3, ge=2, le=7)
+    """Degree; 3 gives continuous torque, 4 continuous torque rate."""
+    intervals: Intervals = "auto"
+    """Number of knot intervals; auto halves those that lose most time until two rounds together gain less than half the
+    tolerance. A number plans sooner, and gives a slower motion; knots: free needs one."""
+    tolerance: Positive = Field(default=1.0e-3, le=0.1)
+    """With intervals: auto, how near, as a fraction of t_E, the end time is to be to that of many."""
+    knots: Literal["uniform", "free"] = "uniform"
+    """Equal intervals, or their lengths as variables of the optimisation."""
+    shortest_interval: Positive = Field(default=0.1, lt=1.0)
+    """With knots: free, the least length of an interval, in mean intervals; never less than 5e-5 t_E."""
+    rest: Literal["velocity", "full", "jerk"] = "full"
+    """What vanishes at both ends: velocity alone; velocity and acceleration (full); or velocity, acceleration and jerk,
+    and with them the rates of the torques (jerk; degree 4 at least)."""
+    points_per_interval: Count = Field(default=3, ge=1, le=100)
+    """Collocation points per knot interval."""
 
     @property
     def vanishing(self) -> int:
@@ -293,37 +246,22 @@ class SplineSettings(Model):
 class SearchSettings(Model):
     """The search over redundant joints, branches and initial guesses."""
 
-    effort: Literal["single", "fast", "thorough", "exhaustive"] = Field(
-        default="fast",
-        description="How far the search goes: single plans once, from the most promising guess, and goes on only if "
-        "that fails.",
-    )
-    guesses: Literal["lattice", "numeric"] = Field(
-        default="lattice",
-        description="Where initial guesses come from: a lattice of postures, or numeric inverse kinematics "
-        "from the start posture.",
-    )
-    jobs: Count = Field(
-        default=1,
-        ge=1,
-        description="Processes that plan at the same time; no more than there are processors are used.",
-    )
-    time_limit: Positive = Field(
-        default=60.0,
-        le=1e6,
-        description="Time from the call after which the best motion so far is returned, s; one that is not verified "
-        "where none is, a second later perhaps.",
-    )
-    seed: Count = Field(default=0, ge=0, description="Seed of what is drawn at random.")
-    least_motion: Flag = Field(
-        default=True,
-        description="Whether, of motions that are as fast as the fastest one to 1e-4, the calmest one is taken: that "
-        "with the least joint accelerations.",
-    )
-    slower: Share = Field(
-        default=0.0,
-        description="How much slower the calmest motion may be, for example 1 %, or 0.01.",
-    )
+    effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
+    """How far the search goes: single plans once, from the most promising guess, and goes on only if that fails."""
+    guesses: Literal["lattice", "numeric"] = "lattice"
+    """Where initial guesses come from: a lattice of postures, or numeric inverse kinematics from the start posture."""
+    jobs: Count = Field(default=1, ge=1)
+    """Processes that plan at the same time; no more than there are processors are used."""
+    time_limit: Positive = Field(default=60.0, le=1e6)
+    """Time from the call after which the best motion so far is returned, s; one that is not verified where none is, a
+    second later perhaps."""
+    seed: Count = Field(default=0, ge=0)
+    """Seed of what is drawn at random."""
+    least_motion: Flag = True
+    """Whether, of motions that are as fast as the fastest one to 1e-4, the calmest one is taken: that with the least
+    joint accelerations."""
+    slower: Share = 0.0
+    """How much slower the calmest motion may be, for example 1 %, or 0.01."""
 
     @model_validator(mode="after")
     def _slower_is_for_least_motion(self) -> Self:
@@ -340,44 +278,26 @@ class SearchSettings(Model):
 class SolverSettings(Model):
     """The solver of the optimisation problem and its bounds."""
 
-    name: Name = Field(
-        default="auto", description="Solver; auto takes the best one installed."
-    )
-    max_iterations: Count = Field(
-        default=300, ge=1, le=1_000_000, description="Largest number of iterations."
-    )
-    time_limit: Positive = Field(
-        default=20.0,
-        le=1e6,
-        description="Largest time of one solve, s; search.time_limit bounds the whole plan.",
-    )
-    tolerance: Positive = Field(
-        default=1.0e-6, description="Tolerance of the optimality conditions."
-    )
+    name: Name = "auto"
+    """Solver; auto takes the best one installed."""
+    max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
+    """Largest number of iterations."""
+    time_limit: Positive = Field(default=20.0, le=1e6)
+    """Largest time of one solve, s; search.time_limit bounds the whole plan."""
+    tolerance: Positive = 1.0e-6
+    """Tolerance of the optimality conditions."""
 
 
 class RefinementSettings(Model):
     """Adding collocation points until the limits hold in between them as well."""
 
-    tolerance: Positive = Field(
-        default=1.0e-4,
-        ge=1.0e-5,
-        le=0.01,
-        description="Largest relative violation of a limit, anywhere; of a position, beyond its range, in rad (m), or "
-        "in half ranges where these are shorter. What is less than 1e-5 the checks do not show.",
-    )
-    density: Count = Field(
-        default=10,
-        ge=10,
-        le=1000,
-        description="Grid points for checking limits, per collocation point.",
-    )
-    max_rounds: Count = Field(
-        default=10,
-        ge=0,
-        le=1000,
-        description="Largest number of rounds; 0 switches refinement off.",
-    )
+    tolerance: Positive = Field(default=1.0e-4, ge=1.0e-5, le=0.01)
+    """Largest relative violation of a limit, anywhere; of a position, beyond its range, in rad (m), or in half ranges
+    where these are shorter. What is less than 1e-5 the checks do not show."""
+    density: Count = Field(default=10, ge=10, le=1000)
+    """Grid points for checking limits, per collocation point."""
+    max_rounds: Count = Field(default=10, ge=0, le=1000)
+    """Largest number of rounds; 0 switches refinement off."""
 
 
 def expand_solver_name(solver: object) -> object:
@@ -388,21 +308,15 @@ def expand_solver_name(solver: object) -> object:
 class BoundarySettings(Model):
     """Speeds at both ends of the path, or a motion that goes round for ever."""
 
-    start_speed: NonNegative = Field(
-        default=0.0,
-        le=1e6,
-        description="Speed along the path at its start, m/s (rad/s where the position stands still; along a path of "
-        "joints the norm of their velocities). At an end in motion the redundant joints' velocities are free, and "
-        "spline.rest: full says that the speed begins, or ends, constant.",
-    )
-    end_speed: NonNegative = Field(
-        default=0.0, le=1e6, description="As start_speed, at the path's end."
-    )
-    periodic: Flag = Field(
-        default=False,
-        description="Whether a closed path is gone round for ever: posture, velocity and acceleration at its end are "
-        "those at its start (with spline.degree: 2 the acceleration jumps).",
-    )
+    start_speed: NonNegative = Field(default=0.0, le=1e6)
+    """Speed along the path at its start, m/s (rad/s where the position stands still; along a path of joints the norm of
+    their velocities). At an end in motion the redundant joints' velocities are free, and spline.rest: full says that
+    the speed begins, or ends, constant."""
+    end_speed: NonNegative = Field(default=0.0, le=1e6)
+    """As start_speed, at the path's end."""
+    periodic: Flag = False
+    """Whether a closed path is gone round for ever: posture, velocity and acceleration at its end are those at its
+    start (with spline.degree: 2 the acceleration jumps)."""
 
     @model_validator(mode="after")
     def _periodic_has_no_ends(self) -> Self:

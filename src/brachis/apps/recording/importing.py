@@ -26,8 +26,16 @@ from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace, Pose
 from brachis.robots import locate
-from brachis.task import FitTolerance, RobotSettings, Segment, Task, load_task
-from brachis.task.fitted import Wanted, segments_along
+from brachis.task import (
+    CsvSegment,
+    FitTolerance,
+    PointFile,
+    RobotSettings,
+    Segment,
+    Task,
+    load_task,
+)
+from brachis.task.fitted import segments_along
 from brachis.task.points.points import Points
 from brachis.trajectory import Recovered, Trajectory
 from brachis.trajectory.recovered import LARGEST, check_tolerance
@@ -238,16 +246,11 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Followed:
     values = task_map.values(q)
     chosen = _choose_evenly(length)
     share = 0.5 * tolerance  # the rest is for s over time, and between the points
-    wanted = Wanted(
-        "the recorded motion",
-        "path",
-        FitTolerance(position=share, orientation=share, corner=None),
-        "refuse",
-        relative=False,
-        orientation=None,
-    )
+    allowed = FitTolerance(position=share, orientation=share)
+    file = PointFile(file="the recorded motion", tolerance=allowed, corner="refuse")
+    points = _points(task_map, values[chosen], chosen)
     try:
-        segments = segments_along(_points(task_map, values[chosen], chosen), wanted)
+        segments = segments_along(points, CsvSegment(csv=file), "path")
     except TaskError as error:
         raise PathError(
             "the motion follows no smooth path within the tolerance",

@@ -290,7 +290,7 @@ def read_recording(
     _check_times(t, table, source)
     _check_angles(parts["q"], robot, units, source)
     notes = [
-        *table.told,
+        *table.notes,
         f"units: {', '.join(dict.fromkeys((time_unit, *position_units)))}",
     ]
     known = {i for i, _ in columns.values()}

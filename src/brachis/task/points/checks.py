@@ -1,20 +1,144 @@
-"""What is wrong with points: repetitions, spikes, other units; each named with its row."""
+"""What is wrong with points, with its row: repetitions, spikes, other units; and how much points scatter.
+
+Scatter is about a smooth curve, and matters by what it does to the curvature of a curve through all points.
+"""
 
 from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.errors import TaskError, write_count
-from brachis.task.points.points import Points, angles_between
-from brachis.task.points.scatter import Scatter
+from brachis.task.point_data import FitTolerance
+from brachis.task.points.points import (
+    QUATERNION,
+    Array,
+    Points,
+    angles_between,
+    shares_along,
+)
 
 SAME = 1e-9
 """What a path takes for standing still, m or rad."""
-_NAMED = 5
-_AROUND = 4
-_FACTOR = (900.0, 1100.0)
-_LARGEST = 100.0
-"""Paths of robots are shorter, m."""
+_MEDIANS = {1: 0.6745, 2: 1.1774, 3: 1.5382}
+"""Median distance from zero of normally distributed points, by their dimension, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Scatter of points.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation across the path, m; 0 where the points look smooth, or are too few to tell.
+    turning : float
+        Standard deviation of each component of their orientations, rad; of yaw; 0 as above.
+    spacing : float
+        Median distance of successive points, m.
+    decimals : int or None
+        Digits after the decimal point, of metres, to which all positions are rounded.
+    """
+
+    deviation: float
+    turning: float
+    spacing: float
+    decimals: int | None
+
+    def noisy(self, tolerance: FitTolerance) -> bool:
+        """Tell whether a curve through all points would follow scatter that counts beside a tolerance."""
+        return self.deviation > 0.0 or self.turning > 0.1 * tolerance.orientation
+
+    @property
+    def curvature(self) -> float:
+        """Standard deviation of the curvature of a curve through all points, 1/m, that scatter alone gives it."""
+        if not self.deviation:
+            return 0.0
+        # The second difference of white noise of standard deviation 1 has one of sqrt(6).
+        return 6.0**0.5 * self.deviation / self.spacing**2
+
+    def __str__(self) -> str:
+        """Say what the scatter looks like."""
+        spacing = f"at {1e3 * self.spacing:.3g} mm spacing"
+        rounding = np.inf if self.decimals is None else 10.0**-self.decimals
+        if rounding / 12.0**0.5 > self.deviation / 3.0 and np.isfinite(rounding):
+            return f"positions rounded to {rounding:g} m {spacing}"
+        return f"positions that scatter by {1e3 * self.deviation:.3g} mm (standard deviation) {spacing}"
+
+    def of_turning(self) -> str:
+        """Say what the scatter of orientations looks like."""
+        return f"orientations that scatter by {np.rad2deg(self.turning):.2g} deg (standard deviation)"
+
+
+def scatter_of(points: Points) -> Scatter:
+    """Estimate the scatter of points.
+
+    Each point is compared with the cubic through its two neighbours on either side, over chord lengths; of the
+    difference of positions counts what is across the path. Noise makes successive differences alternate, curvature
+    does not.
+    """
+    position = points.position
+    turning = points.turning
+    chords = points.steps
+    spacing = float(np.median(chords)) if len(chords) else 0.0
+    if len(points) < 20 or position.shape[1] not in (2, 3) or not spacing:
+        return Scatter(0.0, 0.0, spacing, None)
+    along = position[4:] - position[:-4]
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    away = _residuals(position, chords)
+    across = away - np.sum(away * along, axis=1)[:, None] * along
+    deviation = _deviation(across, _MEDIANS[position.shape[1] - 1])
+    of_turning = 0.0
+    if turning.shape[1]:
+        # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
+        dimension, whole = (3, 2.0) if turning.shape[1] == QUATERNION else (1, 1.0)
+        residuals = _residuals(turning, chords)
+        of_turning = whole * _deviation(residuals, _MEDIANS[dimension])
+    return Scatter(deviation, of_turning, spacing, decimals_of(position))
+
+
+def _deviation(residuals: Array, median_of_one: float) -> float:
+    """Return the standard deviation of residuals, (n, c), if they look like noise; zero where they do not."""
+    sizes = np.linalg.norm(residuals, axis=1)
+    median = float(np.median(sizes))
+    if median == 0.0:
+        return 0.0
+    clipped = (
+        residuals * np.minimum(1.0, 5.0 * median / np.maximum(sizes, 1e-300))[:, None]
+    )
+    correlation = float(np.sum(clipped[1:] * clipped[:-1]) / np.sum(clipped**2))
+    # It is -0.8 for white noise and 1 for a smooth curve.
+    return median / median_of_one if correlation < -0.25 else 0.0
+
+
+def decimals_of(position: Array) -> int | None:
+    """Return the number of decimals to which all values, m, are rounded; None where there are more than twelve."""
+    for decimals in range(13):
+        scaled = position * 10.0**decimals
+        rounding = 1e-9 * np.maximum(np.abs(scaled), 1e3)
+        if np.all(np.abs(scaled - np.rint(scaled)) < rounding):
+            return decimals
+    return None
+
+
+def _residuals(values: Array, chords: Array) -> Array:
+    """Return the differences of values, (n, c), from local cubics, (n - 4, c), scaled to the scatter of one value."""
+    count = len(values)
+    u = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-12 * chords.max()))])
+    inner = np.arange(2, count - 2)
+    neighbours = (-2, -1, 1, 2)
+    offsets = np.stack([u[inner + k] - u[inner] for k in neighbours])
+    weights = np.ones_like(offsets)
+    for i, j in itertools.permutations(range(4), 2):
+        weights[i] *= offsets[j] / (offsets[j] - offsets[i])
+    foreseen = sum(
+        weight[:, None] * values[inner + k]
+        for weight, k in zip(weights, neighbours, strict=True)
+    )
+    scale = np.sqrt(1.0 + np.sum(weights**2, axis=0))
+    return np.asarray((values[inner] - foreseen) / scale[:, None])
 
 
 def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
@@ -25,8 +149,7 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
     TaskError
         The position stands still while the tool turns, or throughout.
     """
-    steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
-    again = 1 + np.flatnonzero(steps < SAME)
+    again = 1 + np.flatnonzero(points.steps < SAME)
     turned = angles_between(points.turning[again], points.turning[again - 1])
     if np.any(turned > SAME):
         i = int(again[np.argmax(turned > SAME)])
@@ -47,10 +170,11 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
         )
     if not again.size:
         return points, ()
-    left_out = (
-        f"left out {write_count(len(again), 'row')} at the place of the row before"
+    count = write_count(len(again), "row")
+    rows = [str(row) for row in points.rows[again[:5]]] + ["..."] * (len(again) > 5)
+    return kept, (
+        f"left out {count} at the place of the row before: {points.row}s {', '.join(rows)}",
     )
-    return kept, (f"{left_out}: {points.row}s {_list_rows(points, again)}",)
 
 
 def refuse_repetitions(points: Points) -> None:
@@ -62,13 +186,11 @@ def refuse_repetitions(points: Points) -> None:
     ------
     TaskError
     """
-    still = bool(
-        np.all(np.linalg.norm(points.position - points.position[0], axis=1) < SAME)
-    )
+    away = np.linalg.norm(points.position - points.position[0], axis=1)
+    still = bool(np.all(away < SAME))
+    steps = points.steps
     if still:
         steps = angles_between(points.turning[1:], points.turning[:-1])
-    else:
-        steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
     if np.any(steps < SAME):
         i = 1 + int(np.argmax(steps < SAME))
         raise points.wrong(
@@ -95,17 +217,11 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
     here = position[1:-1]
     after = position[2:]
     side = after - before
-    share = np.clip(
-        np.sum((here - before) * side, axis=1)
-        / np.maximum(np.sum(side**2, axis=1), SAME**2),
-        0.0,
-        1.0,
-    )
+    share = shares_along(here, before, side)
     off = np.linalg.norm(here - before - share[:, None] * side, axis=1)
-    chords = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    windows = np.lib.stride_tricks.sliding_window_view(
-        np.pad(chords, _AROUND, mode="reflect"), 2 * _AROUND + 2
-    )
+    around = 4
+    chords = np.pad(points.steps, around, mode="reflect")
+    windows = np.lib.stride_tricks.sliding_window_view(chords, 2 * around + 2)
     usual = np.median(windows, axis=1)[: len(off)]
     allowed = np.maximum(4.0 * usual, max(15.0 * scatter.deviation, 2.0 * tolerance))
     i = int(np.argmax(off / allowed))
@@ -120,10 +236,10 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
         )
 
 
-def of_size(points: Points) -> str | None:
+def plausibility_note(points: Points) -> str | None:
     """Say that the whole path looks like mm where m are stated, or the other way round; None where it does not."""
     extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
-    if extent > _LARGEST:
+    if extent > 100.0:  # paths of robots are shorter
         return f"the path is {extent:.4g} m long and wide: mm for m? Set units: {{length: mm}}"
     if extent < 1e-4:
         return f"the path is {1e3 * extent:.4g} mm long and wide: m for mm? Set units: {{length: m}}"
@@ -135,11 +251,10 @@ def _refuse_factors(points: Points) -> None:
     sizes = np.linalg.norm(points.position, axis=1)
     ratios = sizes[1:] / np.maximum(sizes[:-1], SAME)
     growth = np.maximum(ratios, 1.0 / np.maximum(ratios, SAME))
-    steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
+    steps = points.steps
     far = steps > 20.0 * np.median(steps)
-    for i in np.flatnonzero(
-        far & (growth > _FACTOR[0]) & (growth < _FACTOR[1])
-    ).tolist():
+    by_thousand = far & (growth > 900.0) & (growth < 1100.0)
+    for i in np.flatnonzero(by_thousand).tolist():
         one = points.position[i]
         other = points.position[i + 1]
         small, large = (one, other) if ratios[i] > 1.0 else (other, one)
@@ -152,8 +267,3 @@ def _refuse_factors(points: Points) -> None:
                 allowed=f"near {points.describe(i)}",
                 hint="mm and m, or a lost decimal point? Write all rows in one unit",
             )
-
-
-def _list_rows(points: Points, indices: np.ndarray) -> str:
-    more = ", ..." if len(indices) > _NAMED else ""
-    return ", ".join(str(points.rows[i]) for i in indices[:_NAMED]) + more

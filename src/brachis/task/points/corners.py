@@ -1,8 +1,6 @@
-"""Corners of points: places where the direction changes at once, whatever the scale at which it is looked at.
+"""Corners of points: places where the direction changes at once, whatever the scale; the gaps and blends at them.
 
-Long straight ways between points: nothing else would hold a curve to them.
-
-How much of its neighbours a blend may take so that it stays near the corner that it rounds.
+Long straight ways between points get more points: nothing else would hold a curve to them.
 """
 
 from __future__ import annotations
@@ -14,19 +12,12 @@ import numpy as np
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import write_count
-from brachis.task.points.least_squares import lengths_along
+from brachis.task.points.checks import Scatter
+from brachis.task.points.fit import lengths_along
 from brachis.task.points.points import QUATERNION, Array, Indices, Points
-from brachis.task.points.scatter import Scatter
 
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
-_CERTAIN = np.deg2rad(50.0)
-"""A polygon that turns by this much from one side to the next is not a smooth curve."""
-_SHARP = 1.5
-"""Over twice the distance a smooth curve turns by twice the angle, a corner by the same one."""
-_DIRECTION = 0.02
-"""rad: what scatter may do to a direction."""
-_NOTHING = 1e-24
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +61,17 @@ def find_corners(
     noisy = scatter.deviation > 0.0
     u = lengths_along(points.position, scatter.deviation)
     spacing = u[-1] / (len(points) - 1)
-    for_direction = (12.0 * spacing * (scatter.deviation / _DIRECTION) ** 2) ** (
-        1.0 / 3.0
-    )
-    width = max(for_direction, 2.0 * tolerance)
+    direction = 0.02  # rad: what scatter may do to a direction
+    for_direction = 12.0 * spacing * (scatter.deviation / direction) ** 2
+    width = max(for_direction ** (1.0 / 3.0), 2.0 * tolerance)
     least = 4 if noisy else 1
-    angle, doubt = _turning(points.position, u, width, least)
+    angle, uncertainty = _turning(points.position, u, width, least)
     wide, _ = _turning(points.position, u, 2.0 * width, 2 * least)
-    sharp = (wide > 0.0) & (wide < _SHARP * angle) | (angle > _CERTAIN)
-    sharp &= angle > np.maximum(LEAST_ANGLE, 8.0 * scatter.deviation * doubt)
+    # Over twice the distance a smooth curve turns by twice the angle, a corner by the same one.
+    sharp = (wide > 0.0) & (wide < 1.5 * angle)
+    # A polygon that turns by this much from one side to the next is not a smooth curve.
+    sharp |= angle > np.deg2rad(50.0)
+    sharp &= angle > np.maximum(LEAST_ANGLE, 8.0 * scatter.deviation * uncertainty)
     peaks = _peaks(angle, sharp, u, width, least)
     return tuple(
         _locate(points, u, i, float(angle[i]), width, least, tolerance / 4.0)
@@ -93,47 +86,32 @@ def _turning(
 
     Beside it stands the standard deviation that points which scatter by 1 m give it, (n,), rad.
     """
-    count = len(u)
-    index = np.arange(count)
-    first = np.clip(np.minimum(np.searchsorted(u, u - width), index - least), 0, None)
-    last = np.clip(
-        np.maximum(np.searchsorted(u, u + width, side="right") - 1, index + least),
-        None,
-        count - 1,
-    )
-    (before, doubt), (after, other) = (
-        _directions(position, u, *ends) for ends in ((first, index), (index, last))
-    )
-    crossing = (
-        np.linalg.norm(before - after, axis=1),
-        np.linalg.norm(before + after, axis=1),
-    )
-    angle = 2.0 * np.arctan2(*crossing)
-    angle[(index < least) | (index >= count - least)] = 0.0
-    return angle, np.hypot(doubt, other)
+    index = np.arange(len(u))
+    last = len(u) - 1
+    begins = np.minimum(np.searchsorted(u, u - width), index - least)
+    ends = np.maximum(np.searchsorted(u, u + width, side="right") - 1, index + least)
+    before, uncertainty = _directions(position, u, np.clip(begins, 0, last), index)
+    after, other = _directions(position, u, index, np.clip(ends, 0, last))
+    apart = np.linalg.norm(before - after, axis=1)
+    angle = 2.0 * np.arctan2(apart, np.linalg.norm(before + after, axis=1))
+    angle[(index < least) | (index > last - least)] = 0.0
+    return angle, np.hypot(uncertainty, other)
 
 
 def _directions(
     position: Array, u: Array, first: Indices, last: Indices
 ) -> tuple[Array, Array]:
-    """Return unit vectors along the lines that fit points `first` to `last`, (n, p), and their doubts, (n,)."""
-    moment = np.hstack(
-        [
-            np.ones((len(u), 1)),
-            u[:, None],
-            u[:, None] ** 2,
-            position,
-            u[:, None] * position,
-        ]
-    )
-    sums = np.concatenate([np.zeros((1, moment.shape[1])), np.cumsum(moment, axis=0)])
+    """Return unit vectors along lines that fit points `first` to `last`, (n, p), and how uncertain they are, (n,)."""
+    at = u[:, None]
+    moment = np.hstack([np.ones_like(at), at, at**2, position, at * position])
+    sums = np.cumsum(np.pad(moment, ((1, 0), (0, 0))), axis=0)
     part = sums[last + 1] - sums[first]
     dimension = position.shape[1]
     count = part[:, :1]
-    mean = part[:, 1:2] / part[:, :1]
-    spread = np.maximum(part[:, 2:3] - count * mean**2, _NOTHING)
+    mean = part[:, 1:2] / count
+    spread = np.maximum(part[:, 2:3] - count * mean**2, 1e-24)
     slope = (part[:, 3 + dimension :] - mean * part[:, 3 : 3 + dimension]) / spread
-    sizes = np.maximum(np.linalg.norm(slope, axis=1), _NOTHING)
+    sizes = np.maximum(np.linalg.norm(slope, axis=1), 1e-24)
     return slope / sizes[:, None], 1.0 / np.sqrt(spread[:, 0])
 
 
@@ -159,34 +137,29 @@ def _locate(
     It is the point where nothing scatters and the points before it, and those after it, lead there, but for `off`, m.
     """
     position = points.position
-    sides = []
     here = Corner(i, i, i + 1, angle, position[i])
-    from_before, from_after = (
-        _continues(position, u, i, sign, off) for sign in (-1, 1)
-    )
+    from_before = _continues(position, u, i, -1, off)
+    from_after = _continues(position, u, i, 1, off)
     if least == 1 and from_before == from_after:
         return here
-    for sign in (-1.0, 1.0):
+    sides = []
+    for sign in (-1, 1):
         away = sign * (u - u[i])
         side = np.flatnonzero((away > 0.3 * width) & (away < 2.0 * width))
         if len(side) <= least:
-            side = np.clip(
-                i + int(sign) * np.arange(1, 1 + max(least, 2)), 0, len(u) - 1
-            )
-        along = (
-            np.polyfit(u[side], position[side], 1)[0]
-            if np.ptp(u[side])
-            else sign * (position[side[0]] - position[i])
-        )
+            side = i + sign * np.arange(1, 1 + max(least, 2))
+            side = np.clip(side, 0, len(u) - 1)
+        along = sign * (position[side[0]] - position[i])
+        if np.ptp(u[side]):
+            along = np.polyfit(u[side], position[side], 1)[0]
         sides.append((position[side].mean(axis=0), along / np.linalg.norm(along)))
     (one, a), (other, b) = sides
     steps, *_ = np.linalg.lstsq(np.stack([a, -b], axis=1), other - one, rcond=None)
     place = (one + steps[0] * a + other + steps[1] * b) / 2.0
     gap = u[min(i + 1, len(u) - 1)] - u[max(i - 1, 0)]
     after = float((position[i] - place) @ (a + b)) > 0.0
-    if np.linalg.norm(place - position[i]) > max(width, gap) or (
-        least == 1 and after != from_after
-    ):
+    far = np.linalg.norm(place - position[i]) > max(width, gap)
+    if far or (least == 1 and after != from_after):
         return here
     return Corner(i, i + (not after), i + (not after), angle, place)
 
@@ -204,25 +177,20 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
     for k in side:
         others = side[side != k]
         foreseen += position[k] * np.prod((u[i] - u[others]) / (u[k] - u[others]))
-    return bool(
-        np.linalg.norm(foreseen - position[i])
-        <= max(off, 0.03 * abs(u[side[0]] - u[i]))
-    )
-
-
-_LONG = 5.0
+    allowed = max(off, 0.03 * abs(u[side[0]] - u[i]))
+    return bool(np.linalg.norm(foreseen - position[i]) <= allowed)
 
 
 def fill_gaps(points: Points) -> tuple[Points, tuple[str, ...]]:
     """Put points on the straight ways that are five times longer than usual, and say how many ways there are."""
-    chords = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
+    chords = points.steps
     usual = float(np.median(chords))
-    long = chords > _LONG * usual
+    times = 5.0
+    long = chords > times * usual
     if len(points) < 20 or not np.any(long):
         return points, ()
-    counts = np.where(
-        long, np.minimum(np.ceil(chords / (2.0 * usual)), 200), 1.0
-    ).astype(int)
+    parts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
+    counts = np.where(long, parts, 1.0).astype(int)
     before = np.repeat(np.arange(len(chords)), counts)
     firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     shares = ((np.arange(len(before)) - firsts[before] + 1) / counts[before])[:, None]
@@ -232,26 +200,12 @@ def fill_gaps(points: Points) -> tuple[Points, tuple[str, ...]]:
         return np.concatenate([values[:1], between])
 
     turning = fill(points.turning)
-    speed = (
-        None
-        if points.speed is None
-        else np.concatenate([points.speed[:1], points.speed[before + 1]])
-    )
-    rows = np.concatenate([points.rows[:1], points.rows[before + 1]])
-    turning = with_like_signs(turning) if turning.shape[1] == QUATERNION else turning
+    if turning.shape[1] == QUATERNION:
+        turning = with_like_signs(turning)
     ways = write_count(int(np.count_nonzero(long)), "way")
-    told = f"taken as straight: {ways} longer than {_LONG:g} times the usual spacing"
-    return replace(
-        points,
-        position=fill(points.position),
-        turning=turning,
-        speed=speed,
-        rows=rows,
-    ), (told,)
-
-
-_MIDDLE = 11.0 / 64.0
-"""Weight of the first derivatives, of opposite signs, in the middle of the septic polynomial between two points."""
+    note = f"taken as straight: {ways} longer than {times:g} times the usual spacing"
+    rows = points.only(np.append(0, before + 1))
+    return replace(rows, position=fill(points.position), turning=turning), (note,)
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:
@@ -269,5 +223,5 @@ def blend_size(angle: float, distance: float, shortest: float) -> float:
     shortest : float
         Length of the shorter neighbour, m.
     """
-    of_size = 2.0 * sin(angle / 2.0) * (0.5 - _MIDDLE * (1.0 + cos(angle / 2.0)))
+    of_size = 2.0 * sin(angle / 2.0) * (0.5 - 11.0 / 64.0 * (1.0 + cos(angle / 2.0)))
     return min(distance / of_size, 0.45 * shortest)

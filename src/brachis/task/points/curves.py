@@ -1,25 +1,21 @@
-"""From points to curves: checks, corners, a fit between every two of them, and a report.
-
-The points between two corners, and their fit.
-
-Speeds along a fitted curve, from those of its points.
-
-What a fit says of itself.
-"""
+"""From points to curves: checks, corners, a fit between every two of them with its speeds, and a report."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from brachis.errors import TaskError
-from brachis.task.point_data import FitReport, FoundCorner
+from brachis.task.point_data import FitReport, FitTolerance, FoundCorner
 from brachis.task.points.checks import (
-    of_size,
+    Scatter,
+    plausibility_note,
     refuse_repetitions,
     refuse_spikes,
+    scatter_of,
     without_repetitions,
 )
 from brachis.task.points.corners import (
@@ -28,20 +24,19 @@ from brachis.task.points.corners import (
     fill_gaps,
     find_corners,
 )
-from brachis.task.points.fit import deviations, fit_points
-from brachis.task.points.least_squares import Fit, Tolerance
+from brachis.task.points.fit import Fit, deviations, fit_points
 from brachis.task.points.points import Array, Points
-from brachis.task.points.scatter import Scatter, scatter_of
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_SHARPEST = np.deg2rad(150.0)
+Run = tuple[tuple[float, float], ...]
+"""A table (sigma, speed), m and m/s, linear in between."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """Points from one corner to the next.
+class FittedCurve:
+    """A curve from one corner to the next.
 
     Attributes
     ----------
@@ -52,6 +47,8 @@ class Stretch:
     fit : Fit
     distances, angles : ndarray
         How far the given points are from the curve, m and rad.
+    blend : float or None
+        What the blend at its end takes from it and from the next curve, m; None at the last one.
     """
 
     points: Points
@@ -59,6 +56,12 @@ class Stretch:
     fit: Fit
     distances: Array
     angles: Array
+    blend: float | None = None
+
+    @property
+    def spline(self) -> BSpline:
+        """Position, m, and turning as in `Points`, over about the arc length, m."""
+        return self.fit.spline
 
     @property
     def length(self) -> float:
@@ -70,58 +73,59 @@ class Stretch:
         """Where the given points are."""
         return self.fit.sigma[self.given]
 
+    @property
+    def speeds(self) -> tuple[Run, ...]:
+        """Tables of the speeds that are prescribed along it."""
+        return speed_runs(self.fit.sigma, self.points.speed)
 
-def fit_between(
+
+def _fit_between(
     points: Points,
     corners: tuple[Corner, ...],
-    tolerance: Tolerance,
+    tolerance: FitTolerance,
     scatter: Scatter,
-    doubt: str | None = None,
-) -> list[Stretch]:
-    """Cut points at their corners and fit a curve to each stretch.
+    note: str | None,
+) -> list[FittedCurve]:
+    """Cut points at their corners and fit a curve between every two of them.
 
-    `doubt` says what looks implausible in the points; it is the hint of the error.
+    `note` says what looks implausible in the points; it is the hint of the error.
 
     Raises
     ------
     TaskError
         The path turns back, or no smooth curve lies within the tolerance.
     """
-    for sharp in corners:
-        if sharp.angle > _SHARPEST:
+    for corner in corners:
+        degrees = np.rad2deg(corner.angle)
+        if degrees > 150.0:
             raise points.wrong(
-                sharp.index,
-                f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees",
-                found=points.describe(sharp.index),
+                corner.index,
+                f"the path turns back, by {degrees:.4g} degrees",
+                found=points.describe(corner.index),
                 allowed="corners up to 150 degrees",
                 hint="A path that stops there is for two tasks",
             )
-    starts = [None, *corners]
-    ends = [*corners, None]
-    stretches = []
-    for start, end in zip(starts, ends, strict=True):
-        given = np.arange(
-            0 if start is None else start.after,
-            len(points) if end is None else end.before,
-        )
-        before, after = (
-            [] if corner is None else [corner.index] for corner in (start, end)
-        )
-        whole = points.only(np.concatenate([before, given, after]).astype(int))
+    curves = []
+    for start, end in pairwise([None, *corners, None]):
+        before = [start.index] if start else []
+        after = [end.index] if end else []
+        first = start.after if start else 0
+        rows = range(first, end.before if end else len(points))
+        given = slice(len(before), len(before) + len(rows))
+        whole = points.only([*before, *rows, *after])
         position = whole.position.copy()
-        for corner, row in ((start, 0), (end, -1)):
-            if corner is not None:
-                position[row] = corner.place
+        for at_end, row in ((start, 0), (end, -1)):
+            if at_end is not None:
+                position[row] = at_end.place
         whole = replace(whole, position=position)
-        chosen = slice(len(before), len(before) + len(given))
-        fit = _fit_one(whole, tolerance, scatter, doubt)
+        fit = _fit_one(whole, tolerance, scatter, note)
         distances, angles = _measure_deviations(whole, fit, tolerance)
-        stretches.append(Stretch(whole, chosen, fit, distances[chosen], angles[chosen]))
-    return stretches
+        curves.append(FittedCurve(whole, given, fit, distances[given], angles[given]))
+    return curves
 
 
 def _measure_deviations(
-    points: Points, fit: Fit, tolerance: Tolerance
+    points: Points, fit: Fit, tolerance: FitTolerance
 ) -> tuple[Array, Array]:
     """Return distances and angles of points from their fit, by another formula than the fit's.
 
@@ -148,8 +152,8 @@ def _measure_deviations(
     return distances, angles
 
 
-def blend_between(
-    first: Stretch, second: Stretch, corner: Corner, tolerance: Tolerance
+def _blend_between(
+    first: FittedCurve, second: FittedCurve, corner: Corner, tolerance: FitTolerance
 ) -> float:
     """Return the size of the blend that keeps all points near a corner within the tolerance, m.
 
@@ -158,28 +162,26 @@ def blend_between(
     TaskError
         The points leave no room.
     """
-    corner_at = first.points.describe(len(first.points) - 1)
-    wrong = first.points.wrong
     shortest = min(first.length, second.length)
-    widest = blend_size(corner.angle, tolerance.corner, shortest)
+    widest = blend_size(corner.angle, tolerance.at_corners, shortest)
     taken = max(
         float(first.distances[first.sigma > first.length - widest].max(initial=0.0)),
         float(second.distances[second.sigma < widest].max(initial=0.0)),
     )
-    left = tolerance.corner - taken
-    if left < 0.05 * tolerance.corner:
-        raise wrong(
+    left = tolerance.at_corners - taken
+    if left < 0.05 * tolerance.at_corners:
+        raise first.points.wrong(
             -1,
             f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance",
-            found=f"points {1e3 * taken:.3g} mm from the fit at {corner_at}",
-            allowed=f"{1e3 * tolerance.corner:.3g} mm",
+            found=f"points {1e3 * taken:.3g} mm from the fit at {first.points.describe(-1)}",
+            allowed=f"{1e3 * tolerance.at_corners:.3g} mm",
             hint="Give a larger tolerance.corner",
         )
     return blend_size(corner.angle, left, shortest)
 
 
 def _fit_one(
-    points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str | None
+    points: Points, tolerance: FitTolerance, scatter: Scatter, note: str | None
 ) -> Fit:
     """Fit one curve.
 
@@ -195,40 +197,32 @@ def _fit_one(
             "no smooth curve follows these points",
             found=f"{error}, from {points.describe(0)}",
             allowed="points that move on from each to the next",
-            hint=doubt or "Does the path turn back, or stand still, near there?",
+            hint=note or "Does the path turn back, or stand still, near there?",
         ) from error
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
     if ratios[i] <= 1.0 + 1e-6:
         return fit
-    of_turning = bool(fit.position_errors[i] <= tolerance.position)
-    hint = "Is the row as it should be?"
-    if of_turning:
-        angles = np.rad2deg([fit.turning_errors[i], tolerance.orientation])
-        found, allowed = (f"{angle:.3g} deg" for angle in angles)
-        hint = f"The data are {scatter.of_turning()}" if scatter.turning else hint
-    else:
-        found, allowed = (
-            f"{1e3 * value:.3g} mm"
-            for value in (fit.position_errors[i], tolerance.position)
-        )
-        wanted = 6.0 * scatter.deviation
-        more = (
-            f"; give a tolerance of {1e3 * wanted:.2g} mm or more"
-            if wanted > tolerance.position
-            else ""
-        )
-        hint = f"The data are {scatter}{more}" if scatter.deviation else hint
+    kind = "position"
+    found = f"{1e3 * fit.position_errors[i]:.3g} mm"
+    allowed = f"{1e3 * tolerance.position:.3g} mm"
+    looks = str(scatter) if scatter.deviation else ""
+    wanted = 6.0 * scatter.deviation
+    if looks and wanted > tolerance.position:
+        looks += f"; give a tolerance of {1e3 * wanted:.2g} mm or more"
+    if fit.position_errors[i] <= tolerance.position:
+        kind = "orientation"
+        found = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
+        allowed = f"{np.rad2deg(tolerance.orientation):.3g} deg"
+        looks = scatter.of_turning() if scatter.turning else ""
+    hint = f"The data are {looks}" if looks else "Is the row as it should be?"
     raise points.wrong(
         i,
-        f"no smooth curve is within the tolerance of {'orientation' if of_turning else 'position'}",
+        f"no smooth curve is within the tolerance of {kind}",
         found=f"{found} at {points.describe(i)}",
         allowed=allowed,
-        hint=doubt or hint,
+        hint=note or hint,
     )
-
-
-Run = tuple[tuple[float, float], ...]
 
 
 def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
@@ -249,9 +243,8 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     sigma = np.maximum.accumulate(sigma)
     ways = speed[1:]
     given = np.isfinite(ways)
-    edges = np.flatnonzero(
-        np.diff(np.concatenate([[False], given, [False]]).astype(int))
-    )
+    changes = np.diff(given.astype(int), prepend=0, append=0)
+    edges = np.flatnonzero(changes)
     runs = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         of_way = ways[first:last]
@@ -263,53 +256,16 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     return tuple(runs)
 
 
-def profile_of(
-    along: Array, distances: Array, angles: Array
-) -> tuple[tuple[float, float, float], ...]:
-    """Return the largest errors of successive groups of points, at most a few hundred groups."""
-    starts = np.unique(
-        np.linspace(0, len(along), min(len(along), 400), endpoint=False).astype(int)
-    )
-    largest = (
-        np.maximum.reduceat(values, starts).tolist()
-        for values in (along, distances, angles)
-    )
-    return tuple(zip(*largest, strict=True))
-
-
-_ROUGH = 0.5
-"""Of the curvature that scatter makes times the length of the path."""
-
-
-@dataclass(frozen=True, eq=False)
-class FittedCurve:
-    """A curve between two corners.
-
-    Attributes
-    ----------
-    spline : BSpline
-        Position, m, and turning as in `Points`, over about the arc length, m.
-    blend : float or None
-        What the blend at its end takes from it and from the next curve, m; None at the last one.
-    speeds : tuple of Run
-        Tables of (sigma, speed), m and m/s.
-    """
-
-    spline: BSpline
-    blend: float | None
-    speeds: tuple[Run, ...]
-
-
 def fit_curves(
-    points: Points, tolerance: Tolerance, told: tuple[str, ...] = ()
+    points: Points, tolerance: FitTolerance, notes: tuple[str, ...] = ()
 ) -> tuple[tuple[FittedCurve, ...], FitReport]:
     """Return smooth curves within a tolerance of points, and what was found.
 
     Parameters
     ----------
     points : Points
-    tolerance : Tolerance
-    told : tuple of str, optional
+    tolerance : FitTolerance
+    notes : tuple of str, optional
         What was found out before.
 
     Raises
@@ -322,85 +278,58 @@ def fit_curves(
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = fill_gaps(points)
-    corners = find_corners(points, scatter, tolerance.corner)
-    doubt = of_size(points)
-    stretches = fit_between(points, corners, tolerance, scatter, doubt)
-    blends = [
-        blend_between(first, second, corner, tolerance)
-        for first, second, corner in zip(
-            stretches, stretches[1:], corners, strict=False
+    corners = find_corners(points, scatter, tolerance.at_corners)
+    note = plausibility_note(points)
+    curves = _fit_between(points, corners, tolerance, scatter, note)
+    starts = np.cumsum([0.0, *(curve.length for curve in curves)]).tolist()
+    found = []
+    for i, corner in enumerate(corners):
+        blend = _blend_between(curves[i], curves[i + 1], corner, tolerance)
+        curves[i] = replace(curves[i], blend=blend)
+        row = int(points.rows[corner.index])
+        found.append(
+            FoundCorner(
+                row=row, angle=corner.angle, distance=starts[i + 1], blend=blend
+            )
         )
-    ]
-    curves = tuple(
-        FittedCurve(
-            stretch.fit.spline,
-            blend,
-            speed_runs(stretch.fit.sigma, stretch.points.speed),
-        )
-        for stretch, blend in zip(stretches, [*blends, None], strict=True)
-    )
-    report = _report(
-        stretches, tolerance, points=count, source=points.source, doubt=doubt
-    )
-    found = zip(
-        corners,
-        np.cumsum([stretch.length for stretch in stretches]),
-        blends,
-        strict=False,
-    )
-    told = (*told, *repeated, *filled, *((str(scatter),) if scatter.deviation else ()))
-    remarks = tuple(
-        FoundCorner(
-            row=int(points.rows[corner.index]),
-            angle=corner.angle,
-            distance=float(distance),
-            blend=blend,
-        )
-        for corner, distance, blend in found
-    )
-    return curves, report.model_copy(update={"corners": remarks, "told": told})
-
-
-def _report(
-    stretches: list[Stretch],
-    tolerance: Tolerance,
-    *,
-    points: int,
-    source: str,
-    doubt: str | None,
-) -> FitReport:
-    """Report on all stretches, but for their corners and what was told."""
-    starts = np.cumsum([0.0, *(stretch.length for stretch in stretches)])
-    along = np.concatenate(
-        [
-            start + stretch.sigma
-            for start, stretch in zip(starts, stretches, strict=False)
-        ]
-    )
-    distances = np.concatenate([stretch.distances for stretch in stretches])
-    angles = np.concatenate([stretch.angles for stretch in stretches])
-    return FitReport(
-        source=source,
-        points=points,
-        length=float(starts[-1]),
+    sigmas = [start + curve.sigma for start, curve in zip(starts, curves, strict=False)]
+    along = np.maximum.accumulate(np.concatenate(sigmas))
+    distances = np.concatenate([curve.distances for curve in curves])
+    angles = np.concatenate([curve.angles for curve in curves])
+    report = FitReport(
+        source=points.source,
+        points=count,
+        length=starts[-1],
         position_error=float(distances.max()),
         position_rms=float(np.sqrt(np.mean(distances**2))),
         position_tolerance=tolerance.position,
         orientation_error=float(angles.max()),
         orientation_tolerance=tolerance.orientation,
-        intervals=sum(len(stretch.fit.breaks) - 1 for stretch in stretches),
-        doubt=doubt,
-        profile=profile_of(np.maximum.accumulate(along), distances, angles),
+        intervals=sum(len(curve.fit.breaks) - 1 for curve in curves),
+        corners=tuple(found),
+        told=(*notes, *repeated, *filled, *[str(scatter)] * (scatter.deviation > 0.0)),
+        doubt=note,
+        profile=_profile(along, distances, angles),
     )
+    return tuple(curves), report
 
 
-def check_interpolation(points: Points, told: tuple[str, ...] = ()) -> FitReport:
+def _profile(*columns: Array) -> tuple[Any, ...]:
+    """Return the largest values of columns in successive groups of rows, at most a few hundred groups."""
+    count = len(columns[0])
+    groups = np.linspace(0, count, min(count, 400), endpoint=False).astype(int)
+    starts = np.unique(groups)
+    largest = [np.maximum.reduceat(values, starts).tolist() for values in columns]
+    return tuple(zip(*largest, strict=True))
+
+
+def check_interpolation(points: Points, notes: tuple[str, ...] = ()) -> FitReport:
     """Return what is said of a curve through all points, after a check that its curvature is not that of their scatter.
 
     Parameters
     ----------
     points : Points
-    told : tuple of str, optional
+    notes : tuple of str, optional
         What was found out before.
 
     Raises
@@ -411,12 +340,13 @@ def check_interpolation(points: Points, told: tuple[str, ...] = ()) -> FitReport
     refuse_repetitions(points)
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, 0.0)
-    length = float(np.linalg.norm(np.diff(points.position, axis=0), axis=1).sum())
-    if scatter.curvature * length > _ROUGH:
+    length = float(points.steps.sum())
+    largest = 0.5  # of the curvature that scatter makes times the length
+    if scatter.curvature * length > largest:
         raise TaskError(
             "the points are too rough for a curve through all of them: its curvature would be noise",
             found=f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves",
-            allowed=f"less than {_ROUGH / length:.2g} 1/m",
+            allowed=f"less than {largest / length:.2g} 1/m",
             where=points.source,
             hint=f"Give a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}",
         )
@@ -424,12 +354,7 @@ def check_interpolation(points: Points, told: tuple[str, ...] = ()) -> FitReport
         source=points.source,
         points=len(points),
         length=length,
-        position_error=0.0,
-        position_rms=0.0,
-        position_tolerance=0.0,
-        orientation_error=0.0,
-        orientation_tolerance=0.0,
         intervals=len(points) - 1,
-        told=told,
-        doubt=of_size(points),
+        told=notes,
+        doubt=plausibility_note(points),
     )

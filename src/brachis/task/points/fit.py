@@ -1,65 +1,216 @@
-"""A smooth curve within a tolerance of points, with few knots.
+"""A smooth curve within a tolerance of points, with few knots; and how far points are from it, by another formula.
 
 The curve is a quintic B-spline, C4, through the first and the last point; of all with the same knots it has the least
 sum of squared distances. Intervals in which the tolerance is exceeded are halved; then knots that are not needed are
 taken away, and fewer ones spread in the same proportion are tried.
 
-How far points are from a fitted curve, by a formula that the fit does not use.
-
-The curve is drawn as a polygon of many sides. Stretch by stretch of the points, the nearest of its corners to each is
-found in a k-d tree of those that lie near where the stretch before ended: a path may cross itself, or go round several
-times. The nearest place on the two sides at this corner is a place on the curve, to which distance and angle are taken.
-Where the fit took the point to be is not known here.
+For the distances the curve is drawn as a polygon of many sides. Stretch by stretch of the points, the nearest of its
+corners to each is found in a k-d tree of those near where the stretch before ended: a path may cross itself, or
+go round several times. The nearest place on the two sides at this corner is a place on the curve, to which distance and
+angle are taken. Where the fit took the point to be is not known here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.task.points.least_squares import (
-    DEGREE,
-    Fit,
-    Tolerance,
-    clamp_knots,
-    fit_over,
-    lengths_along,
-    measure,
-    over_arc_length,
+from brachis.task.point_data import FitTolerance
+from brachis.task.points.checks import Scatter
+from brachis.task.points.points import (
+    Array,
+    Points,
+    angles_between,
+    shares_along,
+    steps_of,
 )
-from brachis.task.points.points import Array, Points, angles_between
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-    from brachis.task.points.scatter import Scatter
-
-_FEW = DEGREE + 1
-_SAMPLE = 8_000
-"""Points that are looked at while knots are added."""
+DEGREE = 5
+"""Of all fitted curves: C4 at their knots."""
 _NOISY_POINTS = 10
 """Least number of points in an interval where points scatter: with fewer a curve would follow the scatter."""
-_INTERPOLATED = 2_000
-"""Most points that are interpolated where no fewer knots will do."""
 
 
-def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A B-spline near points.
+
+    Attributes
+    ----------
+    spline : BSpline
+        Position and turning over sigma from 0 on, about the arc length, m.
+    breaks : (N + 1,) ndarray
+        Its knots, each once.
+    sigma : (n,) ndarray
+        For every point, the nearest place on the curve.
+    position_errors : (n,) ndarray
+        Distances, m.
+    turning_errors : (n,) ndarray
+        Angles there, rad.
+    """
+
+    spline: BSpline
+    breaks: Array
+    sigma: Array
+    position_errors: Array
+    turning_errors: Array
+
+    def ratios(self, tolerance: FitTolerance) -> Array:
+        """Return for every point how much of the tolerance it takes, (n,)."""
+        turning = self.turning_errors / tolerance.orientation
+        return np.maximum(self.position_errors / tolerance.position, turning)
+
+    def worst(self, tolerance: FitTolerance) -> Array:
+        """Return the largest of `ratios` in every interval, (N,)."""
+        worst = np.zeros(len(self.breaks) - 1)
+        np.maximum.at(worst, self.intervals, self.ratios(tolerance))
+        return worst
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """The interval of every point, (n,)."""
+        return np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
+
+
+def _fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
+    """Return the spline with given knots whose squared distances from the points are least; it passes both ends.
+
+    Parameters
+    ----------
+    points : Points
+    sigma : (n,) ndarray
+        Where on the curve the points are, roughly; their nearest places are then looked for.
+    breaks : (N + 1,) ndarray
+        Knots.
+
+    Raises
+    ------
+    ValueError, LinAlgError
+        The knots are too dense for the points.
+    """
+    from scipy.interpolate import BSpline, make_lsq_spline
+
+    order = np.argsort(sigma, kind="stable")
+    columns = points.columns
+    weights = np.ones(len(points))
+    weights[[0, -1]] = 1e3
+    origin = columns[0]
+    length = float(breaks[-1])
+    knots = _clamp_knots(breaks / length)
+    inside = np.clip(sigma[order] / length, 0.0, 1.0)
+    spline = make_lsq_spline(
+        inside, columns[order] - origin, knots, k=DEGREE, w=weights[order]
+    )
+    if not np.isfinite(spline.c).all():
+        raise ValueError("the knots are too dense for the points")
+    control_points = spline.c + origin
+    control_points[[0, -1]] = columns[[0, -1]]
+    spline = BSpline(knots * length, control_points, DEGREE)
+    return _measure(points, spline, breaks, sigma)
+
+
+def _clamp_knots(breaks: Array) -> Array:
+    """Return the knots of a spline of the degree of all fits, with the ends repeated."""
+    return np.pad(breaks, DEGREE, mode="edge")
+
+
+def _measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fit:
+    """Return the fit with the places on the curve that are nearest to the points, by Newton steps from `sigma`."""
+    dimension = points.position.shape[1]
+    position = _position_of(spline, dimension)
+    slope = position.derivative()
+    sigma = sigma.copy()
+    # Of a path that winds, a first rough curve is near points of other windings, too: these are not for the taking.
+    far = 0.02 * (breaks[-1] - breaks[0])
+    low = np.maximum(sigma - far, breaks[0])
+    high = np.minimum(sigma + far, breaks[-1])
+    for _ in range(2):
+        tangent = slope(sigma)
+        along = np.sum((points.position - position(sigma)) * tangent, axis=1)
+        sigma += along / np.maximum(np.sum(tangent**2, axis=1), 1e-12)
+        np.clip(sigma, low, high, out=sigma)
+        sigma[[0, -1]] = breaks[[0, -1]]
+    values = spline(sigma)
+    distances = np.linalg.norm(values[:, :dimension] - points.position, axis=1)
+    angles = angles_between(values[:, dimension:], points.turning)
+    return Fit(spline, breaks, sigma, distances, angles)
+
+
+def _position_of(spline: BSpline, dimension: int) -> BSpline:
+    return type(spline)(spline.t, spline.c[:, :dimension], spline.k)
+
+
+def _over_arc_length(fit: Fit, dimension: int) -> tuple[Array, Array]:
+    """Return the points' places and the knots, measured by the arc length of the fitted position instead of sigma."""
+    parts = [np.linspace(a, b, 17) for a, b in pairwise(fit.breaks)]
+    fine = np.unique(parts)
+    middle = (fine[1:] + fine[:-1]) / 2.0
+    slope = _position_of(fit.spline, dimension).derivative()
+    speed, between = (np.linalg.norm(slope(at), axis=1) for at in (fine, middle))
+    steps = np.diff(fine) * (speed[:-1] + 4.0 * between + speed[1:]) / 6.0
+    lengths = np.cumsum(np.append(0.0, steps))
+    return np.interp(fit.sigma, fine, lengths), np.interp(fit.breaks, fine, lengths)
+
+
+def lengths_along(position: Array, deviation: float) -> Array:
+    """Return the length along the path at each of n positions, (n, p), m; strictly ascending from zero.
+
+    Where the points scatter, it is that of the polygon through the means of blocks of points, so long that the scatter
+    of the means is small beside it.
+    """
+    count = len(position)
+    block = _block(position, deviation)
+    if block == 1:
+        return np.cumsum(np.append(0.0, np.maximum(steps_of(position), 1e-9)))
+    edges = np.arange(0, count + 1, block)
+    edges[-1] = count
+    moved = np.pad(position - position[0], ((1, 0), (0, 0)))
+    sums = np.cumsum(moved, axis=0)
+    sizes = np.diff(edges)[:, None]
+    means = position[0] + np.diff(sums[edges], axis=0) / sizes
+    centres = (edges[:-1] + edges[1:] - 1) / 2.0
+    corners = np.concatenate([position[:1], means, position[-1:]])
+    chords = np.maximum(steps_of(corners), 1e-9)
+    index = np.concatenate([[-0.5], centres, [count - 0.5]])
+    at_index = np.cumsum(np.append(0.0, chords))
+    lengths = np.interp(np.arange(count), index, at_index)
+    return np.asarray(lengths - lengths[0])
+
+
+def _block(position: Array, deviation: float) -> int:
+    """Return how many points are averaged: twice as many until the blocks are far apart beside the scatter."""
+    count = len(position)
+    block = 1
+    while deviation > 0.0 and 8 * block < count:
+        step = float(np.median(steps_of(position[::block])))
+        if step > 20.0 * deviation / block**0.5:
+            break
+        block *= 2
+    return block
+
+
+def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
     """Return a curve within the tolerance of points, or the one that is nearest to it.
 
     Parameters
     ----------
     points : Points
         At least two; the position moves from each to the next.
-    tolerance : Tolerance
+    tolerance : FitTolerance
     scatter : Scatter
         Of the points.
     """
     sigma = lengths_along(points.position, scatter.deviation)
-    if len(points) < _FEW:
+    if len(points) <= DEGREE:
         return _polynomial(points, sigma)
-    every = -(-len(points) // _SAMPLE)
+    every = -(-len(points) // 8_000)  # points that are looked at while knots are added
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
     noisy = scatter.noisy(tolerance)
     dimension = points.position.shape[1]
@@ -72,7 +223,7 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
     )
     if rough is None:
         return _interpolate(points, sigma)
-    places, breaks = over_arc_length(rough, dimension)
+    places, breaks = _over_arc_length(rough, dimension)
     sigma = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
     fit = _add_knots(points, sigma, breaks, tolerance, noisy=noisy)
     if fit is not None and fit.ratios(tolerance).max() <= 1.0:
@@ -81,7 +232,7 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
         )
     return (
         _interpolate(points, sigma)
-        if fit is None or (not noisy and len(points) <= _INTERPOLATED)
+        if fit is None or (not noisy and len(points) <= 2_000)
         else fit
     )
 
@@ -94,14 +245,14 @@ def _first_breaks(points: Points, sigma: Array) -> Array:
 
 
 def _add_knots(
-    points: Points, sigma: Array, breaks: Array, tolerance: Tolerance, *, noisy: bool
+    points: Points, sigma: Array, breaks: Array, tolerance: FitTolerance, *, noisy: bool
 ) -> Fit | None:
     """Halve the intervals in which the tolerance is exceeded, until none is or none can be; None where no fit is."""
     least = _NOISY_POINTS if noisy else 1
     fit = None
     for _ in range(40):
         try:
-            fit = fit_over(points, sigma, breaks)
+            fit = _fit_over(points, sigma, breaks)
         except (ValueError, np.linalg.LinAlgError):
             return fit
         bad = fit.worst(tolerance) > 1.0
@@ -114,7 +265,7 @@ def _add_knots(
     return fit
 
 
-def _remove_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
+def _remove_knots(points: Points, fit: Fit, tolerance: FitTolerance) -> Fit:
     """Take knots away, many at a time, as long as all points stay within the tolerance."""
     needed = np.empty(0)
     for _ in range(12):
@@ -122,13 +273,13 @@ def _remove_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
         if not removed.size:
             break
         left = np.setdiff1d(fit.breaks, removed)
-        trial = fit_over(points, fit.sigma, left)
+        trial = _fit_over(points, fit.sigma, left)
         back = removed[_near_bad(left, trial.worst(tolerance) > 1.0, removed)]
         if back.size:
             needed = np.append(needed, back)
             if len(back) == len(removed):
                 continue
-            trial = fit_over(points, fit.sigma, np.union1d(left, back))
+            trial = _fit_over(points, fit.sigma, np.union1d(left, back))
             if trial.ratios(tolerance).max() > 1.0:
                 needed = np.append(needed, removed)
                 continue
@@ -145,20 +296,20 @@ def _near_bad(breaks: Array, bad: np.ndarray, removed: Array) -> np.ndarray:
     return near
 
 
-def _use_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
+def _use_fewest_knots(points: Points, fit: Fit, tolerance: FitTolerance) -> Fit:
     """Spread fewer knots as densely in proportion, over the arc length, as long as all points are within the tolerance.
 
     Their number is halved between one that will do and one that will not.
     """
-    sigma, breaks = over_arc_length(fit, points.position.shape[1])
+    sigma, breaks = _over_arc_length(fit, points.position.shape[1])
     most = len(breaks) - 1
     fewest = most // 2
-    trial = fit_over(points, sigma, breaks)
+    trial = _fit_over(points, sigma, breaks)
     if trial.ratios(tolerance).max() <= 1.0:
         fit = trial
     while most - fewest > 1:
         count = (most + fewest) // 2
-        trial = fit_over(
+        trial = _fit_over(
             points,
             sigma,
             np.interp(
@@ -175,7 +326,7 @@ def _use_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
     return fit
 
 
-def _removable(fit: Fit, tolerance: Tolerance, needed: Array) -> Array:
+def _removable(fit: Fit, tolerance: FitTolerance, needed: Array) -> Array:
     """Choose knots that are not neighbours, those with the least of the tolerance taken beside them first."""
     worst = fit.worst(tolerance)
     beside = np.maximum(worst[:-1], worst[1:])
@@ -195,11 +346,11 @@ def _polynomial(points: Points, sigma: Array) -> Fit:
     from scipy.interpolate import make_interp_spline
 
     through = make_interp_spline(sigma, points.columns, k=len(points) - 1)
-    at = np.linspace(0.0, sigma[-1], _FEW)
+    at = np.linspace(0.0, sigma[-1], DEGREE + 1)
     breaks = sigma[[0, -1]]
-    return measure(
+    return _measure(
         points,
-        make_interp_spline(at, through(at), k=DEGREE, t=clamp_knots(breaks)),
+        make_interp_spline(at, through(at), k=DEGREE, t=_clamp_knots(breaks)),
         breaks,
         sigma,
     )
@@ -210,7 +361,7 @@ def _interpolate(points: Points, sigma: Array) -> Fit:
     from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(sigma, points.columns, k=DEGREE)
-    return measure(points, spline, np.unique(spline.t), sigma)
+    return _measure(points, spline, np.unique(spline.t), sigma)
 
 
 def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
@@ -226,9 +377,8 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     breaks = np.unique(spline.t)
     count = max(64, 20_000 // (len(breaks) - 1))
     sides = np.arange(count) / count
-    sigma = np.append(
-        (breaks[:-1, None] + np.diff(breaks)[:, None] * sides).ravel(), breaks[-1]
-    )
+    inside = breaks[:-1, None] + np.diff(breaks)[:, None] * sides
+    sigma = np.append(inside.ravel(), breaks[-1])
     dimension = points.position.shape[1]
     place = spline(sigma)[:, :dimension]
     nearest = _nearest(points.position, place)
@@ -237,13 +387,9 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     for offset in (-1, 0):
         first = np.clip(nearest + offset, 0, len(place) - 2)
         side = place[first + 1] - place[first]
-        share = np.sum((points.position - place[first]) * side, axis=1) / np.maximum(
-            np.sum(side**2, axis=1), 1e-300
-        )
-        share = np.clip(share, 0.0, 1.0)
-        away = np.linalg.norm(
-            points.position - place[first] - share[:, None] * side, axis=1
-        )
+        share = shares_along(points.position, place[first], side)
+        nearest_place = place[first] + share[:, None] * side
+        away = np.linalg.norm(points.position - nearest_place, axis=1)
         nearer = away < distances
         distances[nearer] = away[nearer]
         at[nearer] = (sigma[first] + share * (sigma[first + 1] - sigma[first]))[nearer]
@@ -256,7 +402,7 @@ def _nearest(position: Array, place: Array) -> Array:
     """Return the polygon's nearest corner to each of n points, (n,), in their order."""
     from scipy.spatial import cKDTree
 
-    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
+    along = np.append(0.0, np.cumsum(steps_of(place)))
     nearest = np.zeros(len(position), dtype=int)
     reached = 0.0
     for stretch, length in _stretches(position, along[-1]):
@@ -276,9 +422,7 @@ def _stretches(position: Array, total: float) -> Iterator[tuple[slice, float]]:
 
     The points' polygon is at least as long as the path between them, but for the tolerance.
     """
-    lengths = np.append(
-        0.0, np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))
-    )
+    lengths = np.append(0.0, np.cumsum(steps_of(position)))
     most = max(1, len(position) // 1_000)
     first = 0
     while first < len(position):

@@ -1,7 +1,4 @@
-"""Points that a path is to follow, in SI units, with what messages need to name them.
-
-Points from arrays and transforms.
-"""
+"""Points that a path is to follow, in SI units, with what messages need to name them; from arrays and transforms."""
 
 from __future__ import annotations
 
@@ -58,15 +55,20 @@ class Points:
         """Position and turning side by side, (n, p + q)."""
         return np.hstack([self.position, self.turning])
 
+    @property
+    def steps(self) -> Array:
+        """Distances of successive points, (n - 1,), m."""
+        return steps_of(self.position)
+
     def only(self, chosen: Any) -> Points:
         """Return some of the points."""
-        speed = None if self.speed is None else self.speed[chosen]
-        parts = {
-            "position": self.position[chosen],
-            "turning": self.turning[chosen],
-            "rows": self.rows[chosen],
-        }
-        return replace(self, **parts, speed=speed)
+        return replace(
+            self,
+            position=self.position[chosen],
+            turning=self.turning[chosen],
+            speed=None if self.speed is None else self.speed[chosen],
+            rows=self.rows[chosen],
+        )
 
     def name_row(self, i: int) -> str:
         """Name the row of a point."""
@@ -90,6 +92,18 @@ class Points:
         )
 
 
+def steps_of(position: Array) -> Array:
+    """Return the distances, (n - 1,), of successive positions, (n, p)."""
+    steps: Array = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    return steps
+
+
+def shares_along(points: Array, begin: Array, side: Array) -> Array:
+    """Return where points, (n, p), are nearest to the sides that begin at `begin`, as shares of these, (n,)."""
+    lengths = np.maximum(np.sum(side**2, axis=1), 1e-300)
+    return np.clip(np.sum((points - begin) * side, axis=1) / lengths, 0.0, 1.0)
+
+
 def angles_between(one: Array, other: Array) -> Array:
     """Return the angles, (n,), rad, between what `Points.turning` holds, (n, q) both; zero where it holds nothing."""
     if one.shape[1] != QUATERNION:
@@ -99,10 +113,6 @@ def angles_between(one: Array, other: Array) -> Array:
         np.linalg.norm(unit - other, axis=1), np.linalg.norm(unit + other, axis=1)
     )
     return np.asarray(4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0)))
-
-
-_HOMOGENEOUS = (4, 4)
-_MATRIX = (3, 3)
 
 
 def points_from(
@@ -137,7 +147,7 @@ def points_from(
         Arrays of wrong shapes, with numbers that are not finite, or matrices that are not rotations; with the row.
     """
     values = _array(_matrices(points), source, source)
-    if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:
+    if values.ndim == 3 and values.shape[1:] == (4, 4) and orientations is None:
         orientations = values[:, :3, :3]
         values = values[:, :3, 3]
     if values.ndim != 2 or not 1 <= values.shape[1] <= 3 or len(values) < least:
@@ -147,11 +157,9 @@ def points_from(
             allowed=f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more",
             where=source,
         )
-    turning = (
-        np.empty((len(values), 0))
-        if orientations is None
-        else _turning(orientations, units, source)
-    )
+    turning = np.empty((len(values), 0))
+    if orientations is not None:
+        turning = _turning(orientations, units, source)
     speeds = None
     if speed is not None:
         where = f"{source}: speed"
@@ -166,34 +174,25 @@ def points_from(
         problem = "a speed must be positive and finite, or NaN where none is prescribed"
         _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
     for name, one in (("orientations", turning), ("speed", speeds)):
-        if one is not None and len(np.atleast_1d(one)) != len(values):
+        if one is not None and len(one) != len(values):
             raise TaskError(
                 f"as many {name} as points are needed",
-                found=len(np.atleast_1d(one)),
+                found=len(one),
                 allowed=len(values),
             )
-    return Points(
-        values * LENGTHS[units.length or "m"],
-        turning,
-        speeds,
-        np.arange(len(values)),
-        source,
-        "row",
-    )
+    rows = np.arange(len(values))
+    position = values * LENGTHS[units.length or "m"]
+    return Points(position, turning, speeds, rows, source, "row")
 
 
 def _matrices(points: Any) -> Any:
     """Return the homogeneous matrices of transforms; anything else as it is."""
-    if not isinstance(points, np.ndarray) and callable(
-        getattr(points, "as_matrix", None)
-    ):
-        return points.as_matrix()
     if isinstance(points, list | tuple) and points:
         if all(hasattr(one, "homogeneous") for one in points):
             return [one.homogeneous for one in points]
-        if callable(getattr(points[0], "as_matrix", None)):
+        if hasattr(points[0], "as_matrix"):
             return [one.as_matrix() for one in points]
-    return points
+    return points.as_matrix() if hasattr(points, "as_matrix") else points
 
 
 def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
@@ -206,26 +205,17 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
     values = _array(orientations, where, source)
     if values.ndim == 1:
         return values[:, None] * ANGLES[units.angle or "rad"]
-    if values.shape[1:] == _MATRIX:
+    if values.shape[1:] == (3, 3):
         off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
-        _refuse_first(
-            (off > 1e-4) | (np.linalg.det(values) < 0.0),
-            "no rotation matrix",
-            values,
-            source,
-        )
-        return with_like_signs(
-            np.roll(Rotation.from_matrix(values).as_quat(), 1, axis=1)
-        )
+        bad = (off > 1e-4) | (np.linalg.det(values) < 0.0)
+        _refuse_first(bad, "not a rotation matrix", values, source)
+        quaternions = Rotation.from_matrix(values).as_quat()
+        return with_like_signs(np.roll(quaternions, 1, axis=1))
     problem = "orientations of the wrong shape"
     if values.shape[1:] == (QUATERNION,):
         problem = "an array of quaternions does not say whether w is first or last"
-    raise TaskError(
-        problem,
-        found=values.shape,
-        allowed="SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw",
-        where=where,
-    )
+    allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
+    raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
 
 
 def _array(values: Any, where: str, source: str) -> Array:
@@ -237,12 +227,7 @@ def _array(values: Any, where: str, source: str) -> Array:
             allowed="2 rows or more",
             where=where,
         )
-    _refuse_first(
-        ~np.isfinite(array.reshape(len(array), -1) if array.ndim else array),
-        "not finite",
-        array,
-        source,
-    )
+    _refuse_first(~np.isfinite(np.atleast_1d(array)), "not finite", array, source)
     return array
 
 
@@ -256,8 +241,8 @@ def _numbers(values: Any, where: str) -> Array:
 
 
 def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:
-    rows = np.flatnonzero(bad.any(axis=1) if bad.ndim > 1 else bad)
+    """Refuse the first of the rows of which anything is bad."""
+    rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1))
     if rows.size:
-        raise TaskError(
-            problem, found=values[rows[0]].tolist(), where=f"{source}: row {rows[0]}"
-        )
+        found = np.atleast_1d(values)[rows[0]].tolist()
+        raise TaskError(problem, found=found, where=f"{source}: row {rows[0]}")

@@ -32,6 +32,8 @@ SPEEDS: Final = {
     "in/min": 0.0254 / 60.0,
     "inch/min": 0.0254 / 60.0,
 }
+UNITS: Final = {"length": LENGTHS, "angle": ANGLES, "speed": SPEEDS}
+"""Factors to SI units by kind of quantity."""
 _QUANTITY = re.compile(
     r"^\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z/]+)\s*$"
 )
