@@ -27,12 +27,11 @@ from brachis.apps.bottleneck.reference import (
 )
 from brachis.apps.bottleneck.saturation import THRESHOLD, Saturation, saturations
 from brachis.apps.bottleneck.sensitivities import Sensitivities, sensitivities
-from brachis.apps.bottleneck.text import in_words
+from brachis.apps.bottleneck.text import write_report
 from brachis.common.deadline import Deadline
 from brachis.common.summary import LINES
 from brachis.errors import InputError, PlanningError, UnreachableError
 from brachis.kinematics import (
-    ChartMap,
     ChartRows,
     JointMap,
     JointSpaceMap,
@@ -54,13 +53,8 @@ from brachis.trajectory import Trajectory
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
 
-_SAME = 1e-3
-"""End times that differ by a larger fraction, beyond what the task gave away, are those of two motions."""
-_KEPT = 1e-4
-"""A motion keeps a branch margin of which it falls short by less: solvers and interpolation are not exact."""
 
-
-def solved_again(trajectory: Trajectory) -> Refined:
+def solve_again(trajectory: Trajectory) -> Refined:
     """Solve the problem of a saved motion from where it ended.
 
     Parameters
@@ -80,31 +74,30 @@ def solved_again(trajectory: Trajectory) -> Refined:
     PlanningError
         The motion is not an optimum of its problem: no solver of the task came back to it.
     """
-    with ThreadpoolController().limit(
-        limits=1, user_api="blas"
-    ):  # as in `plan`: batches are small
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         program, x = _problem(trajectory)
         found = list(_answers(program, x, trajectory))
-    for refined in found:
-        if _came_back(refined, trajectory):
-            return refined
-    ends = ", ".join(
-        f"{refined.reports[-1].solver}: {refined.t_end:.6g} s" for refined in found
-    )
+    if found and _is_same_motion(found[-1], trajectory):
+        return found[-1]
+    ends = [f"t_E = {each.t_end:.6g} s by {each.reports[-1].solver}" for each in found]
+    what = "a different optimum" if found else "no optimum"
     raise PlanningError(
-        "solving again does not come back to the saved motion, so that its multipliers are not known",
-        found=ends or "no answer",
-        allowed=f"{trajectory.t_end:.6g} s",
+        f"re-solving found {what}; sensitivities of this file are unavailable",
+        found=", ".join(ends) or "no answer",
+        allowed=f"t_E = {trajectory.t_end:.6g} s, that of the saved motion",
         hint="Ask for the bottlenecks of the task itself",
     )
 
 
 def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
-    """Lay the problem down over the saved knots; the motion is its point x."""
+    """Build the problem over the saved knots; the motion is its point x."""
     joint_map: JointMap
     if len(trajectory.chart_rows):
         problem = Problem.of(trajectory.robot, trajectory.task)
-        joint_map = _chart(problem, trajectory)
+        rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
+        s = trajectory.path_coordinate(trajectory.times)
+        path = problem.path
+        joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
     elif trajectory.task.task_space == JOINTS:
         problem = Problem.of(trajectory.robot, trajectory.task)
         joint_map = JointSpaceMap(problem.robot, problem.path)
@@ -125,22 +118,16 @@ def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     x = program.variables_from([motion])
     for margin in MARGINS:
         program = program.with_margin(margin)
-        if program.safeguard_slack(x) >= -_KEPT:
+        # Solvers and interpolation are not exact.
+        if program.safeguard_slack(x) >= -1e-4:
             break
     return program, x
 
 
-def _chart(problem: Problem, trajectory: Trajectory) -> ChartMap:
-    """Lay the saved chart around the saved motion."""
-    rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
-    s = trajectory.path_coordinate(trajectory.times)
-    return chart_around(problem.task_map, problem.path, s, trajectory.q, rows)
-
-
-def _came_back(refined: Refined, trajectory: Trajectory) -> bool:
+def _is_same_motion(refined: Refined, trajectory: Trajectory) -> bool:
     """Tell whether an answer is the fastest motion that a saved one was made from."""
     slower = trajectory.t_end / refined.t_end - 1.0
-    return -_SAME <= slower <= trajectory.task.search.slower + _SAME
+    return -1e-3 <= slower <= trajectory.task.search.slower + 1e-3
 
 
 def _answers(
@@ -170,7 +157,7 @@ def _answers(
             continue
         if refined.converged:
             yield refined
-            if _came_back(refined, trajectory):
+            if _is_same_motion(refined, trajectory):
                 return
 
 
@@ -217,7 +204,7 @@ class BottleneckReport:
 
     def text(self, *, degrees: bool = False) -> str:
         """Say all in plain words, angles in degrees where asked for."""
-        return "\n".join(in_words(**vars(self), degrees=degrees))
+        return "\n".join(write_report(**vars(self), degrees=degrees))
 
     def __repr__(self) -> str:
         """Say what there is room for on a screen."""
@@ -253,7 +240,7 @@ def report(
     ----------
     motion : Result, Trajectory or path
         Of `brachis.plan`; or a trajectory, a loaded one for example, or its file, whose problem is solved again
-        (`solved_again`).
+        (`solve_again`).
     check : bool, optional
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
@@ -280,23 +267,25 @@ def report(
     """
     if isinstance(motion, str | os.PathLike):
         motion = Trajectory.load(motion)
-    if isinstance(motion, Trajectory) and motion.recovered is not None:
-        if check or reference:
-            hint = "brachis compare plans the same path; ask for the bottlenecks of that plan"
-            problem = "the motion was not planned: nothing of it can be solved again"
-            raise InputError(problem, where=motion.recovered.source, hint=hint)
-        return BottleneckReport(motion.t_end, None, saturations(motion))
     if isinstance(motion, Trajectory):
         trajectory = motion
-        refined = solved_again(motion)
-    elif motion.attempt.refined is None:
-        raise InputError(
-            "the result holds no solved problem",
-            where="result",
-            allowed="a result of brachis.plan",
-        )
+        if trajectory.recovered is not None:
+            if check or reference:
+                raise InputError(
+                    "the motion was not planned: nothing of it can be solved again",
+                    where=trajectory.recovered.source,
+                    hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
+                )
+            return BottleneckReport(trajectory.t_end, None, saturations(trajectory))
+        refined = solve_again(trajectory)
     else:
         trajectory = motion.trajectory
+        if motion.attempt.refined is None:
+            raise InputError(
+                "the result holds no solved problem",
+                where="result",
+                allowed="a result of brachis.plan",
+            )
         refined = motion.attempt.refined
     found = sensitivities(refined)
     tolerance = trajectory.task.refinement.tolerance

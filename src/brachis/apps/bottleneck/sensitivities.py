@@ -21,6 +21,7 @@ promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -49,22 +50,13 @@ def rows_and_jacobian(
 
     places = (program.jacobian_rows, program.jacobian_columns)
     shape = (len(program.lower), len(x))
-    return program.rows(x), sparse.coo_array(
-        (program.jacobian(x), places), shape=shape
-    ).tocsr()
-
-
-ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
-"""Distances from a bound within which rows and variables press on it; dimensionless. The least that gives a balance
-counts: solvers differ in how near they come, and a row that is near its bound without being active would count as one
-that takes over within any step."""
-_GOOD = 1e-5
-"""The solver's multipliers with a smaller residual are taken as they are."""
+    jacobian = sparse.coo_array((program.jacobian(x), places), shape=shape)
+    return program.rows(x), jacobian.tocsr()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ActiveSet(Summary):
-    """What presses on a point x.
+    """Rows and variables at their bounds at a point x.
 
     Attributes
     ----------
@@ -82,7 +74,9 @@ class ActiveSet(Summary):
 
     @classmethod
     def at(cls, program: Program, x: np.ndarray, near: float) -> ActiveSet:
-        """Collect what presses on x, (v,): what is nearer to its bound than `near`, dimensionless.
+        """Collect rows and variables that are nearer to their bounds than `near`, dimensionless, at x, (v,).
+
+        Rows that no variable changes, such as those at a given start posture, are left out.
 
         Raises
         ------
@@ -95,14 +89,10 @@ class ActiveSet(Summary):
         rows = np.concatenate([low, high])
         signs = np.repeat([1.0, -1.0], [len(low), len(high)])
         slopes = signs[:, None] * jacobian[rows].toarray()
-        pressing = slopes.any(
-            axis=1
-        )  # what holds at the given start posture holds whatever x
+        kept = slopes.any(axis=1)
         unit = np.eye(len(x))
-        bounds = unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near]
-        return cls(
-            np.vstack([slopes[pressing], *bounds]), rows[pressing], signs[pressing]
-        )
+        bounds = (unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near])
+        return cls(np.vstack([slopes[kept], *bounds]), rows[kept], signs[kept])
 
     @property
     def dependent(self) -> bool:
@@ -111,27 +101,26 @@ class ActiveSet(Summary):
 
     def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
         """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
-        return float(
-            np.linalg.norm(gradient - weights @ self.slopes) / np.linalg.norm(gradient)
-        )
+        rest = gradient - weights @ self.slopes
+        return float(np.linalg.norm(rest) / np.linalg.norm(gradient))
 
-    def weights_of(self, gradient: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can."""
-        of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
-        rest = gradient - of_rows @ self.slopes[: len(of_rows)]
-        return np.concatenate(
-            [of_rows, np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)]
-        )
+    def weights_of(
+        self, gradient: np.ndarray, multipliers: np.ndarray | None
+    ) -> np.ndarray:
+        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can.
 
-    def fitted_weights(self, gradient: np.ndarray) -> np.ndarray:
-        """Weights, (p,), that balance a gradient best: non-negative least squares (Lawson and Hanson)."""
+        Without multipliers, the weights that balance the gradient best: non-negative least squares (Lawson and Hanson).
+        """
+        if multipliers is not None:
+            of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
+            rest = gradient - of_rows @ self.slopes[: len(of_rows)]
+            of_variables = np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)
+            return np.concatenate([of_rows, of_variables])
         from scipy.optimize import nnls
 
-        return (
-            np.asarray(nnls(self.slopes.T, gradient)[0])
-            if len(self.slopes)
-            else np.empty(0)
-        )
+        if not len(self.slopes):
+            return np.empty(0)
+        return np.asarray(nnls(self.slopes.T, gradient)[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -172,30 +161,20 @@ class Multipliers(Summary):
         float
             <= 0, s.
         """
-        rates = relaxation[self.active_set.rows]
+        rates = np.zeros(len(self.weights))
+        of_rows = relaxation[self.active_set.rows]
         if side is not None:
-            rates = np.where(self.active_set.signs == side, rates, 0.0)
-        active = self.weights[: len(rates)]
-        if self.unique or not (rates @ active):
-            return -float(rates @ active)
-        return -self._least(
-            np.concatenate([rates, np.zeros(len(self.weights) - len(rates))])
-        )
-
-    def _least(self, rates: np.ndarray) -> float:
-        """Least of ``rates @ w`` over all weights that balance as much as `weights` do."""
+            of_rows = np.where(self.active_set.signs == side, of_rows, 0.0)
+        rates[: len(of_rows)] = of_rows
+        saved = float(rates @ self.weights)
+        if self.unique or not saved:
+            return -saved
         from scipy.optimize import linprog
 
+        # Of all weights that balance as much, those that promise the least.
         slopes = self.active_set.slopes
-        found = linprog(
-            rates,
-            A_eq=slopes.T,
-            b_eq=self.weights @ slopes,
-            bounds=(0.0, None),
-            method="highs",
-        )
-        best = self.weights if found.x is None else found.x
-        return float(rates @ best)
+        found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes)
+        return -float(rates @ (self.weights if found.x is None else found.x))
 
 
 def multipliers_of(
@@ -219,42 +198,31 @@ def multipliers_of(
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    tried: list[Multipliers] = []
-    for near in ACTIVE:
-        tried.append(
-            _balancing(ActiveSet.at(program, x, near), program.gradient(x), given)
-        )
-        if tried[-1].residual <= _GOOD:
+    tried = []
+    for multipliers in _balance(program, x, given):
+        tried.append(multipliers)
+        if multipliers.residual <= 1e-5:
             break
     return min(tried, key=lambda multipliers: multipliers.residual)
 
 
-def _balancing(
-    active_set: ActiveSet, gradient: np.ndarray, given: np.ndarray | None
-) -> Multipliers:
-    """Choose the weights of active_set that balance a gradient, (v,), best."""
-    candidates = (
-        [] if given is None else [("solver", active_set.weights_of(gradient, given))]
-    )
-    if (
-        not candidates
-        or active_set.stationarity_residual(gradient, candidates[0][1]) > _GOOD
-    ):
-        candidates.append(("least squares", active_set.fitted_weights(gradient)))
-    source, weights = min(
-        candidates,
-        key=lambda candidate: active_set.stationarity_residual(gradient, candidate[1]),
-    )
-    residual = active_set.stationarity_residual(gradient, weights)
-    return Multipliers(
-        active_set, weights, source, residual, unique=not active_set.dependent
-    )
+def _balance(
+    program: Program, x: np.ndarray, given: np.ndarray | None
+) -> Iterator[Multipliers]:
+    """Yield multipliers of the rows at their bounds, the solver's first, then with rows a little farther away.
 
-
-def multipliers_of_answer(refined: Refined) -> Multipliers:
-    """Find the multipliers of a refined answer, before its end time was lengthened."""
-    report = refined.reports[-1]
-    return multipliers_of(refined.program, report.x, report.multipliers)
+    A row that is near its bound without being active would count as one that takes over within any step.
+    """
+    gradient = program.gradient(x)
+    for near in (1e-8, 1e-7, 1e-6, 1e-5):
+        active_set = ActiveSet.at(program, x, near)
+        unique = not active_set.dependent
+        for source, own in (("solver", given), ("least squares", None)):
+            if source == "solver" and given is None:
+                continue
+            weights = active_set.weights_of(gradient, own)
+            rest = active_set.stationarity_residual(gradient, weights)
+            yield Multipliers(active_set, weights, source, rest, unique=unique)
 
 
 STATIONARY = 1e-3
@@ -364,14 +332,11 @@ class Sensitivities(Summary):
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
         """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
+        wanted = (subject, kind, end)
         for entry in self.limits:
-            if (entry.label.subject, entry.label.kind, entry.bound.end) == (
-                subject,
-                kind,
-                end,
-            ):
+            if (entry.label.subject, entry.label.kind, entry.bound.end) == wanted:
                 return entry
-        raise KeyError((subject, kind, end))
+        raise KeyError(wanted)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -398,7 +363,9 @@ def sensitivities(refined: Refined) -> Sensitivities:
     Sensitivities
         Of the answer before its end time was lengthened to meet the limits between collocation points.
     """
-    return sensitivities_at(refined.program, multipliers_of_answer(refined))
+    report = refined.reports[-1]
+    multipliers = multipliers_of(refined.program, report.x, report.multipliers)
+    return sensitivities_at(refined.program, multipliers)
 
 
 def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
@@ -410,14 +377,15 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         for bound in limit.bounds:
             rates = np.zeros(len(program.lower))
             rates[rows[:, bound.column]] = bound.per_unit
-            if limit.role is not Role.SAFEGUARD:
-                found.append(_sensitivity(limit, bound, rates, multipliers))
-            elif (slope := -multipliers.change(rates)) > 1e-9:
-                boundaries.append(
-                    BranchBoundary(
-                        limit.labels[bound.column].subject, bound.figure, slope
-                    )
-                )
+            if limit.role is Role.SAFEGUARD:
+                subject = limit.labels[bound.column].subject
+                cost = -multipliers.change(rates)
+                if cost > 1e-9:
+                    boundaries.append(BranchBoundary(subject, bound.figure, cost))
+                continue
+            side = {None: None, "lower": 1.0, "upper": -1.0}[bound.end]
+            derivative = -(side or -1.0) * multipliers.change(rates, side)
+            found.append(Sensitivity(limit, bound, derivative))
     found.sort(key=lambda entry: entry.change(1.0))
     return Sensitivities(
         tuple(found),
@@ -426,13 +394,3 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         multipliers.residual,
         multipliers.unique,
     )
-
-
-def _sensitivity(
-    limit: Limit, bound: Bound, rates: np.ndarray, multipliers: Multipliers
-) -> Sensitivity:
-    """Sensitivity to a figure that moves the bounds of the rows outwards at `rates`, (c,)."""
-    if bound.end is None:
-        return Sensitivity(limit, bound, multipliers.change(rates))
-    sign = 1.0 if bound.end == "lower" else -1.0
-    return Sensitivity(limit, bound, -sign * multipliers.change(rates, sign))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from brachis.apps.bottleneck.check import CheckedSensitivity, SensitivityCheck
+from brachis.apps.bottleneck.check import SensitivityCheck
 from brachis.apps.bottleneck.reference import MEANING, KnotCost, Reference
 from brachis.apps.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation
 from brachis.apps.bottleneck.sensitivities import (
@@ -16,13 +16,12 @@ from brachis.errors import write_count
 from brachis.robot.joints import shown_unit
 
 _FRACTION = 0.1
+"""By which limits are raised in the sentences on what they cost."""
 _NOTHING = 1e-5
-"""Of t_E; what saves less for `_FRACTION`, and a boundary that costs less, is not worth a line."""
-_KNOTS = 0.01
-"""Of t_E; what the knots cost is known to 0.2 % or so, and `intervals: auto` leaves 0.1 %."""
+"""Fraction of t_E; what saves less has no sentence."""
 
 
-def in_words(
+def write_report(
     *,
     t_end: float,
     sensitivities: Sensitivities | None,
@@ -42,7 +41,7 @@ def in_words(
         lines += _knots(knots, t_end)
     if check is not None:
         lines += _check_lines(check)
-    lines += active_in_words(saturations)
+    lines += write_active(saturations)
     if reference is not None:
         lines.append(_reference(reference, t_end))
     elif reference_sought:
@@ -53,6 +52,11 @@ def in_words(
 def _figures(value: float) -> str:
     """Write a positive number with two significant figures, or all before the point."""
     return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
+
+
+def _part(saved: float, t_end: float) -> str:
+    """Write a time, s, as a part of t_E and in ms."""
+    return f"{_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
 
 
 def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
@@ -82,7 +86,6 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
 
 def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
     """Say what more room at one limit saves."""
-    saved = -entry.change(_FRACTION)
     label = entry.label
     end = entry.bound.end
     unit, factor = shown_unit(label.unit, degrees=degrees)
@@ -95,27 +98,20 @@ def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
         )
     else:
         more = f"{amount} more room at the {end} end of {label}"
-    return (
-        f"{more} saves {_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
-    )
+    return f"{more} saves {_part(-entry.change(_FRACTION), t_end)}"
 
 
 def _knots(found: KnotCost, t_end: float) -> list[str]:
-    """Say what the knots cost, if it is worth a line."""
-    if found.saved < _KNOTS:
+    """Say what the knots cost, if it is worth a line: it is known to 0.2 %, and ``intervals: auto`` leaves 0.1 %."""
+    if found.saved < 0.01:
         return []
-    saved = (
-        f"{_figures(100.0 * found.saved)} % ({_figures(1e3 * found.saved * t_end)} ms)"
+    line = (
+        f"the knots cost about {_part(found.saved * t_end, t_end)} with {write_count(found.intervals, 'interval')}: "
+        f"timed anew in the phase plane, where torques jump, the same joint path takes {found.t_end:.4g} s"
     )
-    hint = (
-        "; spline.intervals: auto, or more of them, come nearer to that"
-        if found.given
-        else ""
-    )
-    again = f"timed anew in the phase plane, where torques jump, the same joint path takes {found.t_end:.4g} s"
-    return [
-        f"the knots cost about {saved} with {write_count(found.intervals, 'interval')}: {again}{hint}"
-    ]
+    if found.given:
+        line += "; spline.intervals: auto, or more of them, come nearer to that"
+    return [line]
 
 
 def _boundary(entry: BranchBoundary) -> str:
@@ -128,70 +124,56 @@ def _boundary(entry: BranchBoundary) -> str:
 
 def _check_lines(check: SensitivityCheck) -> list[str]:
     """Sentences on the predictions beside solving again."""
-    percent = f"{100.0 * check.step:g} %"
     lines = []
     for entry in check.entries:
         if not entry.predicted:
             continue
-        what = " ".join(
-            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end))
-        )
+        label = str(entry.sensitivity.label)
+        what = " ".join(filter(None, (label, entry.sensitivity.bound.end)))
         line = (
-            f"checked, {what} +{percent}: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
+            f"checked, {what} +{100.0 * check.step:g} %: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
             f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
-            f"{_taken_back(entry)}"
         )
+        taken_back = abs(entry.linearised - entry.predicted)
+        if taken_back > 0.02 * abs(entry.predicted):
+            line += f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
         if entry.other_optimum:
-            line += f"; from another local optimum, {1e3 * abs(entry.other_optimum):.2g} ms "
-            line += "faster" if entry.other_optimum < 0.0 else "slower"
+            which = "faster" if entry.other_optimum < 0.0 else "slower"
+            apart = f"{1e3 * abs(entry.other_optimum):.2g} ms {which}"
+            line += f"; from another local optimum, {apart}"
+        if not entry.optimal:
+            line += " (solved again without reaching an optimum)"
+        lines.append(line)
+    larger = check.larger()
+    lost = sum(not entry.optimal for entry in larger)
+    if not larger:
+        lines.append("checked: no change is larger than 0.1 ms")
+    elif lost == len(larger):
         lines.append(
-            line
-            if entry.optimal
-            else f"{line} (solved again without reaching an optimum)"
+            "checked: no solver brought the changes that are larger than 0.1 ms to an optimum"
         )
-    if not check.larger():
-        return [*lines, "checked: no change is larger than 0.1 ms"]
-    if all(not entry.optimal for entry in check.larger()):
-        return [
-            *lines,
-            "checked: no solver brought the changes that are larger than 0.1 ms to an optimum",
-        ]
-    worst = f"{100.0 * check.worst_deviation():.2g} %"
-    lost = sum(not entry.optimal for entry in check.larger())
-    but = f", but for {lost} that no solver brought to an optimum" if lost else ""
-    return [
-        *lines,
-        f"checked: changes larger than 0.1 ms are predicted to within {worst}{but}",
-    ]
+    else:
+        but = f", but for {lost} that no solver brought to an optimum" if lost else ""
+        worst = f"{100.0 * check.worst_deviation():.2g} %"
+        lines.append(
+            f"checked: changes larger than 0.1 ms are predicted to within {worst}{but}"
+        )
+    return lines
 
 
-def _taken_back(entry: CheckedSensitivity) -> str:
-    """Say how much of a promise other limits take back within the step, where it is worth saying."""
-    if abs(entry.linearised - entry.predicted) <= 0.02 * abs(entry.predicted):
-        return ""
-    return f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
-
-
-def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
+def write_active(found: tuple[Saturation, ...]) -> list[str]:
     """Sentences on the limits that are active for some time."""
     lines = []
     for entry in found:
-        if entry.share >= 5e-4:
-            times = (
-                "once"
-                if len(entry.active) == 1
-                else f"in {len(entry.active)} stretches"
-            )
-            share = f"{100.0 * entry.share:.1f} % of the time"
-            reached = (
-                entry.label.reached
-                or f"{entry.label.subject} is at its {entry.label.kind} limit"
-            )
-            lines.append(f"{reached} for {share}, {times}")
-    if not lines:
-        lines = ["nothing stays at a limit"]
+        if entry.share < 5e-4:
+            continue
+        label = entry.label
+        count = len(entry.active)
+        times = "once" if count == 1 else f"in {count} intervals"
+        reached = label.reached or f"{label.subject} is at its {label.kind} limit"
+        lines.append(f"{reached} for {100.0 * entry.share:.1f} % of the time, {times}")
     return [
-        *lines,
+        *(lines or ["nothing stays at a limit"]),
         f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
     ]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from brachis.apps import bottleneck
 from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
 from brachis.apps.bottleneck.saturation import dense_samples, saturations_of
-from brachis.apps.bottleneck.text import active_in_words
+from brachis.apps.bottleneck.text import write_active
 from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
 from brachis.optimise.candidate import Candidate
@@ -114,7 +114,7 @@ def _held_back(
     try:
         return tuple(bottleneck.report(source).text(degrees=degrees).splitlines())
     except BrachisError as error:
-        return (*active_in_words(found), f"What the limits cost is not known: {error}")
+        return (*write_active(found), f"What the limits cost is not known: {error}")
 
 
 def _describe_plan(result: PlannedMotion) -> dict[str, str]:
