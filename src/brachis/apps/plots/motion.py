@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from brachis.apps.bottleneck.saturation import (
     dense_samples,
     knot_times,
@@ -181,7 +179,7 @@ def _stack(trajectory: Trajectory, found: Sequence[Panel]) -> Figure:
 
 def _height(panel: Panel) -> float:
     """Height of a panel, mm: less for few curves."""
-    return 38.0 if len(panel.names) > 2 else 24.0
+    return 38.0 if len(panel.curves) > 2 else 24.0
 
 
 def draw_panels(
@@ -205,24 +203,21 @@ def draw_panels(
 
 def _draw_panel(ax: Axes, panel: Panel) -> None:
     """Draw one line for each curve, and the limits; curves with the same limit share its dashes."""
-    for name, number, values in zip(
-        panel.names, panel.styles.tolist(), panel.values.T, strict=True
-    ):
-        label = style.plain(name) if number != BLACK else None
-        ax.plot(panel.t, values, label=label, **style.joint_style(number))
+    for curve in panel.curves:
+        label = style.plain(curve.name) if curve.style != BLACK else None
+        ax.plot(panel.t, curve.values, label=label, **style.joint_style(curve.style))
     ends = panel.view()
     for limit, curves in panel.near_limits():
         if panel.is_ratio:
             style.draw_limit(ax, float(limit[0]), ends[1])
             continue
-        line = np.broadcast_to(limit, panel.t.shape)
         for place, curve in enumerate(curves):
             look = {
                 **style.LIMIT,
-                "color": style.joint_style(int(panel.styles[curve]))["color"],
+                "color": style.joint_style(curve.style)["color"],
                 "linestyle": style.limit_dashes(place, len(curves)),
             }
-            ax.plot(panel.t, line, **look)
+            ax.plot(panel.t, limit, **look)
     if panel.is_ratio:
         ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(ends)

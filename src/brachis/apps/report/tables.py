@@ -15,7 +15,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD
-from brachis.apps.plots.panels import Panel, joint_rows_of, panels_of, select_joint
+from brachis.apps.plots.panels import Curve, Panel, curves_of, joint_rows_of, panels_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.optimise.candidate import coordinates
 from brachis.robot.from_task import in_use
@@ -202,38 +202,34 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     panels = panels_of(trajectory, motion.samples, *rows, degrees=motion.degrees)
     found = []
     for name in trajectory.joint_names:
-        parts = select_joint(panels, name)
-        q = parts[0].values[:, 0]
-        unit = parts[0].unit
+        own = curves_of(panels, name)
+        panel, position = own[0]
+        q = position.values
+        unit = panel.unit
         row = JointRow(
             name=name,
             redundant=name in trajectory.redundant_joints,
             start=f"{q[0]:.4f} {unit}",
             end=f"{q[-1]:.4f} {unit}",
             travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
-            peaks=tuple(_peak(part, tolerance) for part in parts),
+            peaks=tuple(_peak(*each, tolerance) for each in own),
         )
         found.append(row)
     return found
 
 
-def _peak(part: Panel, tolerance: float) -> Row:
-    """Find the value of a joint that is nearest to its limit.
-
-    Without a limit it is the largest one.
-    """
-    values = part.values[:, 0]
-    upper = part.upper[0, 0]
-    lower = part.lower[0, 0]
-    if not part.is_limited[0]:
+def _peak(panel: Panel, curve: Curve, tolerance: float) -> Row:
+    """Find the value of a joint that is nearest to its limit, or without a limit the largest one."""
+    values = curve.values
+    if not curve.is_limited:
         largest = values[np.argmax(np.abs(values))]
-        return Row(_write_value(largest, part.unit), "", "", "")
-    ratios = np.abs(part.ratios[:, 0])
-    limit = f"{_write_number(upper)} {part.unit}"
-    if upper != -lower:
-        limit = f"{_write_number(lower)} to {limit}"
+        return Row(_write_value(largest, panel.unit), "", "", "")
+    ratios = np.abs(curve.ratios)
+    limit = f"{_write_number(float(curve.upper))} {panel.unit}"
+    if curve.upper != -curve.lower:
+        limit = f"{_write_number(float(curve.lower))} to {limit}"
     return Row(
-        value=_write_value(values[np.argmax(ratios)], part.unit),
+        value=_write_value(values[np.argmax(ratios)], panel.unit),
         limit=limit,
         share=f"{100.0 * ratios.max():.1f} %",
         level=_level(float(ratios.max()), tolerance),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.bottleneck.saturation import limit_ratios
+from brachis.apps.bottleneck.saturation import LimitRatios, limit_ratios
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import Panel, panels_of, ratio_panel, titles_of
 from brachis.apps.view import tables
@@ -50,16 +50,14 @@ def shown_panels(
         Whether angles of joints without limits are in degrees.
     """
     ratios = limit_ratios(trajectory)
-    found = []
-    for title in titles_of(ratios):
-        panel = ratio_panel(trajectory, ratios, title)
-        is_last = np.append(np.diff(panel.t) > 0.0, True)  # times of jumps occur twice
-        found.append(replace(panel, t=panel.t[is_last], values=panel.values[is_last]))
+    is_last = np.append(np.diff(ratios.t) > 0.0, True)  # times of jumps occur twice
+    once = LimitRatios(ratios.t[is_last], ratios.labels, ratios.values[is_last])
+    found = [ratio_panel(trajectory, once, title) for title in titles_of(once)]
     rows = ("torque", "velocity", "position")
     for panel in panels_of(trajectory, samples, *rows, degrees=degrees):
-        if not panel.is_limited.all():
-            free = panel.select(~panel.is_limited)
-            found.append(replace(free, unit=f"{free.unit}, no limit"))
+        free = tuple(curve for curve in panel.curves if not curve.is_limited)
+        if free:
+            found.append(replace(panel, curves=free, unit=f"{panel.unit}, no limit"))
     return [*found, *panels_of(trajectory, samples, "tool speed")]
 
 
@@ -78,14 +76,11 @@ class Chart:
         data = [panel.t]
         series: list[uplot.Series] = [{"label": "time (s)"}]
         for limit, _ in panel.near_limits():
-            data.append(np.broadcast_to(limit, panel.t.shape))
-            series.append(_series("limit", style.GREY, 1.0, (5.0, 4.0)))
-        for name, number, values in zip(
-            panel.names, panel.styles.tolist(), panel.values.T, strict=True
-        ):
-            colour, dash = look(number)
-            data.append(values)
-            series.append(_series(name, colour, 1.6, dash))
+            data.append(limit)
+            series.append(_series("limit", style.GREY, (5.0, 4.0), 1.0))
+        for curve in panel.curves:
+            data.append(curve.values)
+            series.append(_series(curve.name, *look(curve.style)))
         gui.add_html(_heading(panel))
         gui.add_uplot(
             tuple(data),
@@ -114,7 +109,7 @@ class Chart:
 
 
 def _series(
-    label: str, colour: str, width: float, dash: tuple[float, ...]
+    label: str, colour: str, dash: tuple[float, ...], width: float = 1.6
 ) -> uplot.Series:
     """Describe a line without points."""
     return {
@@ -153,13 +148,13 @@ def look(number: int) -> tuple[str, tuple[float, ...]]:
 def _heading(panel: Panel) -> str:
     """Title of a plot, and the names in the colours of their curves, as HTML."""
     entries = []
-    for name, number in zip(panel.names, panel.styles.tolist(), strict=True):
-        colour, dashes = look(number)
+    for curve in panel.curves:
+        colour, dashes = look(curve.style)
         border = f"2.5px {'dashed' if dashes else 'solid'} {colour}"
         line = f"display:inline-block;width:1.2em;border-top:{border};vertical-align:middle;margin-right:0.3em"
         entries.append(
             f'<span style="white-space:nowrap;margin-right:0.8em"><span style="{line}"></span>'
-            f"{html.escape(name)}</span>"
+            f"{html.escape(curve.name)}</span>"
         )
     return (
         '<div style="margin:0.3em 0.8em 0 0.8em">'

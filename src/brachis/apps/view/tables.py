@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from brachis.apps.plots.panels import panels_of, select_joint
+from brachis.apps.plots.panels import curves_of, panels_of
 from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import Samples, Trajectory
 
@@ -37,10 +37,10 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
     rows = []
     for name in trajectory.joint_names:
-        parts = zip(select_joint(panels, name), _STATE.values(), strict=True)
+        own = zip(curves_of(panels, name), _STATE.values(), strict=True)
         cells = [
-            f"{_write_number(part.values[0, 0], digits)} {part.unit}"
-            for part, digits in parts
+            f"{_write_number(curve.values[0], digits)} {panel.unit}"
+            for (panel, curve), digits in own
         ]
         rows.append([name, *cells])
     return head + _table(("joint", "position", "velocity", "torque, force"), rows)
