@@ -165,7 +165,7 @@ class Saturation(Summary):
 
 
 def saturations(
-    trajectory: Trajectory,
+    motion: Trajectory | LimitRatios,
     limits: Sequence[Limit] | None = None,
     *,
     threshold: float = THRESHOLD,
@@ -175,8 +175,8 @@ def saturations(
 
     Parameters
     ----------
-    trajectory : Trajectory
-        Any one, a saved one for example.
+    motion : Trajectory or LimitRatios
+        Any trajectory, a saved one for example, or its ratios.
     limits : sequence of Limit, optional
         Those of the trajectory's task if left out.
     threshold : float, optional
@@ -189,15 +189,9 @@ def saturations(
     tuple of Saturation
         Of all limits, those active longest first.
     """
-    return saturations_of(
-        limit_ratios(trajectory, limits), threshold=threshold, ripple=ripple
-    )
-
-
-def saturations_of(
-    ratios: LimitRatios, *, threshold: float = THRESHOLD, ripple: float = RIPPLE
-) -> tuple[Saturation, ...]:
-    """As `saturations`, from ratios already computed."""
+    ratios = motion
+    if isinstance(ratios, Trajectory):
+        ratios = limit_ratios(ratios, limits)
     found = []
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [

@@ -9,7 +9,7 @@ from brachis.apps.bottleneck.saturation import (
     dense_samples,
     knot_times,
     limit_ratios,
-    saturations_of,
+    saturations,
 )
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import (
@@ -146,7 +146,7 @@ def draw_holding(
     """Draw the limits that hold the motion, one panel below the other; see `plot_overview`."""
     ratios = limit_ratios(trajectory)
     shares = dict.fromkeys(titles_of(ratios), 0.0)
-    for found in saturations_of(ratios):
+    for found in saturations(ratios):
         shares[found.label.axis] += found.share
     longest = sorted(shares, key=shares.__getitem__, reverse=True)[:3]
     active = [title for title in longest if shares[title] > 0.0]

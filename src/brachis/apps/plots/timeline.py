@@ -11,7 +11,7 @@ from brachis.apps.bottleneck.saturation import (
     RIPPLE,
     THRESHOLD,
     limit_ratios,
-    saturations_of,
+    saturations,
 )
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import dress
@@ -53,7 +53,7 @@ def plot_timeline(
     from matplotlib.patches import Patch
 
     ratios = limit_ratios(trajectory, limits)
-    found = {entry.label: entry for entry in saturations_of(ratios)}
+    found = {entry.label: entry for entry in saturations(ratios)}
     shown = [k for k, label in enumerate(ratios.labels) if found[label].is_half_used]
     labels = [ratios.labels[column] for column in shown]
     figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * max(len(shown), 1))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from brachis.apps import bottleneck
 from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
-from brachis.apps.bottleneck.saturation import dense_samples, saturations_of
+from brachis.apps.bottleneck.saturation import dense_samples, saturations
 from brachis.apps.bottleneck.text import write_active
 from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
@@ -91,14 +91,14 @@ def reported_motion(
             )
         not_completed += motion.not_completed
     ratios = limit_ratios(trajectory, limits)
-    saturations = saturations_of(ratios)
+    found = saturations(ratios)
     return ReportedMotion(
         trajectory=trajectory,
         samples=dense_samples(trajectory),
         verification=verification,
         ratios=ratios,
-        saturations=saturations,
-        held_back=_held_back(motion, saturations, degrees=degrees),
+        saturations=found,
+        held_back=_held_back(motion, found, degrees=degrees),
         remarks=remarks,
         not_completed=tuple(not_completed),
         candidates=candidates,
