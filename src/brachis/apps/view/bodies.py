@@ -211,11 +211,6 @@ class Placements:
     positions: np.ndarray
     quaternions: np.ndarray
 
-    @property
-    def tool(self) -> np.ndarray:
-        """Positions of the tool, (K, 3), m."""
-        return np.asarray(self.positions[:, -1])
-
 
 def placements(robot: Robot, q: np.ndarray) -> Placements:
     """Forward kinematics of postures `q`, (K, n)."""
@@ -355,41 +350,13 @@ def _range(trajectory: Trajectory, joint: int) -> np.ndarray:
     return np.where(np.isfinite(ends), ends, [q.min(), q.max()])
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A trajectory at even times.
-
-    Attributes
-    ----------
-    trajectory : Trajectory
-    samples : Samples
-        At K times from start to end.
-    frames : Placements
-        At the same times.
-    path : (K, 3) ndarray
-        The prescribed path at the motion's own s, m; what it does not prescribe is the tool's.
-    ghosts : Placements
-        At a few even times from start to end.
-    """
-
-    trajectory: Trajectory
-    samples: Samples
-    frames: Placements
-    path: np.ndarray
-    ghosts: Placements
-
-    @classmethod
-    def of(cls, trajectory: Trajectory) -> Motion:
-        """Evaluate a trajectory."""
-        samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
-        frames = placements(trajectory.robot, samples.q)
-        times = np.linspace(0.0, trajectory.t_end, 6)
-        ghosts = placements(trajectory.robot, trajectory.position(times))
-        path = frames.tool.copy()
-        task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-        axes = list(task_map.axes)
-        if axes:
-            prescribed = path_of(task_map, trajectory.task)
-            target = prescribed.sample(np.clip(samples.s, 0.0, 1.0)).target
-            path[:, axes] = target[:, : len(axes)]
-        return cls(trajectory, samples, frames, path, ghosts)
+def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
+    """Return the path at the motion's own s, (K, 3), m; what it does not prescribe is the tool's."""
+    task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
+    axes = list(task_map.axes)
+    points = samples.tool_position.copy()
+    if axes:
+        path = path_of(task_map, trajectory.task)
+        target = path.sample(np.clip(samples.s, 0.0, 1.0)).target
+        points[:, axes] = target[:, : len(axes)]
+    return points

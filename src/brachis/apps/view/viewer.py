@@ -10,7 +10,6 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
-from brachis.apps.view.bodies import Motion, bodies_of
 from brachis.apps.view.panel import Controls, Playback, first_rate
 from brachis.apps.view.scene import Scene
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
@@ -69,19 +68,16 @@ class Viewer:
         )
         self._trajectory = trajectory
         self._lock = threading.RLock()
-        motion = Motion.of(trajectory)
-        bodies = bodies_of(trajectory)
         self._server = start_server(host, port)
         try:
-            self._scene = Scene(self._server, motion, bodies)
+            self._scene = Scene(self._server, trajectory)
             self._panel = Controls(
                 self._server,
-                motion,
+                trajectory,
                 self._scene,
                 self.playback,
                 self.show,
                 candidates,
-                [f"not shown: {reason}" for reason in bodies.unread],
                 verified=verified,
                 degrees=degrees,
             )
