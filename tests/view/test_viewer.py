@@ -45,7 +45,7 @@ def test_the_robot_is_where_the_motion_has_it_at_the_chosen_instant(shown, line_
     shown.show()
     found = placements(motion.robot, motion.position(0.6 * motion.t_end)[None])
     np.testing.assert_allclose(
-        poses(shown), np.hstack([found.positions[0], found.quaternions[0]]), atol=1e-6
+        poses(shown), np.hstack([found[0][0], found[1][0]]), atol=1e-6
     )
     assert np.abs(poses(shown) - before).max() > 0.1
     assert shown._panel._slider.value == pytest.approx(0.6 * motion.t_end, abs=0.01)

@@ -40,7 +40,7 @@ class ReportedMotion:
         What is implausible in robot and task.
     not_completed : tuple of str
         What the search did not complete.
-    candidates : tuple of Attempt
+    candidates : tuple of Candidate
         What the search looked at; none for a saved motion.
     planned : dict of str to str
         How the motion was planned, where that is known.
@@ -66,30 +66,27 @@ def reported_motion(
 ) -> ReportedMotion:
     """Gather what there is to say of a motion; a saved one is verified again."""
     limits: list[Limit] | None = None
-    not_completed: list[str] = []
+    not_completed: tuple[str, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    planned = {}
     if isinstance(motion, Trajectory):
         trajectory = motion
         verification = verify_trajectory(motion)
         remarks = of_robot(motion.robot) + of_task(motion.task)
-        candidates: tuple[Candidate, ...] = ()
-        planned = {}
     else:
         trajectory = motion.trajectory
         verification = motion.verification
         remarks = motion.warnings
         candidates = motion.candidates
         planned = _describe_plan(motion)
-        if motion.attempt.refined is not None:
-            limits = [
-                limit
-                for limit in motion.attempt.refined.program.limits
-                if limit.role is not Role.SAFEGUARD
-            ]
+        refined = motion.attempt.refined
+        if refined is not None:
+            every = refined.program.limits
+            limits = [limit for limit in every if limit.role is not Role.SAFEGUARD]
+        not_completed = motion.not_completed
         if motion.interrupted:
-            not_completed.append(
-                "the search was ended early: a faster motion may have been missed"
-            )
-        not_completed += motion.not_completed
+            early = "the search was ended early: a faster motion may have been missed"
+            not_completed = (early, *not_completed)
     ratios = limit_ratios(trajectory, limits)
     found = saturations(ratios)
     return ReportedMotion(
@@ -100,7 +97,7 @@ def reported_motion(
         saturations=found,
         held_back=_held_back(motion, found, degrees=degrees),
         remarks=remarks,
-        not_completed=tuple(not_completed),
+        not_completed=not_completed,
         candidates=candidates,
         planned=planned,
         degrees=degrees,

@@ -196,24 +196,16 @@ def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trime
     return mesh
 
 
-@dataclass(frozen=True, eq=False)
-class Placements:
-    """Frames of a robot in the world frame at K postures.
+def placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forward kinematics of postures `q`, (K, n).
 
-    Attributes
-    ----------
+    Returns
+    -------
     positions : (K, n + 2, 3) ndarray
-        Of the world, of what every joint moves, and of the tool, m.
+        Of the world, of what every joint moves, and of the tool, in the world frame, m.
     quaternions : (K, n + 2, 4) ndarray
         w, x, y, z.
     """
-
-    positions: np.ndarray
-    quaternions: np.ndarray
-
-
-def placements(robot: Robot, q: np.ndarray) -> Placements:
-    """Forward kinematics of postures `q`, (K, n)."""
     model = robot.model
     data = model.createData()
     frames = np.empty((len(q), robot.n + 2, 7))
@@ -221,7 +213,7 @@ def placements(robot: Robot, q: np.ndarray) -> Placements:
         pin.forwardKinematics(model, data, posture)
         tool = pin.updateFramePlacement(model, data, robot.frame_id)
         rows[:] = [pin.SE3ToXYZQUAT(placement) for placement in (*data.oMi, tool)]
-    return Placements(frames[..., :3], frames[..., [6, 3, 4, 5]])
+    return frames[..., :3], frames[..., [6, 3, 4, 5]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,30 +257,30 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
             mesh.apply_transform(frame.placement.homogeneous)
         links.setdefault(int(frame.parentJoint), []).extend(meshes)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
-    found = placements(robot, q)
-    size = float(np.ptp(found.positions.reshape(-1, 3), axis=0).max())
+    frames = placements(robot, q)
+    size = float(np.ptp(frames[0].reshape(-1, 3), axis=0).max())
     skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
     drawn = links or skeleton
     moving = {joint: meshes for joint, meshes in drawn.items() if joint}
-    return Bodies(
-        links, skeleton, tuple(unread), _box(drawn, found), _box(moving, found)
-    )
+    boxes = (_box(drawn, *frames), _box(moving, *frames))
+    return Bodies(links, skeleton, tuple(unread), *boxes)
 
 
 def _box(
-    bodies: Mapping[int, Sequence[trimesh.Trimesh]], found: Placements
+    bodies: Mapping[int, Sequence[trimesh.Trimesh]],
+    positions: np.ndarray,
+    quaternions: np.ndarray,
 ) -> np.ndarray:
     """Corners, (2, 3), of a box around joints, tool and bodies in all postures."""
     import trimesh
     from scipy.spatial.transform import Rotation
 
-    points = [found.positions[:, 1:].reshape(-1, 3)]
+    points = [positions[:, 1:].reshape(-1, 3)]
     for joint, meshes in bodies.items():
-        corners = np.concatenate(
-            [trimesh.bounds.corners(each.bounds) for each in meshes]
-        )
-        turns = Rotation.from_quat(found.quaternions[:, joint], scalar_first=True)
-        for turn, position in zip(turns, found.positions[:, joint], strict=True):
+        boxes = [trimesh.bounds.corners(mesh.bounds) for mesh in meshes]
+        corners = np.concatenate(boxes)
+        turns = Rotation.from_quat(quaternions[:, joint], scalar_first=True)
+        for turn, position in zip(turns, positions[:, joint], strict=True):
             points.append(position + turn.apply(corners))
     every = np.concatenate(points)
     return np.array([every.min(axis=0), every.max(axis=0)])

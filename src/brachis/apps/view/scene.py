@@ -87,10 +87,10 @@ class Scene:
 
     def show(self, q: np.ndarray) -> None:
         """Move the robot into the posture `q`, (n,)."""
-        found = placements(self._robot, q[None])
+        positions, quaternions = placements(self._robot, q[None])
         for k, handle in enumerate((*self._frames, self._tool)):
-            handle.position = found.positions[0, k]
-            handle.wxyz = found.quaternions[0, k]
+            handle.position = positions[0, k]
+            handle.wxyz = quaternions[0, k]
 
     def _frame(self, name: str, part: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""
@@ -120,11 +120,12 @@ class Scene:
         links = self.bodies.links
         bodies = links if self.bodies.shows_links else self.bodies.skeleton
         times = np.linspace(0.0, self._trajectory.t_end, 6)
-        ghosts = placements(self._robot, self._trajectory.position(times))
+        frames = placements(self._robot, self._trajectory.position(times))
         shades = np.linspace([190, 214, 235], [25, 75, 125], 6).astype(np.uint8)
         for joint, meshes in bodies.items():
-            frames = (ghosts.positions[:, joint], ghosts.quaternions[:, joint])
-            if np.ptp(np.hstack(frames), axis=0).max() < 1e-9:  # it stands still
+            positions, quaternions = (each[:, joint] for each in frames)
+            turned = np.ptp(quaternions, axis=0).max()
+            if max(turned, np.ptp(positions, axis=0).max()) < 1e-9:  # it stands still
                 continue
             coarse = [
                 mesh.convex_hull if len(mesh.faces) > 2000 else mesh for mesh in meshes
@@ -136,8 +137,8 @@ class Scene:
                 f"/ghosts/{joint}",
                 whole.vertices,
                 whole.faces,
-                batched_positions=frames[0],
-                batched_wxyzs=frames[1],
+                batched_positions=positions,
+                batched_wxyzs=quaternions,
                 batched_colors=shades,
                 opacity=0.13,
                 cast_shadow=False,
@@ -217,8 +218,8 @@ class Scene:
 
     def _direction(self) -> np.ndarray:
         """Return the unit vector from the scene to the camera, (3,)."""
-        first = placements(self._robot, self.samples.q).positions[:, 1].mean(axis=0)
-        reach = self.samples.tool_position.mean(axis=0) - first
+        positions, _ = placements(self._robot, self.samples.q)
+        reach = (self.samples.tool_position - positions[:, 1]).mean(axis=0)
         azimuth = np.arctan2(reach[1], reach[0]) - np.radians(50.0)
         directions = {
             None: (np.cos(azimuth), np.sin(azimuth), 0.55),
