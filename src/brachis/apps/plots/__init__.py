@@ -20,11 +20,11 @@ from brachis.apps.plots.motion import (
     plot_limits,
     plot_motion,
     plot_overview,
+    plot_timeline,
     plot_torques,
 )
 from brachis.apps.plots.postures import plot_postures
 from brachis.apps.plots.style import SUFFIXES, as_html, check_suffix, save_figure
-from brachis.apps.plots.timeline import plot_timeline
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:

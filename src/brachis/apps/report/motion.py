@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from brachis.apps import bottleneck
 from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
+from brachis.apps.bottleneck.report import write_active
 from brachis.apps.bottleneck.saturation import dense_samples, saturations
-from brachis.apps.bottleneck.text import write_active
 from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
 from brachis.optimise.candidate import Candidate
