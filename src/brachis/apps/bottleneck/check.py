@@ -1,18 +1,17 @@
-"""Predictions checked by solving again: the same problem with one limit after the other raised.
+"""Predictions of the multipliers, compared with solving again with one limit after the other raised.
 
-Knots, collocation points and branch margins stay; every solve begins at the answer and is held to a tighter tolerance.
-An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself. Where a
-change is not as predicted, the unchanged problem is solved again from the new answer: a step into the valley of another
-local optimum is not an effect of the limit.
+Knots, collocation points and branch margins stay. Every solve begins at the answer and has a tighter tolerance. An
+answer is an optimum if least squares find multipliers for it, whatever status the solver reports. If a change is not as
+predicted, the unchanged problem is solved again from the new answer: the step may have led to another local optimum,
+which is not an effect of the limit.
 
-The change of t_E for a limit that rises by a finite step, from the problem linearised at its answer.
-
-Multipliers are derivatives: they hold for steps so small that the same rows stay active. The linear program
+Multipliers are derivatives: they hold for steps so small that the same rows stay active. For a finite step, the problem
+linearised at its answer is solved with the raised limit, so that other rows can take over within the step:
 
     minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
 
-with the raised limit lets other rows take over within the step. Its optimum is not lower than what the multipliers
-promise, since they are feasible for its dual; it tells how much of the promise other limits take back.
+Its optimum is not lower than what the multipliers promise, since they are feasible for its dual. The difference is the
+part of the promise that other limits take back.
 """
 
 from __future__ import annotations
@@ -58,10 +57,10 @@ class CheckedSensitivity:
     re_solved : float
         Change found by solving again, s.
     other_optimum : float
-        Where the solve again came to another local optimum: how much longer the unchanged problem takes there, s.
-        `re_solved` is then the change from there. 0 otherwise.
+        How much longer the unchanged problem takes at another local optimum, s, if the solve ended there; `re_solved`
+        is then the change from there. 0 otherwise.
     optimal : bool
-        False where the solve again ended without an optimum, so that `re_solved` says little.
+        False if the solve ended without an optimum, so that `re_solved` is rough.
     """
 
     sensitivity: Sensitivity
@@ -73,12 +72,12 @@ class CheckedSensitivity:
 
     @property
     def deviation(self) -> float:
-        """How far the multipliers' promise is off, as a fraction of the re-solved change; 0 where neither changes."""
+        """How far the multipliers' promise is off, as a fraction of the re-solved change; 0 if neither changes."""
         return _deviation(self.predicted, self.re_solved)
 
     @property
     def linearised_deviation(self) -> float:
-        """As `deviation`, of `linearised`."""
+        """Deviation of `linearised`, likewise."""
         return _deviation(self.linearised, self.re_solved)
 
     def to_dict(self) -> dict[str, Any]:
@@ -160,9 +159,9 @@ def check_sensitivities(
     refined : Refined
         ``result.attempt.refined``.
     predictions : Sensitivities, optional
-        What is checked; by default what `sensitivities` says.
+        What is checked; by default the result of `sensitivities`.
     step : float, optional
-        Fraction by which each limit leaves more room; less where it is negative.
+        Fraction by which each limit leaves more room; less if it is negative.
 
     Returns
     -------
@@ -232,7 +231,7 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     Returns
     -------
     float or None
-        s; None where the linear program has no answer.
+        s; None if the linear program has no answer.
 
     Raises
     ------
@@ -271,7 +270,13 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
 
 
 def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Solve to a tight tolerance from x with one backend after the other; tell whether it is an optimum.
+    """Solve to a tight tolerance from x with one backend after the other.
+
+    Returns
+    -------
+    x : (v,) ndarray
+    optimal : bool
+        Whether it is an optimum.
 
     Raises
     ------

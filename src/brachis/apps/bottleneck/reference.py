@@ -1,4 +1,4 @@
-"""Two comparisons that show what a motion loses: the best value known, and the knots.
+"""Two comparisons that show what a motion loses: with the best value known, and with other knots.
 
 The reference is the same problem with discontinuous torque, on a fine mesh. Rest means
 zero velocity only, so that torques may leave their static values at once. Cubic splines
@@ -61,7 +61,7 @@ class Reference:
     distance : float
         How much longer the motion takes, as a fraction of `t_end`.
     degree, intervals : int
-        Of the splines that gave it.
+        Of the splines of this motion.
     violation : float
         Largest violation of a limit on a dense grid, as a fraction of it.
     wall_time : float
@@ -193,7 +193,7 @@ def _plan_on_mesh(
 
 
 def _violation(answer: Refined) -> float:
-    """Largest violation of a limit on a dense grid and on both sides of every knot; infinite where out of reach."""
+    """Largest violation of a limit on a dense grid and on both sides of every knot; infinite if out of reach."""
     ((phase, x),) = answer.program.split(answer.x)
     breaks = phase.breaks
     grid = np.linspace(0.0, 1.0, 30 * phase.intervals + 1)
@@ -246,8 +246,8 @@ def knot_cost(
     Returns
     -------
     KnotCost or None
-        None if the phase plane does not tell: a limit bounds the jerk or the rate of the torque, or the motion in the
-        phase plane exceeds a limit that it leaves out.
+        None if it cannot be compared: a limit bounds the jerk or the rate of the torque, or the motion in the phase
+        plane exceeds a limit that the phase plane leaves out.
     """
     if any(limit.order > _JUMPING for limit in limits):
         return None

@@ -174,13 +174,13 @@ class BottleneckReport:
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
     knots : KnotCost or None
-        What the knots cost; None where that is not known.
+        What the knots cost; None if that is not known.
     check : SensitivityCheck or None
-        The predictions beside solving again, where asked for.
+        The predictions compared with solving again, if requested.
     reference : Reference or None
-        The best value known, where asked for and found.
+        The best value known, if requested and found.
     reference_sought : bool
-        True where it was asked for.
+        Whether it was requested.
 
     Examples
     --------
@@ -203,7 +203,7 @@ class BottleneckReport:
         return self.text()
 
     def text(self, *, degrees: bool = False) -> str:
-        """Say all in plain words, angles in degrees if asked for."""
+        """Say all in plain words, angles in degrees if requested."""
         lines = ["the motion was not planned: what a limit costs is not known"]
         if self.sensitivities is not None:
             lines = _costs(self.sensitivities, self.t_end, degrees=degrees)
@@ -332,7 +332,7 @@ def _part(saved: float, t_end: float) -> str:
 
 
 def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
-    """Sentences on every limit that costs time, the costliest first."""
+    """Say what every limit costs, the costliest first."""
     lines = []
     if not found.reliable:
         lines.append(
@@ -374,7 +374,7 @@ def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
 
 
 def _knots(found: KnotCost, t_end: float) -> list[str]:
-    """Say what the knots cost, if it is worth a line: it is known to 0.2 %, and ``intervals: auto`` leaves 0.1 %."""
+    """Say what the knots cost from 1 % on: it is known to 0.2 %, and ``intervals: auto`` leaves 0.1 %."""
     if found.saved < 0.01:
         return []
     line = (
@@ -389,13 +389,13 @@ def _knots(found: KnotCost, t_end: float) -> list[str]:
 def _boundary(entry: BranchBoundary) -> str:
     saved = _figures(1e3 * entry.derivative * entry.margin)
     return (
-        f"the branch boundary of {entry.label} costs {saved} ms (margin {entry.margin:.3g}, to first order): no "
-        "limit of the robot; other redundant joints may be faster"
+        f"the branch boundary of {entry.label} costs {saved} ms (margin {entry.margin:.3g}, to first order): not "
+        "a limit of the robot; other redundant joints may be faster"
     )
 
 
 def _check_lines(check: SensitivityCheck) -> list[str]:
-    """Sentences on the predictions beside solving again."""
+    """Say how the predictions compare with solving again."""
     lines = []
     for entry in check.entries:
         if not entry.predicted:
@@ -434,7 +434,7 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
 
 
 def write_active(found: tuple[Saturation, ...]) -> list[str]:
-    """Sentences on the limits that are active for some time."""
+    """Say which limits are active for some time."""
     lines = []
     for entry in found:
         if entry.share < 5e-4:

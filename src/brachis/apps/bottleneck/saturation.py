@@ -35,7 +35,7 @@ class LimitRatios(Summary):
     values: np.ndarray
 
     def __post_init__(self) -> None:
-        """Take copies that nobody can write to."""
+        """Make the arrays read-only copies."""
         freeze(self, "t", "values")
 
 

@@ -1,22 +1,20 @@
 """What a limit costs: the derivative of t_E with respect to every limit, from the multipliers.
 
-Every limit tells which figures a user could change, and at which rate d the bounds of its rows move outwards when one
-of them gives way (`brachis.limits.Bound`): with the multipliers w of these rows
+Every limit lists the figures that a user could change, and the rates d at which the bounds of its rows move outwards if
+one of them is relaxed (`brachis.limits.Bound`). With the multipliers w of these rows
 
     dt_E / d(figure) = -sum w d.
 
-Multipliers of a solved program: the solver's where they balance the gradient, otherwise least squares.
-
-At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
+The multipliers are the solver's if they balance the gradient, otherwise those by least squares. At an optimum the
+gradient of t_E is a combination of the slopes of the active rows and variable bounds,
 
     grad t_E = sum_i w_i p_i,    w_i >= 0,
 
 with p_i the gradient of a row or variable at its lower bound, or minus that at its upper bound. The norm of what is
-left over, relative to the gradient's, tells how far an answer is from being stationary.
+left over, relative to the gradient's, measures how far an answer is from being stationary.
 
-If the bounds of the active rows give way at rates d_i >= 0, then dt_E = -sum_i w_i d_i. Where the slopes are linearly
-dependent, many sets of multipliers balance the gradient, and the one that holds for a relaxation is the one that
-promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+If the slopes are linearly dependent, many sets of multipliers balance the gradient. The one that holds for a relaxation
+is the one that promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
 """
 
 from __future__ import annotations
@@ -96,7 +94,7 @@ class ActiveSet(Summary):
 
     @property
     def dependent(self) -> bool:
-        """True where several sets of multipliers may balance a gradient."""
+        """Whether several sets of multipliers may balance a gradient."""
         return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < len(self.slopes))
 
     def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
@@ -135,9 +133,9 @@ class Multipliers(Summary):
     source : str
         ``"solver"`` or ``"least squares"``.
     residual : float
-        See `ActiveSet.stationarity_residual`; 1 where nothing balances.
+        Norm of what the weights leave of the gradient, relative to the gradient's; 1 if nothing balances.
     unique : bool
-        False where other multipliers balance the gradient as well.
+        False if other multipliers balance the gradient as well.
     """
 
     active_set: ActiveSet
@@ -147,7 +145,7 @@ class Multipliers(Summary):
     unique: bool
 
     def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
-        """Directional derivative of t_E as bounds give way.
+        """Directional derivative of t_E if bounds are relaxed.
 
         Parameters
         ----------
@@ -226,7 +224,7 @@ def _balance(
 
 
 STATIONARY = 1e-3
-"""With a larger residual the answer is not an optimum, and its multipliers say little."""
+"""Largest residual of an optimum, relative to the gradient; beyond it the multipliers are rough."""
 
 
 @dataclass(frozen=True)
@@ -239,7 +237,7 @@ class Sensitivity:
     bound : Bound
         The figure.
     derivative : float
-        Derivative of t_E with respect to the figure, s per unit; <= 0 but at a lower end, which is raised by it.
+        Derivative of t_E with respect to the figure, s per unit; <= 0 except at a lower end, which is raised by it.
     """
 
     limit: Limit
@@ -276,7 +274,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class BranchBoundary:
-    """What the branch's boundary costs; no limit of the robot, but of the choice of redundant joints.
+    """What the branch's boundary costs; it limits the choice of redundant joints, not the robot.
 
     Attributes
     ----------
@@ -312,11 +310,11 @@ class Sensitivities(Summary):
     boundaries : tuple of BranchBoundary
         Branch margins that hold the motion back.
     source : str
-        Where the multipliers are from: ``"solver"`` or ``"least squares"``.
+        Origin of the multipliers: ``"solver"`` or ``"least squares"``.
     residual : float
         Part of the gradient of t_E that they do not balance; an optimum has 0.
     unique : bool
-        False where the multipliers are not unique: the derivatives then hold for more room only, not for less.
+        False if the multipliers are not unique: the derivatives then hold for more room only, not for less.
     """
 
     limits: tuple[Sensitivity, ...]
@@ -327,7 +325,7 @@ class Sensitivities(Summary):
 
     @property
     def reliable(self) -> bool:
-        """True where the answer is an optimum as far as the multipliers tell."""
+        """Whether the answer is an optimum, judged by the multipliers."""
         return self.residual <= STATIONARY
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
@@ -369,7 +367,7 @@ def sensitivities(refined: Refined) -> Sensitivities:
 
 
 def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
-    """As `sensitivities`, from a problem and the multipliers of its answer."""
+    """Derive what every limit costs from a problem and the multipliers of its answer."""
     found: list[Sensitivity] = []
     boundaries: list[BranchBoundary] = []
     for limit in program.limits:

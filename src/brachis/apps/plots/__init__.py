@@ -1,4 +1,4 @@
-"""Figures of a trajectory; a plot is one file here and one line in `PLOTS`.
+"""Figures of a trajectory; a plot is one function here and one row of `PLOTS`.
 
 Every function returns a Matplotlib figure of its own, made without pyplot and without touching Matplotlib's settings.
 Matplotlib is imported when the first figure is made.

@@ -122,10 +122,10 @@ LABEL_SIZE = 8.0
 TICK_SIZE = 7.0
 """Font size of all other text, points."""
 LINE_WIDTH = 1.2
-"""Of data, points."""
+"""Width of the lines of data, points."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's colours, told apart by colour-blind readers; their yellow is too faint on white."""
+"""Okabe and Ito's colours, which colour-blind readers can distinguish; without yellow, which is too faint on white."""
 LINE_STYLES: tuple[Any, ...] = (
     "-",
     (0, (6.0, 1.6)),
@@ -134,7 +134,7 @@ LINE_STYLES: tuple[Any, ...] = (
     (0, (2.6, 1.2)),
     (0, (6.0, 1.3, 1.2, 1.3, 1.2, 1.3)),
 )
-"""Told apart in print without colours. One fewer than colours, so that joints far down the chain still differ."""
+"""Line styles that differ in print without colours; one fewer than colours, so that joints of long chains differ."""
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
 LIMIT: dict[str, Any] = {
     "linewidth": 0.7,

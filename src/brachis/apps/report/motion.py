@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ReportedMotion:
-    """A motion with all that is said of it.
+    """A motion with everything that a report shows of it.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class ReportedMotion:
     candidates : tuple of Candidate
         What the search looked at; none for a saved motion.
     planned : dict of str to str
-        How the motion was planned, where that is known.
+        How the motion was planned, if that is known.
     degrees : bool
         Whether angles are shown in degrees.
     """

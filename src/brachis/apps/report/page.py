@@ -164,7 +164,7 @@ def _part(name: str) -> str:
 
 
 def _template() -> Any:
-    """Read the page's template; what is filled in is escaped unless it is said to be safe."""
+    """Read the page's template; what is filled in is escaped unless the template marks it as safe."""
     jinja2 = require_library("jinja2", "a report", library="Jinja2", extra="report")
     environment = jinja2.Environment(
         autoescape=True,

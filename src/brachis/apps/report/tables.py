@@ -130,7 +130,7 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
 
 
 def describe_path(task: Task) -> str:
-    """Name the segments of a path, each by its shape and what the task says of it."""
+    """Name the segments of a path, each by its shape and its entries in the task."""
     found = []
     for segment in task.path:
         for shape, given in segment.model_dump(exclude_defaults=True).items():

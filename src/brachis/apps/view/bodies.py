@@ -109,7 +109,7 @@ def _check_size(path: Path, room: int) -> int:
     Raises
     ------
     InputError
-        It is packed, so that nobody knows its size, or larger than `room`, bytes.
+        It is packed, so that its size is not known, or larger than `room`, bytes.
     """
     if path.suffix in {".gz", ".bz2"}:
         raise InputError(
@@ -172,7 +172,7 @@ def _meshes(
 
 
 def _place(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
-    """Place a mesh, and see to its colour where it has no picture on it."""
+    """Place a mesh, and colour it unless it has a picture on it."""
     # A material, or colours of the faces.
     look = getattr(mesh.visual, "material", mesh.visual)
     pictures = [getattr(look, name, None) for name in ("baseColorTexture", "image")]
@@ -223,7 +223,7 @@ class Bodies:
     Attributes
     ----------
     links : dict of int to list of Trimesh
-        What the URDF says the links look like; joint 0 is the world.
+        Visual shapes of the URDF; joint 0 is the world.
     skeleton : dict of int to list of Trimesh
         Joints and the straight lines between them.
     unread : tuple of str

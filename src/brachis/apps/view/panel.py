@@ -228,7 +228,7 @@ class Playback:
 
 
 class Controls:
-    """What is beside the scene.
+    """Controls, tables and plots at the sides of the scene.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ class Controls:
     candidates : sequence of mapping
         What the search looked at, as `Candidate.to_dict` gives it.
     verified : bool or None
-        None where it is not known.
+        None if it is not known.
     degrees : bool
         Whether angles are in degrees.
     """

@@ -53,7 +53,7 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
     """
     if not candidates:
         return _paragraph(
-            "The candidates of the search are not known: they are in result.json beside result.npz."
+            "The candidates of the search are not known: they are in result.json, in the folder of result.npz."
         )
     rows = candidate_rows(candidates)
     left = len(candidates) - len(rows[:_MANY])
@@ -77,12 +77,12 @@ def summary(
     trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None
 ) -> str:
     """End time, what is known of the verification, and what else the user should know."""
-    told = {
+    verdict = {
         None: "",
         True: ", verified",
         False: ', <b style="color:#D00000">NOT verified</b>',
     }[verified]
-    text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{told}</div>'
+    text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{verdict}</div>'
     return text + (_paragraph(*notes) if notes else "")
 
 

@@ -26,11 +26,11 @@ class Viewer:
     candidates : sequence of mapping, optional
         What the search looked at, as `Candidate.to_dict` gives it.
     verified : bool, optional
-        Whether the motion passed the verification, where that is known.
+        Whether the motion passed the verification, if that is known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address that the server listens on; by default nobody but this machine reaches it.
+        Address that the server listens on; by default only this machine reaches it.
     port : int, optional
         0 takes any free port; the first free one from 8080 on if left out.
 
@@ -39,7 +39,7 @@ class Viewer:
     url : str
         Where to look at it.
     local : bool
-        Whether nobody but this machine reaches it.
+        Whether only this machine reaches it.
     playback : Playback
         Which instant is shown.
 
@@ -132,7 +132,7 @@ class Viewer:
         return f'<iframe src="{url}" width="100%" height="640" style="border:0"></iframe><a href="{url}">{url}</a>'
 
     def _run(self) -> None:
-        """Play the motion as long as somebody looks: 30 pictures/s of the robot, 10 of the plots and the table."""
+        """Play the motion while a page is open: 30 pictures/s of the robot, 10 of the plots and the table."""
         before = time.monotonic()
         picture = 0
         while not self._stopped.wait(1.0 / 30.0):
@@ -172,11 +172,11 @@ def view(
     candidates : sequence of mapping, optional
         What the search looked at, as `Result.to_dict` lists it.
     verified : bool, optional
-        Whether the motion passed the verification, where that is known.
+        Whether the motion passed the verification, if that is known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address that the viewer listens on; by default nobody but this machine reaches it.
+        Address that the viewer listens on; by default only this machine reaches it.
     port : int, optional
         0 takes any free port; the first free one from 8080 on if left out.
     block : bool, optional
