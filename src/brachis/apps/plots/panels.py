@@ -284,9 +284,8 @@ def _joint_panels(
             curves.append(Curve(trajectory.joint_names[joint], joint, *scaled))
         if not curves:
             continue
-        title, symbol = name, row.symbol
-        if base == "m" and row.prismatic:
-            title, symbol = row.prismatic
+        own = row.prismatic if base == "m" else None
+        title, symbol = own or (name, row.symbol)
         unit = unit.replace("^2", "²").replace("^3", "³")
         ratio = row.ratio_title or f"{title} / limit"
         found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))

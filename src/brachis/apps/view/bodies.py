@@ -248,6 +248,9 @@ class Bodies:
 
 def bodies_of(trajectory: Trajectory) -> Bodies:
     """Read a robot's shapes, and draw its skeleton as large as the robot is."""
+    import trimesh
+    from scipy.spatial.transform import Rotation
+
     robot = trajectory.robot
     shapes, unread = link_shapes(robot.urdf, Path(robot.source).absolute().parent)
     links: dict[int, list[trimesh.Trimesh]] = {}
@@ -257,33 +260,21 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
             mesh.apply_transform(frame.placement.homogeneous)
         links.setdefault(int(frame.parentJoint), []).extend(meshes)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
-    frames = placements(robot, q)
-    size = float(np.ptp(frames[0].reshape(-1, 3), axis=0).max())
+    positions, quaternions = placements(robot, q)
+    size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
     skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
-    drawn = links or skeleton
-    moving = {joint: meshes for joint, meshes in drawn.items() if joint}
-    boxes = (_box(drawn, *frames), _box(moving, *frames))
-    return Bodies(links, skeleton, tuple(unread), *boxes)
-
-
-def _box(
-    bodies: Mapping[int, Sequence[trimesh.Trimesh]],
-    positions: np.ndarray,
-    quaternions: np.ndarray,
-) -> np.ndarray:
-    """Corners, (2, 3), of a box around joints, tool and bodies in all postures."""
-    import trimesh
-    from scipy.spatial.transform import Rotation
-
-    points = [positions[:, 1:].reshape(-1, 3)]
-    for joint, meshes in bodies.items():
-        boxes = [trimesh.bounds.corners(mesh.bounds) for mesh in meshes]
-        corners = np.concatenate(boxes)
-        turns = Rotation.from_quat(quaternions[:, joint], scalar_first=True)
-        for turn, position in zip(turns, positions[:, joint], strict=True):
-            points.append(position + turn.apply(corners))
-    every = np.concatenate(points)
-    return np.array([every.min(axis=0), every.max(axis=0)])
+    fixed = [positions[:, 1:].reshape(-1, 3)]
+    moving = fixed.copy()
+    for joint, meshes in (links or skeleton).items():
+        own = np.concatenate([trimesh.bounds.corners(mesh.bounds) for mesh in meshes])
+        turns = Rotation.from_quat(quaternions[:, joint], scalar_first=True).as_matrix()
+        corners = positions[:, joint, None] + own @ turns.transpose(0, 2, 1)
+        (moving if joint else fixed).append(corners.reshape(-1, 3))
+    box, moving_box = (
+        np.array([points.min(axis=0), points.max(axis=0)])
+        for points in map(np.concatenate, (fixed + moving, moving))
+    )
+    return Bodies(links, skeleton, tuple(unread), box, moving_box)
 
 
 def _skeleton(
