@@ -97,11 +97,6 @@ class ActiveSet(Summary):
         """Whether several sets of multipliers may balance a gradient."""
         return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < len(self.slopes))
 
-    def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
-        """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
-        rest = gradient - weights @ self.slopes
-        return float(np.linalg.norm(rest) / np.linalg.norm(gradient))
-
     def weights_of(
         self, gradient: np.ndarray, multipliers: np.ndarray | None
     ) -> np.ndarray:
@@ -219,8 +214,9 @@ def _balance(
             if source == "solver" and given is None:
                 continue
             weights = active_set.weights_of(gradient, own)
-            rest = active_set.stationarity_residual(gradient, weights)
-            yield Multipliers(active_set, weights, source, rest, unique=unique)
+            rest = np.linalg.norm(gradient - weights @ active_set.slopes)
+            residual = float(rest / np.linalg.norm(gradient))
+            yield Multipliers(active_set, weights, source, residual, unique=unique)
 
 
 STATIONARY = 1e-3
