@@ -299,7 +299,7 @@ def test_paths_of_many_segments_are_told_in_short():
             "path": path,
         }
     )
-    said = tables.path_in_words(task)
+    said = tables.describe_path(task)
     assert said.startswith(
         "line (by [0.1, 0]), then spline (through 29 entries), then line (by [0, 0.1])"
     )

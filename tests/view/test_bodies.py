@@ -10,8 +10,8 @@ from support.shown import PANDA, ROBOTS
 def placed(bodies, found):
     """Vertices in the world at the first posture, by joint."""
     return {
-        joint: found.positions[0, joint]
-        + Rotation.from_quat(found.quaternions[0, joint], scalar_first=True).apply(
+        joint: found[0][0, joint]
+        + Rotation.from_quat(found[1][0, joint], scalar_first=True).apply(
             np.vstack([m.vertices for m in meshes])
         )
         for joint, meshes in bodies.items()
@@ -26,8 +26,8 @@ def test_placements_are_those_of_the_model(motion_of):
     t = np.linspace(0.2, 0.9, 5)
     found = placements(robot, motion.position(t))
     tool, rotations = robot.tool_placements(motion.position(t))
-    np.testing.assert_allclose(found.tool, tool, atol=1e-12)
-    w, x, y, z = found.quaternions[0, -1]
+    np.testing.assert_allclose(found[0][:, -1], tool, atol=1e-12)
+    w, x, y, z = found[1][0, -1]
     np.testing.assert_allclose(
         1.0 - 2.0 * (y * y + z * z), rotations[0, 0, 0], atol=1e-12
     )
@@ -52,11 +52,11 @@ def test_a_robot_without_shapes_gets_a_skeleton_from_base_to_tool(
     assert bodies.links == {}
     found = placements(bare_robot, motion.q[:1])
     vertices = placed(bodies.skeleton, found)
-    assert np.linalg.norm(vertices[2] - found.tool[0], axis=1).min() < 0.05
+    assert np.linalg.norm(vertices[2] - found[0][0, -1], axis=1).min() < 0.05
     np.testing.assert_allclose(
         [vertices[0][:, 1].min(), vertices[0][:, 1].max()], [-1.0, 2.0], atol=0.02
     )  # the rail
-    assert np.linalg.norm(vertices[1] - found.positions[0, 2], axis=1).min() < 0.05
+    assert np.linalg.norm(vertices[1] - found[0][0, 2], axis=1).min() < 0.05
 
 
 @pytest.mark.parametrize("urdf", ROBOTS, ids=lambda path: path.parent.name)

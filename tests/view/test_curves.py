@@ -72,9 +72,9 @@ def test_joints_without_limits_are_plotted_in_their_units(bare_robot, motion_of)
         if "torque / limit" in title or "force / limit" in title
     ]
     force, torque = found["force (N, no limit)"], found["torque (Nm, no limit)"]
-    assert (force.names, torque.names) == (("rail",), ("turn",))
+    assert [curve.name for curve in force.curves] == ["rail"]
+    assert [(curve.name, curve.style) for curve in torque.curves] == [("turn", 1)]
     np.testing.assert_allclose(force.values[:, 0], motion.torque(force.t)[:, 0])
-    assert torque.styles.tolist() == [1]
     low, high = torque.view()
     assert low < torque.values.min() <= torque.values.max() < high
 
@@ -89,7 +89,7 @@ def test_every_robot_has_curves(urdf, motion_of):
         assert np.isfinite(curves.values).all()
         assert (curves.t[0], curves.t[-1]) == (0.0, motion.t_end)
         assert (np.diff(curves.t) > 0.0).all()
-        assert curves.values.shape == (len(curves.t), len(curves.names))
+        assert curves.values.shape == (len(curves.t), len(curves.curves))
 
 
 def test_the_tools_speed_is_in_metres_per_second_beside_what_the_task_allows(

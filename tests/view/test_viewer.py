@@ -11,7 +11,7 @@ import pytest
 import brachis
 from brachis.apps.plots.style import COLOURS
 from brachis.apps.view import Viewer
-from brachis.apps.view.bodies import placements
+from brachis.apps.view.bodies import placements, prescribed_path
 from brachis.apps.view.panel import look
 from brachis.apps.view.scene import LAYERS
 from brachis.apps.view.tables import candidates_table, state_table, summary
@@ -45,7 +45,7 @@ def test_the_robot_is_where_the_motion_has_it_at_the_chosen_instant(shown, line_
     shown.show()
     found = placements(motion.robot, motion.position(0.6 * motion.t_end)[None])
     np.testing.assert_allclose(
-        poses(shown), np.hstack([found.positions[0], found.quaternions[0]]), atol=1e-6
+        poses(shown), np.hstack([found[0][0], found[1][0]]), atol=1e-6
     )
     assert np.abs(poses(shown) - before).max() > 0.1
     assert shown._panel._slider.value == pytest.approx(0.6 * motion.t_end, abs=0.01)
@@ -64,8 +64,9 @@ def test_plots_and_table_follow_the_slider(shown, line_result):
 
 
 def test_path_and_trace_are_one_curve_and_every_layer_can_be_hidden(shown):
-    motion = shown._scene._motion
-    np.testing.assert_allclose(motion.path, motion.frames.tool, atol=1e-8)
+    samples = shown._scene.samples
+    path = prescribed_path(shown._trajectory, samples)
+    np.testing.assert_allclose(path, samples.tool_position, atol=1e-8)
     for name in LAYERS:
         assert shown._scene.layers[name]
         shown._scene.set_visible(name, visible=False)

@@ -19,7 +19,7 @@ from brachis.apps.bottleneck.reference import (
     find_reference,
     knot_cost,
 )
-from brachis.apps.bottleneck.report import BottleneckReport, report, solved_again
+from brachis.apps.bottleneck.report import BottleneckReport, report, solve_again
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
     THRESHOLD,
@@ -57,5 +57,5 @@ __all__ = [
     "report",
     "saturations",
     "sensitivities",
-    "solved_again",
+    "solve_again",
 ]

@@ -1,18 +1,17 @@
-"""Predictions checked by solving again: the same problem with one limit after the other raised.
+"""Predictions of the multipliers, compared with solving again with one limit after the other raised.
 
-Knots, collocation points and branch margins stay; every solve begins at the answer and is held to a tighter tolerance.
-An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself. Where a
-change is not as predicted, the unchanged problem is solved again from the new answer: a step into the valley of another
-local optimum is not an effect of the limit.
+Knots, collocation points and branch margins stay. Every solve begins at the answer and has a tighter tolerance. An
+answer is an optimum if least squares find multipliers for it, whatever status the solver reports. If a change is not as
+predicted, the unchanged problem is solved again from the new answer: the step may have led to another local optimum,
+which is not an effect of the limit.
 
-The change of t_E for a limit that rises by a finite step, from the problem linearised at its answer.
-
-Multipliers are derivatives: they hold for steps so small that the same rows stay active. The linear program
+Multipliers are derivatives: they hold for steps so small that the same rows stay active. For a finite step, the problem
+linearised at its answer is solved with the raised limit, so that other rows can take over within the step:
 
     minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
 
-with the raised limit lets other rows take over within the step. Its optimum is not lower than what the multipliers
-promise, since they are feasible for its dual; it tells how much of the promise other limits take back.
+Its optimum is not lower than what the multipliers promise, since they are feasible for its dual. The difference is the
+part of the promise that other limits take back.
 """
 
 from __future__ import annotations
@@ -37,27 +36,16 @@ from brachis.optimise.backends import SolverOptions, residual, solver_named
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 
-_NEAR = 0.1
-"""Rows farther from their bounds are left out at first; dimensionless."""
-_LARGEST_STEP = 1.0
-"""Of any variable: directions that change nothing to first order are not followed without end."""
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
 _OPTIONS = SolverOptions(tolerance=1e-8)
 _FEASIBLE = 1e-7
-_EXACT = 1e-9
-"""An answer that violates no row and leaves no gradient beyond this is not solved again."""
-_SUSPICIOUS = 0.02
-"""A change that is off by a larger fraction may be one to another local optimum, which solving back tells."""
-_SAME = 1e-6
-"""End times that differ by a smaller fraction are those of one optimum."""
-_NO_CHANGE = 1e-9
-"""A limit that is predicted to change t_E by a smaller fraction of it does not press: the answer stays an optimum."""
+"""Largest violation of a row at an answer, dimensionless."""
 
 
 @dataclass(frozen=True)
 class CheckedSensitivity:
-    """A prediction beside the change that solving again gives.
+    """A prediction, and the change that solving again gives.
 
     Attributes
     ----------
@@ -69,10 +57,10 @@ class CheckedSensitivity:
     re_solved : float
         Change found by solving again, s.
     other_optimum : float
-        Where the solve again came to another local optimum: how much longer the unchanged problem takes there, s.
-        `re_solved` is then the change from there. 0 otherwise.
+        How much longer the unchanged problem takes at another local optimum, s, if the solve ended there; `re_solved`
+        is then the change from there. 0 otherwise.
     optimal : bool
-        False where the solve again ended without an optimum, so that `re_solved` says little.
+        False if the solve ended without an optimum, so that `re_solved` is rough.
     """
 
     sensitivity: Sensitivity
@@ -84,12 +72,12 @@ class CheckedSensitivity:
 
     @property
     def deviation(self) -> float:
-        """How far the multipliers' promise is off, as a fraction of the re-solved change; 0 where neither changes."""
+        """How far the multipliers' promise is off, as a fraction of the re-solved change; 0 if neither changes."""
         return _deviation(self.predicted, self.re_solved)
 
     @property
     def linearised_deviation(self) -> float:
-        """As `deviation`, of `linearised`."""
+        """Deviation of `linearised`, likewise."""
         return _deviation(self.linearised, self.re_solved)
 
     def to_dict(self) -> dict[str, Any]:
@@ -118,7 +106,7 @@ def _deviation(predicted: float, found: float) -> float:
 
 @dataclass(frozen=True, repr=False)
 class SensitivityCheck(Summary):
-    """All predictions beside the changes that solving again gives.
+    """All predictions, and the changes that solving again gives.
 
     Attributes
     ----------
@@ -138,11 +126,9 @@ class SensitivityCheck(Summary):
     wall_time: float
 
     def worst_deviation(self, above: float = 1e-4) -> float:
-        """Largest deviation among `larger` changes that were solved to an optimum; 0 if there are none."""
-        return max(
-            (entry.deviation for entry in self.larger(above) if entry.optimal),
-            default=0.0,
-        )
+        """Largest deviation among `larger` changes that were solved to an optimum; 0 without any."""
+        optimal = [entry for entry in self.larger(above) if entry.optimal]
+        return max((entry.deviation for entry in optimal), default=0.0)
 
     def larger(self, above: float = 1e-4) -> tuple[CheckedSensitivity, ...]:
         """Entries whose change, as predicted or as solved again, is larger than `above`, s."""
@@ -176,9 +162,9 @@ def check_sensitivities(
     refined : SolvedProgram
         ``result.candidate.refined``.
     predictions : Sensitivities, optional
-        What is checked; by default what `sensitivities` says.
+        What is checked; by default the result of `sensitivities`.
     step : float, optional
-        Fraction by which each limit leaves more room; less where it is negative.
+        Fraction by which each limit leaves more room; less if it is negative.
 
     Returns
     -------
@@ -189,54 +175,42 @@ def check_sensitivities(
     PlanningError
         No solver could solve the unchanged problem again.
     """
-    with ThreadpoolController().limit(
-        limits=1, user_api="blas"
-    ):  # as in `plan`: batches are small
-        return _check_limits(refined, predictions or sensitivities(refined), step)
-
-
-def _check_limits(
-    refined: SolvedProgram, predictions: Sensitivities, step: float
-) -> SensitivityCheck:
-    """Compare limit by limit."""
     began = time.perf_counter()
     program = refined.program
     base = refined.reports[-1].x
     t_end = program.end_time
-    if residual(program, base) > _EXACT or _stationarity(program, base) > _EXACT:
-        base, _ = _solve_again(program, base)
     checked = []
-    for entry in predictions.limits:
-        if abs(entry.change(step)) <= _NO_CHANGE * t_end(base):
-            checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
-        else:
-            raised = program.relax(
-                entry.limit, entry.bound, step * entry.bound.full_scale
-            )
-            checked.append(_compare(entry, entry.change(step), program, raised, base))
-    return SensitivityCheck(
-        step, t_end(base), tuple(checked), time.perf_counter() - began
-    )
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
+        if max(residual(program, base), _stationarity(program, base)) > 1e-9:
+            base, _ = _solve_again(program, base)
+        for entry in (predictions or sensitivities(refined)).limits:
+            # If a limit changes nothing, the answer stays an optimum.
+            if abs(entry.change(step)) <= 1e-9 * t_end(base):
+                same = CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True)
+                checked.append(same)
+            else:
+                checked.append(_check_limit(entry, step, program, base))
+    elapsed = time.perf_counter() - began
+    return SensitivityCheck(step, t_end(base), tuple(checked), elapsed)
 
 
-def _compare(
-    entry: Sensitivity,
-    predicted: float,
-    program: Program,
-    raised: Program,
-    base: np.ndarray,
+def _check_limit(
+    entry: Sensitivity, step: float, program: Program, base: np.ndarray
 ) -> CheckedSensitivity:
-    """Solve with one limit raised, and back where the change is suspicious."""
+    """Solve with one limit raised, and back if the change may be one to another local optimum."""
+    predicted = entry.change(step)
+    raised = program.relax(entry.limit, entry.bound, step * entry.bound.full_scale)
     linearised = linearised_change(raised, base)
     answer, optimal = _solve_again(raised, base)
     t_end = program.end_time
+    same = 1e-6 * t_end(base)  # end times of one optimum differ by less
     before = base
     off = abs(predicted - (t_end(answer) - t_end(base)))
-    if off > _SUSPICIOUS * abs(predicted) and off > _SAME * t_end(base):
-        before, sure = _solve_again(program, answer)
-        optimal = optimal and sure
-        if abs(t_end(before) - t_end(base)) <= _SAME * t_end(base):
-            before = base
+    if off > max(0.02 * abs(predicted), same):
+        other, is_optimum = _solve_again(program, answer)
+        optimal = optimal and is_optimum
+        if abs(t_end(other) - t_end(base)) > same:
+            before = other
     return CheckedSensitivity(
         sensitivity=entry,
         predicted=predicted,
@@ -260,7 +234,7 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     Returns
     -------
     float or None
-        s; None where the linear program has no answer.
+        s; None if the linear program has no answer.
 
     Raises
     ------
@@ -268,54 +242,44 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
         A collocation point is out of the branch's reach.
     """
     from scipy import sparse
+    from scipy.optimize import linprog
 
     rows, jacobian = rows_and_jacobian(program, x)
-    below = np.isfinite(program.lower)
-    above = np.isfinite(program.upper)
-    slopes = sparse.vstack(
-        [-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]],
-        format="csr",
-    )
+    below = np.flatnonzero(np.isfinite(program.lower))
+    above = np.flatnonzero(np.isfinite(program.upper))
+    slopes = sparse.vstack([-jacobian[below], jacobian[above]], format="csr")
     room = np.concatenate(
         [(rows - program.lower)[below], (program.upper - rows)[above]]
     )
-    lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
-    highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
-    kept = room < _NEAR
+    # Directions that change nothing to first order are not followed without end.
+    lowest = np.clip(program.x_lower - x, -1.0, 0.0)
+    highest = np.clip(program.x_upper - x, 0.0, 1.0)
+    bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
     gradient = program.gradient(x)
+    kept = room < 0.1  # rows farther from their bounds are left out at first
     while True:
-        step = _solve_linear_program(
+        found = linprog(
             gradient,
-            slopes[np.flatnonzero(kept)].toarray(),
-            room[kept],
-            lowest,
-            highest,
+            A_ub=slopes[np.flatnonzero(kept)].toarray(),
+            b_ub=room[kept],
+            bounds=bounds,
         )
-        if step is None:
+        if not found.success:
             return None
-        overrun = slopes @ step > room + 1e-9
+        overrun = slopes @ found.x > room + 1e-9
         if not (overrun & ~kept).any():
-            return float(gradient @ step)
+            return float(gradient @ found.x)
         kept |= overrun
 
 
-def _solve_linear_program(
-    gradient: np.ndarray,
-    slopes: np.ndarray,
-    room: np.ndarray,
-    lowest: np.ndarray,
-    highest: np.ndarray,
-) -> np.ndarray | None:
-    """Solve the linear program over some of the rows; None where it has no answer."""
-    from scipy.optimize import linprog
-
-    bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
-    found = linprog(gradient, A_ub=slopes, b_ub=room, bounds=bounds, method="highs")
-    return np.asarray(found.x) if found.success else None
-
-
 def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Solve to a tight tolerance from x with one backend after the other; tell whether it is an optimum.
+    """Solve to a tight tolerance from x with one backend after the other.
+
+    Returns
+    -------
+    x : (v,) ndarray
+    optimal : bool
+        Whether it is an optimum.
 
     Raises
     ------

@@ -9,8 +9,8 @@ optimum already, so this takes a few iterations and ends at the same one.
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -20,19 +20,33 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.apps.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.apps.bottleneck.reference import (
+    MEANING,
     KnotCost,
     Reference,
     find_reference,
     knot_cost,
 )
-from brachis.apps.bottleneck.saturation import THRESHOLD, Saturation, saturations
-from brachis.apps.bottleneck.sensitivities import Sensitivities, sensitivities
-from brachis.apps.bottleneck.text import in_words
+from brachis.apps.bottleneck.saturation import (
+    RIPPLE,
+    THRESHOLD,
+    Saturation,
+    saturations,
+)
+from brachis.apps.bottleneck.sensitivities import (
+    BranchBoundary,
+    Sensitivities,
+    Sensitivity,
+    sensitivities,
+)
 from brachis.common.deadline import Deadline
 from brachis.common.summary import LINES
-from brachis.errors import InputError, PlanningError, UnreachableError
+from brachis.errors import (
+    InputError,
+    PlanningError,
+    UnreachableError,
+    write_count,
+)
 from brachis.kinematics import (
-    ChartMap,
     ChartRows,
     JointMap,
     JointSpaceMap,
@@ -48,6 +62,7 @@ from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
+from brachis.robot.joints import shown_unit
 from brachis.robot.task_map import JOINTS
 from brachis.search.solving import MARGINS
 from brachis.trajectory import Trajectory
@@ -55,13 +70,8 @@ from brachis.trajectory import Trajectory
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
 
-_SAME = 1e-3
-"""End times that differ by a larger fraction, beyond what the task gave away, are those of two motions."""
-_KEPT = 1e-4
-"""A motion keeps a branch margin of which it falls short by less: solvers and interpolation are not exact."""
 
-
-def solved_again(trajectory: Trajectory) -> SolvedProgram:
+def solve_again(trajectory: Trajectory) -> SolvedProgram:
     """Solve the problem of a saved motion from where it ended.
 
     Parameters
@@ -81,31 +91,51 @@ def solved_again(trajectory: Trajectory) -> SolvedProgram:
     PlanningError
         The motion is not an optimum of its problem: no solver of the task came back to it.
     """
-    with ThreadpoolController().limit(
-        limits=1, user_api="blas"
-    ):  # as in `plan`: batches are small
-        program, x = _problem(trajectory)
-        found = list(_answers(program, x, trajectory))
-    for refined in found:
-        if _came_back(refined, trajectory):
-            return refined
-    ends = ", ".join(
-        f"{refined.reports[-1].solver}: {refined.t_end:.6g} s" for refined in found
+    task = trajectory.task
+    deadline = Deadline.after(task.search.time_limit)
+    settings = task.refinement
+    options = RefinementOptions(
+        settings.tolerance, settings.density, settings.max_rounds, deadline
     )
+    ends = []
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
+        program, x = _problem(trajectory)
+        joint_map = program.phases[0].joint_map
+        curved = any(limit.guarantee.is_mean for limit in program.limits)
+        for backend in solver_named(task.solver.name, curved=curved):
+            if deadline.passed:
+                break
+            solve = SolverSession.for_task(
+                backend, task.solver, joint_map, deadline, lambda _text: None
+            )
+            try:
+                refined = refine(program, solve(program, x), solve, options)
+            except (ImportError, UnreachableError):
+                continue
+            if not refined.converged:
+                continue
+            slower = trajectory.t_end / refined.t_end - 1.0
+            if -1e-3 <= slower <= task.search.slower + 1e-3:
+                return refined
+            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.reports[-1].solver}")
+    what = "a different optimum" if ends else "no optimum"
     raise PlanningError(
-        "solving again does not come back to the saved motion, so that its multipliers are not known",
-        found=ends or "no answer",
-        allowed=f"{trajectory.t_end:.6g} s",
+        f"re-solving found {what}; sensitivities of this file are unavailable",
+        found=", ".join(ends) or "no answer",
+        allowed=f"t_E = {trajectory.t_end:.6g} s, that of the saved motion",
         hint="Ask for the bottlenecks of the task itself",
     )
 
 
 def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
-    """Lay the problem down over the saved knots; the motion is its point x."""
+    """Build the problem over the saved knots; the motion is its point x."""
     joint_map: JointMap
     if len(trajectory.chart_rows):
         problem = Problem.of(trajectory.robot, trajectory.task)
-        joint_map = _chart(problem, trajectory)
+        rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
+        s = trajectory.path_coordinate(trajectory.times)
+        path = problem.path
+        joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
     elif trajectory.task.task_space == JOINTS:
         problem = Problem.of(trajectory.robot, trajectory.task)
         joint_map = JointSpaceMap(problem.robot, problem.path)
@@ -126,53 +156,10 @@ def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     x = program.variables_from([motion])
     for margin in MARGINS:
         program = program.with_margin(margin)
-        if program.safeguard_slack(x) >= -_KEPT:
+        # Solvers and interpolation are not exact.
+        if program.safeguard_slack(x) >= -1e-4:
             break
     return program, x
-
-
-def _chart(problem: Problem, trajectory: Trajectory) -> ChartMap:
-    """Lay the saved chart around the saved motion."""
-    rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
-    s = trajectory.path_coordinate(trajectory.times)
-    return chart_around(problem.task_map, problem.path, s, trajectory.q, rows)
-
-
-def _came_back(refined: SolvedProgram, trajectory: Trajectory) -> bool:
-    """Tell whether an answer is the fastest motion that a saved one was made from."""
-    slower = trajectory.t_end / refined.t_end - 1.0
-    return -_SAME <= slower <= trajectory.task.search.slower + _SAME
-
-
-def _answers(
-    program: Program, x: np.ndarray, trajectory: Trajectory
-) -> Iterator[SolvedProgram]:
-    """Solve and refine with one backend after the other, until one comes back to the motion."""
-    task = trajectory.task
-    deadline = Deadline.after(task.search.time_limit)
-    settings = task.refinement
-    options = RefinementOptions(
-        settings.tolerance, settings.density, settings.max_rounds, deadline
-    )
-    curved = any(limit.guarantee.is_mean for limit in program.limits)
-    for backend in solver_named(task.solver.name, curved=curved):
-        if deadline.passed:
-            return
-        solve = SolverSession.for_task(
-            backend,
-            task.solver,
-            program.phases[0].joint_map,
-            deadline,
-            lambda _text: None,
-        )
-        try:
-            refined = refine(program, solve(program, x), solve, options)
-        except (ImportError, UnreachableError):
-            continue
-        if refined.converged:
-            yield refined
-            if _came_back(refined, trajectory):
-                return
 
 
 @dataclass(frozen=True, repr=False)
@@ -188,13 +175,13 @@ class BottleneckReport:
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
     knots : KnotCost or None
-        What the knots cost; None where that is not known.
+        What the knots cost; None if that is not known.
     check : SensitivityCheck or None
-        The predictions beside solving again, where asked for.
+        The predictions compared with solving again, if requested.
     reference : Reference or None
-        The best value known, where asked for and found.
+        The best value known, if requested and found.
     reference_sought : bool
-        True where it was asked for.
+        Whether it was requested.
 
     Examples
     --------
@@ -217,8 +204,20 @@ class BottleneckReport:
         return self.text()
 
     def text(self, *, degrees: bool = False) -> str:
-        """Say all in plain words, angles in degrees where asked for."""
-        return "\n".join(in_words(**vars(self), degrees=degrees))
+        """Say all in plain words, angles in degrees if requested."""
+        lines = ["the motion was not planned: what a limit costs is not known"]
+        if self.sensitivities is not None:
+            lines = _costs(self.sensitivities, self.t_end, degrees=degrees)
+        if self.knots is not None:
+            lines += _knots(self.knots, self.t_end)
+        if self.check is not None:
+            lines += _check_lines(self.check)
+        lines += write_active(self.saturations)
+        if self.reference is not None:
+            lines.append(_reference(self.reference, self.t_end))
+        elif self.reference_sought:
+            lines.append("reference: no faster motion was found")
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
         """Say what there is room for on a screen."""
@@ -254,7 +253,7 @@ def report(
     ----------
     motion : Result, Trajectory or path
         Of `brachis.plan`; or a trajectory, a loaded one for example, or its file, whose problem is solved again
-        (`solved_again`).
+        (`solve_again`).
     check : bool, optional
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
@@ -281,23 +280,25 @@ def report(
     """
     if isinstance(motion, str | os.PathLike):
         motion = Trajectory.load(motion)
-    if isinstance(motion, Trajectory) and motion.recovered is not None:
-        if check or reference:
-            hint = "brachis compare plans the same path; ask for the bottlenecks of that plan"
-            problem = "the motion was not planned: nothing of it can be solved again"
-            raise InputError(problem, where=motion.recovered.source, hint=hint)
-        return BottleneckReport(motion.t_end, None, saturations(motion))
     if isinstance(motion, Trajectory):
         trajectory = motion
-        refined = solved_again(motion)
-    elif motion.candidate.refined is None:
-        raise InputError(
-            "the result holds no solved problem",
-            where="result",
-            allowed="a result of brachis.plan",
-        )
+        if trajectory.recovered is not None:
+            if check or reference:
+                raise InputError(
+                    "the motion was not planned: nothing of it can be solved again",
+                    where=trajectory.recovered.source,
+                    hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
+                )
+            return BottleneckReport(trajectory.t_end, None, saturations(trajectory))
+        refined = solve_again(trajectory)
     else:
         trajectory = motion.trajectory
+        if motion.candidate.refined is None:
+            raise InputError(
+                "the result holds no solved problem",
+                where="result",
+                allowed="a result of brachis.plan",
+            )
         refined = motion.candidate.refined
     found = sensitivities(refined)
     tolerance = trajectory.task.refinement.tolerance
@@ -312,4 +313,149 @@ def report(
         check=check_sensitivities(refined, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
         reference_sought=reference,
+    )
+
+
+_FRACTION = 0.1
+"""By which limits are raised in the sentences on what they cost."""
+_NOTHING = 1e-5
+"""Fraction of t_E; what saves less has no sentence."""
+
+
+def _figures(value: float) -> str:
+    """Write a positive number with two significant figures, or all before the point."""
+    return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
+
+
+def _part(saved: float, t_end: float) -> str:
+    """Write a time, s, as a part of t_E and in ms."""
+    return f"{_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
+
+
+def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
+    """Say what every limit costs, the costliest first."""
+    lines = []
+    if not found.reliable:
+        lines.append(
+            f"beware: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
+            "motion is not an optimum, and the savings below are rough"
+        )
+    costly = [
+        entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end
+    ]
+    lines += [_saving(entry, t_end, degrees=degrees) for entry in costly]
+    if len(costly) < len(found.limits):
+        lines.append("no other limit costs time" if costly else "no limit costs time")
+    lines.append(
+        f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})"
+    )
+    lines += [
+        _boundary(entry)
+        for entry in found.boundaries
+        if entry.derivative * entry.margin > _NOTHING * t_end
+    ]
+    return lines
+
+
+def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
+    """Say what more room at one limit saves."""
+    label = entry.label
+    end = entry.bound.side
+    unit, factor = shown_unit(label.unit, degrees=degrees)
+    amount = f"{factor * _FRACTION * entry.bound.full_scale:.3g} {unit}"
+    if label.slack_text:
+        more = f"{amount} more {label.slack_text}"
+    elif end is None:
+        more = (
+            f"{100.0 * _FRACTION:.0f} % more {label.kind} at {label.subject} ({amount})"
+        )
+    else:
+        more = f"{amount} more room at the {end} end of {label}"
+    return f"{more} saves {_part(-entry.change(_FRACTION), t_end)}"
+
+
+def _knots(found: KnotCost, t_end: float) -> list[str]:
+    """Say what the knots cost from 1 % on: it is known to 0.2 %, and ``intervals: auto`` leaves 0.1 %."""
+    if found.saved < 0.01:
+        return []
+    line = (
+        f"the knots cost about {_part(found.saved * t_end, t_end)} with {write_count(found.intervals, 'interval')}: "
+        f"timed anew in the phase plane, where torques jump, the same joint path takes {found.t_end:.4g} s"
+    )
+    if found.given:
+        line += "; spline.intervals: auto, or more of them, come nearer to that"
+    return [line]
+
+
+def _boundary(entry: BranchBoundary) -> str:
+    saved = _figures(1e3 * entry.derivative * entry.margin)
+    return (
+        f"the branch boundary of {entry.label} costs {saved} ms (margin {entry.margin:.3g}, to first order): not "
+        "a limit of the robot; other redundant joints may be faster"
+    )
+
+
+def _check_lines(check: SensitivityCheck) -> list[str]:
+    """Say how the predictions compare with solving again."""
+    lines = []
+    for entry in check.entries:
+        if not entry.predicted:
+            continue
+        label = str(entry.sensitivity.label)
+        what = " ".join(filter(None, (label, entry.sensitivity.bound.side)))
+        line = (
+            f"checked, {what} +{100.0 * check.step:g} %: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
+            f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
+        )
+        taken_back = abs(entry.linearised - entry.predicted)
+        if taken_back > 0.02 * abs(entry.predicted):
+            line += f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
+        if entry.other_optimum:
+            which = "faster" if entry.other_optimum < 0.0 else "slower"
+            apart = f"{1e3 * abs(entry.other_optimum):.2g} ms {which}"
+            line += f"; from another local optimum, {apart}"
+        if not entry.optimal:
+            line += " (solved again without reaching an optimum)"
+        lines.append(line)
+    larger = check.larger()
+    lost = sum(not entry.optimal for entry in larger)
+    if not larger:
+        lines.append("checked: no change is larger than 0.1 ms")
+    elif lost == len(larger):
+        lines.append(
+            "checked: no solver brought the changes that are larger than 0.1 ms to an optimum"
+        )
+    else:
+        but = f", but for {lost} that no solver brought to an optimum" if lost else ""
+        worst = f"{100.0 * check.worst_deviation():.2g} %"
+        lines.append(
+            f"checked: changes larger than 0.1 ms are predicted to within {worst}{but}"
+        )
+    return lines
+
+
+def write_active(found: tuple[Saturation, ...]) -> list[str]:
+    """Say which limits are active for some time."""
+    lines = []
+    for entry in found:
+        if entry.share < 5e-4:
+            continue
+        label = entry.label
+        count = len(entry.active)
+        times = "once" if count == 1 else f"in {count} intervals"
+        reached = label.active_text or f"{label.subject} is at its {label.kind} limit"
+        lines.append(f"{reached} for {100.0 * entry.share:.1f} % of the time, {times}")
+    return [
+        *(lines or ["nothing stays at a limit"]),
+        f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
+    ]
+
+
+def _reference(reference: Reference, t_end: float) -> str:
+    longer = (
+        f"{100.0 * reference.distance:.2f} % ({1e3 * (t_end - reference.t_end):.1f} ms)"
+    )
+    return (
+        f"reference {reference.t_end:.4f} s ({MEANING}; degree {reference.degree}, {reference.intervals} intervals): "
+        f"the motion takes {longer} longer"
     )

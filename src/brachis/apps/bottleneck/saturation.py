@@ -35,7 +35,7 @@ class LimitRatios(Summary):
     values: np.ndarray
 
     def __post_init__(self) -> None:
-        """Take copies that nobody can write to."""
+        """Make the arrays read-only copies."""
         freeze(self, "t", "values")
 
 
@@ -71,6 +71,15 @@ def limit_ratios(
     if limits is None:
         robot, _ = bind(trajectory.robot, trajectory.task.task_space)
         limits = limits_of(robot, trajectory.task)
+    nodes = trajectory.times[1:]
+    before = (
+        nodes,
+        trajectory.q[1:],
+        trajectory.qdot[1:],
+        trajectory.qddot_before[1:],
+        trajectory.jerk_pieces.c[-1],
+        trajectory.path_spline(nodes),
+    )
     samples = dense_samples(trajectory, 40)
     behind = (
         samples.t,
@@ -80,10 +89,9 @@ def limit_ratios(
         trajectory.jerk(samples.t),
         samples.s,
     )
-    before = _just_before(trajectory)
     jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
     if trajectory.degree <= max((limit.order for limit in limits), default=0):
-        jumps[:-1] |= np.isin(trajectory.times[1:-1], knot_times(trajectory))
+        jumps[:-1] |= np.isin(nodes[:-1], knot_times(trajectory))
     t, *motion = (
         np.concatenate([first[jumps], then])
         for first, then in zip(before, behind, strict=True)
@@ -92,32 +100,19 @@ def limit_ratios(
     moments = Moments(*(part[order] for part in motion))
     values = [np.empty((len(order), 0))]
     values += [limit.ratios(moments, t[order]) for limit in limits]
-    return LimitRatios(
-        t[order],
-        tuple(label for limit in limits for label in limit.labels),
-        np.hstack(values),
-    )
-
-
-def _just_before(trajectory: Trajectory) -> tuple[np.ndarray, ...]:
-    """Return times, positions, three derivatives and path coordinates just before every node but the first."""
-    nodes = (trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot_before)
-    return (
-        *(part[1:] for part in nodes),
-        trajectory.jerk_pieces.c[-1],
-        trajectory.path_spline(trajectory.times[1:]),
-    )
+    labels = tuple(label for limit in limits for label in limit.labels)
+    return LimitRatios(t[order], labels, np.hstack(values))
 
 
 THRESHOLD = 0.99
-"""A limit is active from where the motion is at this part of it ..."""
+"""A limit is active from the time at which the motion uses this part of it."""
 RIPPLE = 0.95
-"""... until it falls below this one: splines ripple on a limit between their knots."""
+"""A limit stays active until the motion uses less than this part of it: splines ripple between their knots."""
 
 
 @dataclass(frozen=True)
 class ActiveInterval:
-    """A stretch of time on which a limit is active, ripple included.
+    """A time interval during which a limit is active, ripple included.
 
     Attributes
     ----------
@@ -141,10 +136,10 @@ class Saturation(Summary):
     label : Label
         What is limited.
     share : float
-        Part of the time, 0 to 1, that the stretches together take.
+        Part of the time, 0 to 1, during which the limit is active.
     peak : float
         Largest ratio to the limit.
-    active : tuple of Stretch
+    active : tuple of ActiveInterval
         When, in the order of time.
     """
 
@@ -165,14 +160,12 @@ class Saturation(Summary):
             "kind": self.label.kind,
             "share": self.share,
             "peak_ratio": self.peak,
-            "active_s": [
-                [stretch.begin, stretch.end, stretch.side] for stretch in self.active
-            ],
+            "active_s": [[each.begin, each.end, each.side] for each in self.active],
         }
 
 
 def saturations(
-    trajectory: Trajectory,
+    motion: Trajectory | LimitRatios,
     limits: Sequence[Limit] | None = None,
     *,
     threshold: float = THRESHOLD,
@@ -182,79 +175,59 @@ def saturations(
 
     Parameters
     ----------
-    trajectory : Trajectory
-        Any one, a saved one for example.
+    motion : Trajectory or LimitRatios
+        Any trajectory, a saved one for example, or its ratios.
     limits : sequence of Limit, optional
         Those of the trajectory's task if left out.
     threshold : float, optional
         Part of the limit from which on it counts as active.
     ripple : float, optional
-        Part of the limit above which dips below the threshold count as ripple, which interrupts no stretch.
+        Part of the limit above which dips below the threshold count as ripple, which does not end an interval.
 
     Returns
     -------
     tuple of Saturation
         Of all limits, those active longest first.
     """
-    return saturations_of(
-        limit_ratios(trajectory, limits), threshold=threshold, ripple=ripple
-    )
-
-
-def saturations_of(
-    ratios: LimitRatios, *, threshold: float = THRESHOLD, ripple: float = RIPPLE
-) -> tuple[Saturation, ...]:
-    """As `saturations`, from ratios already computed."""
+    ratios = motion
+    if isinstance(ratios, Trajectory):
+        ratios = limit_ratios(ratios, limits)
     found = []
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [
             ActiveInterval(begin, end, side)
             for side, sign in (("lower", -1.0), ("upper", 1.0))
-            for begin, end in _stretches(ratios.t, sign * column, threshold, ripple)
+            for begin, end in _find_active(ratios.t, sign * column, threshold, ripple)
         ]
-        active.sort(key=lambda stretch: stretch.begin)
-        duration = sum(stretch.end - stretch.begin for stretch in active)
+        active.sort(key=lambda interval: interval.begin)
+        duration = sum(interval.end - interval.begin for interval in active)
+        share = float(duration / ratios.t[-1])
         peak = float(np.abs(column).max())
-        found.append(
-            Saturation(label, float(duration / ratios.t[-1]), peak, tuple(active))
-        )
+        found.append(Saturation(label, share, peak, tuple(active)))
     return tuple(sorted(found, key=lambda entry: (-entry.share, -entry.peak)))
 
 
-def _stretches(
+def _find_active(
     t: np.ndarray, values: np.ndarray, threshold: float, ripple: float
 ) -> list[tuple[float, float]]:
-    """Stretches of time on which values, linear between the times (K,), keep to the threshold but for ripple."""
-    above = np.concatenate([[False], values >= threshold, [False]])
-    edges = np.flatnonzero(np.diff(above.astype(int))).reshape(-1, 2)
-    if len(edges) == 0:
-        return []
-    dips = np.array(
-        [
-            values[end:begin].min()
-            for end, begin in zip(edges[:-1, 1], edges[1:, 0], strict=True)
-        ]
-    )
-    apart = dips < ripple
-    firsts = edges[np.append(True, apart), 0]
-    afters = edges[np.append(apart, True), 1]
-    return [
-        (
-            _crossing(t, values, first - 1, threshold) if first else float(t[0]),
-            _crossing(t, values, after - 1, threshold)
-            if after < len(t)
-            else float(t[-1]),
-        )
-        for first, after in zip(firsts.tolist(), afters.tolist(), strict=True)
-    ]
+    """Find the intervals in which values, linear between the times (K,), keep to the threshold but for ripple."""
+    found: list[list[int]] = []  # first and last sample at the limit
+    is_active = False
+    for k in np.flatnonzero((values >= threshold) | (values < ripple)).tolist():
+        if values[k] < threshold:
+            is_active = False
+        elif is_active:
+            found[-1][1] = k
+        else:
+            found.append([k, k])
+            is_active = True
 
+    def crossing(before: int) -> float:
+        """Time between two samples at which the line between them meets the threshold, s; an end of the motion."""
+        if not 0 <= before < len(t) - 1:
+            return float(t[max(before, 0)])
+        low, high = values[before : before + 2]
+        part = (threshold - low) / (high - low)
+        return float(t[before] + (t[before + 1] - t[before]) * part)
 
-def _crossing(
-    t: np.ndarray, values: np.ndarray, before: int, threshold: float
-) -> float:
-    """Time between two neighbours at which the line between them meets the threshold, s."""
-    low = values[before]
-    high = values[before + 1]
-    return float(
-        t[before] + (t[before + 1] - t[before]) * (threshold - low) / (high - low)
-    )
+    return [(crossing(first - 1), crossing(last)) for first, last in found]

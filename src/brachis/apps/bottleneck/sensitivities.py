@@ -1,26 +1,25 @@
 """What a limit costs: the derivative of t_E with respect to every limit, from the multipliers.
 
-Every limit tells which figures a user could change, and at which rate d the bounds of its rows move outwards when one
-of them gives way (`brachis.limits.Bound`): with the multipliers w of these rows
+Every limit lists the figures that a user could change, and the rates d at which the bounds of its rows move outwards if
+one of them is relaxed (`brachis.limits.Bound`). With the multipliers w of these rows
 
     dt_E / d(figure) = -sum w d.
 
-Multipliers of a solved program: the solver's where they balance the gradient, otherwise least squares.
-
-At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
+The multipliers are the solver's if they balance the gradient, otherwise those by least squares. At an optimum the
+gradient of t_E is a combination of the slopes of the active rows and variable bounds,
 
     grad t_E = sum_i w_i p_i,    w_i >= 0,
 
 with p_i the gradient of a row or variable at its lower bound, or minus that at its upper bound. The norm of what is
-left over, relative to the gradient's, tells how far an answer is from being stationary.
+left over, relative to the gradient's, measures how far an answer is from being stationary.
 
-If the bounds of the active rows give way at rates d_i >= 0, then dt_E = -sum_i w_i d_i. Where the slopes are linearly
-dependent, many sets of multipliers balance the gradient, and the one that holds for a relaxation is the one that
-promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+If the slopes are linearly dependent, many sets of multipliers balance the gradient. The one that holds for a relaxation
+is the one that promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -49,22 +48,13 @@ def rows_and_jacobian(
 
     places = (program.jacobian_rows, program.jacobian_columns)
     shape = (len(program.lower), len(x))
-    return program.rows(x), sparse.coo_array(
-        (program.jacobian(x), places), shape=shape
-    ).tocsr()
-
-
-ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
-"""Distances from a bound within which rows and variables press on it; dimensionless. The least that gives a balance
-counts: solvers differ in how near they come, and a row that is near its bound without being active would count as one
-that takes over within any step."""
-_GOOD = 1e-5
-"""The solver's multipliers with a smaller residual are taken as they are."""
+    jacobian = sparse.coo_array((program.jacobian(x), places), shape=shape)
+    return program.rows(x), jacobian.tocsr()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ActiveSet(Summary):
-    """What presses on a point x.
+    """Rows and variables at their bounds at a point x.
 
     Attributes
     ----------
@@ -82,7 +72,9 @@ class ActiveSet(Summary):
 
     @classmethod
     def at(cls, program: Program, x: np.ndarray, near: float) -> ActiveSet:
-        """Collect what presses on x, (v,): what is nearer to its bound than `near`, dimensionless.
+        """Collect rows and variables that are nearer to their bounds than `near`, dimensionless, at x, (v,).
+
+        Rows that no variable changes, such as those at a given start posture, are left out.
 
         Raises
         ------
@@ -95,43 +87,33 @@ class ActiveSet(Summary):
         rows = np.concatenate([low, high])
         signs = np.repeat([1.0, -1.0], [len(low), len(high)])
         slopes = signs[:, None] * jacobian[rows].toarray()
-        pressing = slopes.any(
-            axis=1
-        )  # what holds at the given start posture holds whatever x
+        kept = slopes.any(axis=1)
         unit = np.eye(len(x))
-        bounds = unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near]
-        return cls(
-            np.vstack([slopes[pressing], *bounds]), rows[pressing], signs[pressing]
-        )
+        bounds = (unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near])
+        return cls(np.vstack([slopes[kept], *bounds]), rows[kept], signs[kept])
 
     @property
     def dependent(self) -> bool:
-        """True where several sets of multipliers may balance a gradient."""
+        """Whether several sets of multipliers may balance a gradient."""
         return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < len(self.slopes))
 
-    def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
-        """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
-        return float(
-            np.linalg.norm(gradient - weights @ self.slopes) / np.linalg.norm(gradient)
-        )
+    def weights_of(
+        self, gradient: np.ndarray, multipliers: np.ndarray | None
+    ) -> np.ndarray:
+        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can.
 
-    def weights_of(self, gradient: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can."""
-        of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
-        rest = gradient - of_rows @ self.slopes[: len(of_rows)]
-        return np.concatenate(
-            [of_rows, np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)]
-        )
-
-    def fitted_weights(self, gradient: np.ndarray) -> np.ndarray:
-        """Weights, (p,), that balance a gradient best: non-negative least squares (Lawson and Hanson)."""
+        Without multipliers, the weights that balance the gradient best: non-negative least squares (Lawson and Hanson).
+        """
+        if multipliers is not None:
+            of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
+            rest = gradient - of_rows @ self.slopes[: len(of_rows)]
+            of_variables = np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)
+            return np.concatenate([of_rows, of_variables])
         from scipy.optimize import nnls
 
-        return (
-            np.asarray(nnls(self.slopes.T, gradient)[0])
-            if len(self.slopes)
-            else np.empty(0)
-        )
+        if not len(self.slopes):
+            return np.empty(0)
+        return np.asarray(nnls(self.slopes.T, gradient)[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,9 +128,9 @@ class Multipliers(Summary):
     source : str
         ``"solver"`` or ``"least squares"``.
     residual : float
-        See `ActiveSet.stationarity_residual`; 1 where nothing balances.
+        Norm of what the weights leave of the gradient, relative to the gradient's; 1 if nothing balances.
     unique : bool
-        False where other multipliers balance the gradient as well.
+        False if other multipliers balance the gradient as well.
     """
 
     active_set: ActiveSet
@@ -158,7 +140,7 @@ class Multipliers(Summary):
     unique: bool
 
     def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
-        """Directional derivative of t_E as bounds give way.
+        """Directional derivative of t_E if bounds are relaxed.
 
         Parameters
         ----------
@@ -172,30 +154,20 @@ class Multipliers(Summary):
         float
             <= 0, s.
         """
-        rates = relaxation[self.active_set.rows]
+        rates = np.zeros(len(self.weights))
+        of_rows = relaxation[self.active_set.rows]
         if side is not None:
-            rates = np.where(self.active_set.signs == side, rates, 0.0)
-        active = self.weights[: len(rates)]
-        if self.unique or not (rates @ active):
-            return -float(rates @ active)
-        return -self._least(
-            np.concatenate([rates, np.zeros(len(self.weights) - len(rates))])
-        )
-
-    def _least(self, rates: np.ndarray) -> float:
-        """Least of ``rates @ w`` over all weights that balance as much as `weights` do."""
+            of_rows = np.where(self.active_set.signs == side, of_rows, 0.0)
+        rates[: len(of_rows)] = of_rows
+        saved = float(rates @ self.weights)
+        if self.unique or not saved:
+            return -saved
         from scipy.optimize import linprog
 
+        # Of all weights that balance as much, those that promise the least.
         slopes = self.active_set.slopes
-        found = linprog(
-            rates,
-            A_eq=slopes.T,
-            b_eq=self.weights @ slopes,
-            bounds=(0.0, None),
-            method="highs",
-        )
-        best = self.weights if found.x is None else found.x
-        return float(rates @ best)
+        found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes)
+        return -float(rates @ (self.weights if found.x is None else found.x))
 
 
 def multipliers_of(
@@ -219,46 +191,36 @@ def multipliers_of(
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    tried: list[Multipliers] = []
-    for near in ACTIVE:
-        tried.append(
-            _balancing(ActiveSet.at(program, x, near), program.gradient(x), given)
-        )
-        if tried[-1].residual <= _GOOD:
+    tried = []
+    for multipliers in _balance(program, x, given):
+        tried.append(multipliers)
+        if multipliers.residual <= 1e-5:
             break
     return min(tried, key=lambda multipliers: multipliers.residual)
 
 
-def _balancing(
-    active_set: ActiveSet, gradient: np.ndarray, given: np.ndarray | None
-) -> Multipliers:
-    """Choose the weights of active_set that balance a gradient, (v,), best."""
-    candidates = (
-        [] if given is None else [("solver", active_set.weights_of(gradient, given))]
-    )
-    if (
-        not candidates
-        or active_set.stationarity_residual(gradient, candidates[0][1]) > _GOOD
-    ):
-        candidates.append(("least squares", active_set.fitted_weights(gradient)))
-    source, weights = min(
-        candidates,
-        key=lambda candidate: active_set.stationarity_residual(gradient, candidate[1]),
-    )
-    residual = active_set.stationarity_residual(gradient, weights)
-    return Multipliers(
-        active_set, weights, source, residual, unique=not active_set.dependent
-    )
+def _balance(
+    program: Program, x: np.ndarray, given: np.ndarray | None
+) -> Iterator[Multipliers]:
+    """Yield multipliers of the rows at their bounds, the solver's first, then with rows a little farther away.
 
-
-def multipliers_of_answer(refined: SolvedProgram) -> Multipliers:
-    """Find the multipliers of a refined answer, before its end time was lengthened."""
-    report = refined.reports[-1]
-    return multipliers_of(refined.program, report.x, report.multipliers)
+    A row that is near its bound without being active would count as one that takes over within any step.
+    """
+    gradient = program.gradient(x)
+    for near in (1e-8, 1e-7, 1e-6, 1e-5):
+        active_set = ActiveSet.at(program, x, near)
+        unique = not active_set.dependent
+        for source, own in (("solver", given), ("least squares", None)):
+            if source == "solver" and given is None:
+                continue
+            weights = active_set.weights_of(gradient, own)
+            rest = np.linalg.norm(gradient - weights @ active_set.slopes)
+            residual = float(rest / np.linalg.norm(gradient))
+            yield Multipliers(active_set, weights, source, residual, unique=unique)
 
 
 STATIONARY = 1e-3
-"""With a larger residual the answer is not an optimum, and its multipliers say little."""
+"""Largest residual of an optimum, relative to the gradient; beyond it the multipliers are rough."""
 
 
 @dataclass(frozen=True)
@@ -271,7 +233,7 @@ class Sensitivity:
     bound : Bound
         The figure.
     derivative : float
-        Derivative of t_E with respect to the figure, s per unit; <= 0 but at a lower end, which is raised by it.
+        Derivative of t_E with respect to the figure, s per unit; <= 0 except at a lower end, which is raised by it.
     """
 
     limit: Limit
@@ -308,7 +270,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class BranchBoundary:
-    """What the branch's boundary costs; no limit of the robot, but of the choice of redundant joints.
+    """What the branch's boundary costs; it limits the choice of redundant joints, not the robot.
 
     Attributes
     ----------
@@ -344,11 +306,11 @@ class Sensitivities(Summary):
     boundaries : tuple of BranchBoundary
         Branch margins that hold the motion back.
     source : str
-        Where the multipliers are from: ``"solver"`` or ``"least squares"``.
+        Origin of the multipliers: ``"solver"`` or ``"least squares"``.
     residual : float
         Part of the gradient of t_E that they do not balance; an optimum has 0.
     unique : bool
-        False where the multipliers are not unique: the derivatives then hold for more room only, not for less.
+        False if the multipliers are not unique: the derivatives then hold for more room only, not for less.
     """
 
     limits: tuple[Sensitivity, ...]
@@ -359,19 +321,16 @@ class Sensitivities(Summary):
 
     @property
     def reliable(self) -> bool:
-        """True where the answer is an optimum as far as the multipliers tell."""
+        """Whether the answer is an optimum, judged by the multipliers."""
         return self.residual <= STATIONARY
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
         """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
+        wanted = (subject, kind, end)
         for entry in self.limits:
-            if (entry.label.subject, entry.label.kind, entry.bound.side) == (
-                subject,
-                kind,
-                end,
-            ):
+            if (entry.label.subject, entry.label.kind, entry.bound.side) == wanted:
                 return entry
-        raise KeyError((subject, kind, end))
+        raise KeyError(wanted)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -398,11 +357,13 @@ def sensitivities(refined: SolvedProgram) -> Sensitivities:
     Sensitivities
         Of the answer before its end time was lengthened to meet the limits between collocation points.
     """
-    return sensitivities_at(refined.program, multipliers_of_answer(refined))
+    report = refined.reports[-1]
+    multipliers = multipliers_of(refined.program, report.x, report.multipliers)
+    return sensitivities_at(refined.program, multipliers)
 
 
 def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
-    """As `sensitivities`, from a problem and the multipliers of its answer."""
+    """Derive what every limit costs from a problem and the multipliers of its answer."""
     found: list[Sensitivity] = []
     boundaries: list[BranchBoundary] = []
     for limit in program.limits:
@@ -410,14 +371,15 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         for bound in limit.bounds:
             rates = np.zeros(len(program.lower))
             rates[rows[:, bound.column]] = bound.per_unit
-            if limit.role is not Role.SAFEGUARD:
-                found.append(_sensitivity(limit, bound, rates, multipliers))
-            elif (slope := -multipliers.change(rates)) > 1e-9:
-                boundaries.append(
-                    BranchBoundary(
-                        limit.labels[bound.column].subject, bound.figure, slope
-                    )
-                )
+            if limit.role is Role.SAFEGUARD:
+                subject = limit.labels[bound.column].subject
+                cost = -multipliers.change(rates)
+                if cost > 1e-9:
+                    boundaries.append(BranchBoundary(subject, bound.figure, cost))
+                continue
+            side = {None: None, "lower": 1.0, "upper": -1.0}[bound.side]
+            derivative = -(side or -1.0) * multipliers.change(rates, side)
+            found.append(Sensitivity(limit, bound, derivative))
     found.sort(key=lambda entry: entry.change(1.0))
     return Sensitivities(
         tuple(found),
@@ -426,13 +388,3 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         multipliers.residual,
         multipliers.unique,
     )
-
-
-def _sensitivity(
-    limit: Limit, bound: Bound, rates: np.ndarray, multipliers: Multipliers
-) -> Sensitivity:
-    """Sensitivity to a figure that moves the bounds of the rows outwards at `rates`, (c,)."""
-    if bound.side is None:
-        return Sensitivity(limit, bound, multipliers.change(rates))
-    sign = 1.0 if bound.side == "lower" else -1.0
-    return Sensitivity(limit, bound, -sign * multipliers.change(rates, sign))

@@ -48,7 +48,7 @@ def write_ros2_yaml(rows: JointRows, stream: BinaryIO) -> None:
 
 
 TOPIC: Final = "/joint_trajectory_controller/joint_trajectory"
-"""Where ros2_control's controller listens."""
+"""Topic on which ros2_control's controller listens."""
 
 _DEFINITION = f"\n{'=' * 80}\n".join(
     (

@@ -30,9 +30,9 @@ class Format:
     writer : callable
         Writes `JointRows`, or the `Film` of an animation, to a binary stream.
     dt : float
-        Period unless another one is asked for, s.
+        Default period, s.
     last : {"exact", "hold"}
-        Last sample unless another one is asked for; see `Trajectory.sample`.
+        Default last sample; see `Trajectory.sample`.
     step : float or None
         Of an animation: periods are multiples of it, s.
     """

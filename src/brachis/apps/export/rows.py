@@ -123,22 +123,26 @@ def rows_of(
     )
 
 
-def require_library(name: str, what: str) -> ModuleType:
-    """Import a library of the extra ``export``.
+def require_library(
+    module: str, user: str, *, library: str = "", extra: str = "export"
+) -> ModuleType:
+    """Import a module of a library that only an extra brings.
 
     Parameters
     ----------
-    name : str
-        Of the module.
-    what : str
+    module : str
+    user : str
         What needs it.
+    library : str, optional
+        Its name if the module's first part is not.
+    extra : str, optional
 
     Raises
     ------
     NotInstalledError
     """
     try:
-        return importlib.import_module(name)
+        return importlib.import_module(module)
     except ImportError as error:
-        package = name.split(".", maxsplit=1)[0]
-        raise NotInstalledError(what, package, "export") from error
+        name = library or module.partition(".")[0]
+        raise NotInstalledError(user, name, extra) from error

@@ -10,9 +10,10 @@ from __future__ import annotations
 import csv
 import io
 import json
-from typing import Any, BinaryIO, Final
+from typing import Annotated, Any, BinaryIO, Final, Literal
 
 import numpy as np
+from pydantic import BaseModel, Field, PositiveFloat
 
 from brachis.apps.export.rows import JointRows, require_library
 from brachis.trajectory.samples import COLUMNS
@@ -54,71 +55,48 @@ def write_parquet(rows: JointRows, stream: BinaryIO) -> None:
 SCHEMA_ID: Final = "urn:brachis:joint-trajectory:1"
 
 
+_Numbers = Annotated[list[float], Field(min_length=2)]
+_Rows = Annotated[
+    list[Annotated[list[float], Field(min_length=1)]], Field(min_length=2)
+]
+
+
+class _Samples(BaseModel, extra="forbid", title="samples"):
+    """Motion at the times of an exported file."""
+
+    t: _Numbers = Field(description="s")
+    s: _Numbers = Field(description="path coordinate, 0 to 1")
+    q: _Rows = Field(
+        description="positions, rad or m, a row for each t, a column for each joint"
+    )
+    qdot: _Rows = Field(description="velocities, rad/s or m/s")
+    qddot: _Rows = Field(description="accelerations, rad/s^2 or m/s^2")
+    tau: _Rows = Field(description="torques, Nm, or forces, N")
+
+
+class _JointTrajectory(BaseModel, extra="forbid", title="A joint trajectory"):
+    """A joint trajectory written by brachis."""
+
+    schema_id: Literal["urn:brachis:joint-trajectory:1"] = Field(alias="$schema")
+    joint_names: list[str] = Field(
+        min_length=1, description="Joints in the order of the columns."
+    )
+    position_units: list[Literal["rad", "m"]] = Field(
+        min_length=1, description="Unit of every joint's position."
+    )
+    t_end: PositiveFloat = Field(description="End time, s.")
+    dt: PositiveFloat = Field(description="Period of the samples, s.")
+    warnings: list[str] = Field(description="Joints that move and are left out.")
+    samples: _Samples
+
+
 def samples_schema() -> dict[str, Any]:
     """Return the JSON schema of exported trajectories, draft 2020-12; also ``brachis schema --of trajectory``."""
-    text = {"type": "string"}
-    number = {"type": "number"}
-    positive = {**number, "exclusiveMinimum": 0}
-    names = _array(text, 1)
-    numbers = _array(number, 2)
-    per_joint = _array(_array(number, 1), 2)
-    samples = {
-        "t": ("s", numbers),
-        "s": ("path coordinate, 0 to 1", numbers),
-        "q": (
-            "positions, rad or m, a row for each t, a column for each joint",
-            per_joint,
-        ),
-        "qdot": ("velocities, rad/s or m/s", per_joint),
-        "qddot": ("accelerations, rad/s^2 or m/s^2", per_joint),
-        "tau": ("torques, Nm, or forces, N", per_joint),
-    }
-    properties = _describe(
-        {
-            "joint_names": ("Joints in the order of the columns.", names),
-            "position_units": (
-                "Unit of every joint's position.",
-                _array({"enum": ["rad", "m"]}, 1),
-            ),
-            "t_end": ("End time, s.", positive),
-            "dt": ("Period of the samples, s.", positive),
-            "warnings": ("Joints that move and are left out.", _array(text, 0)),
-        }
-    )
+    draft = "https://json-schema.org/draft/2020-12/schema"
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$schema": draft,
         "$id": SCHEMA_ID,
-        "title": "A joint trajectory written by brachis",
-        **_object(
-            {
-                "$schema": {"const": SCHEMA_ID},
-                **properties,
-                "samples": _object(_describe(samples)),
-            }
-        ),
-    }
-
-
-def _array(items: dict[str, Any], least: int) -> dict[str, Any]:
-    """Return the schema of an array of at least so many items."""
-    return {"type": "array", "items": items} | ({"minItems": least} if least else {})
-
-
-def _describe(entries: dict[str, tuple[str, dict[str, Any]]]) -> dict[str, Any]:
-    """Return schemas with their descriptions."""
-    return {
-        name: {**schema, "description": text}
-        for name, (text, schema) in entries.items()
-    }
-
-
-def _object(properties: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of an object with these properties and no others."""
-    return {
-        "type": "object",
-        "properties": properties,
-        "required": list(properties),
-        "additionalProperties": False,
+        **_JointTrajectory.model_json_schema(),
     }
 
 

@@ -1,4 +1,4 @@
-"""Figures of a trajectory; a plot is one file here and one line in `PLOTS`.
+"""Figures of a trajectory; a plot is one function here and one row of `PLOTS`.
 
 Every function returns a Matplotlib figure of its own, made without pyplot and without touching Matplotlib's settings.
 Matplotlib is imported when the first figure is made.
@@ -20,11 +20,11 @@ from brachis.apps.plots.motion import (
     plot_limits,
     plot_motion,
     plot_overview,
+    plot_timeline,
     plot_torques,
 )
 from brachis.apps.plots.postures import plot_postures
 from brachis.apps.plots.style import SUFFIXES, as_html, check_suffix, save_figure
-from brachis.apps.plots.timeline import plot_timeline
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from brachis.task import FitReport
-
 
 Case = float | str
 """What is planned: a number that is varied, or a name."""
@@ -69,26 +67,24 @@ def plot_comparison(
     height = 1.27 * max((t_end for t_end in cells.values() if t_end > 0.0), default=1.0)
     for panel in range(panels):
         ax = figure.add_subplot(panels, 1, panel + 1)
-        _draw(
-            ax, cases[panel * per_panel : (panel + 1) * per_panel], choices, cells, unit
-        )
+        style.dress(ax, xlabel if panel == panels - 1 else "", r"$t_\mathrm{E}$ (s)")
+        shown = cases[panel * per_panel : (panel + 1) * per_panel]
+        _draw_bars(ax, shown, choices, cells)
+        names = [style.plain(f"{_name(case)}{unit}") for case in shown]
+        ax.set_xticks(range(len(shown)), names)
+        ax.tick_params(axis="x", length=0.0)
         ax.set_xlim(-0.5, per_panel - 0.5)
         ax.set_ylim(0.0, height)
-        ax.set_xlabel(xlabel if panel == panels - 1 else "")
-        if panel == 0:
-            style.legend_above(ax, style.PAGE_WIDTH - 20.0)
+    style.legend_above(figure.axes[0], style.PAGE_WIDTH - 20.0)
     return figure
 
 
 def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], float]:
     """Check the rows and key them by case and choice."""
+    row_type = "(case, choice, end time in s)"
     if not isinstance(rows, Sequence):
-        raise InputError(
-            "wrong type",
-            where="rows",
-            found=repr(rows),
-            allowed="a list of (case, choice, end time in s)",
-        )
+        allowed = f"a list of {row_type}"
+        raise InputError("wrong type", where="rows", found=repr(rows), allowed=allowed)
     if not rows:
         raise InputError(
             "there is nothing to compare",
@@ -98,34 +94,26 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
         )
     cells: dict[tuple[Case, str], float] = {}
     for number, row in enumerate(rows):
-        where = f"rows[{number}]"
-        if not isinstance(row, Sequence) or len(row) != 3 or isinstance(row, str):
-            raise InputError(
-                "wrong type",
-                where=where,
-                found=repr(row),
-                allowed="(case, choice, end time in s)",
-            )
-        case, choice, t_end = row
-        if not isinstance(case, str) and not math.isfinite(case):
-            raise InputError(
-                "is not a case",
-                where=where,
-                found=f"{case}",
-                allowed="a finite number, or a name",
-            )
-        if not (math.isnan(t_end) or 0.0 < t_end < math.inf):
-            raise InputError(
-                "is not an end time",
-                where=where,
-                found=f"{t_end} s",
-                allowed="> 0 s, or NaN for no plan",
-            )
-        if (case, choice) in cells:
-            raise InputError(
-                "comes twice", where=where, found=f"{_name(case)} with {choice!r}"
-            )
-        cells[case, choice] = t_end
+        allowed = None
+        if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 3:
+            problem = "wrong type"
+            found = repr(row)
+            allowed = row_type
+        elif not isinstance(row[0], str) and not math.isfinite(row[0]):
+            problem = "is not a case"
+            found = f"{row[0]}"
+            allowed = "a finite number, or a name"
+        elif not (math.isnan(row[2]) or 0.0 < row[2] < math.inf):
+            problem = "is not an end time"
+            found = f"{row[2]} s"
+            allowed = "> 0 s, or NaN for no plan"
+        elif (row[0], row[1]) in cells:
+            problem = "comes twice"
+            found = f"{_name(row[0])} with {row[1]!r}"
+        else:
+            cells[row[0], row[1]] = row[2]
+            continue
+        raise InputError(problem, where=f"rows[{number}]", found=found, allowed=allowed)
     return cells
 
 
@@ -133,60 +121,41 @@ def _name(case: Case) -> str:
     return case if isinstance(case, str) else f"{case:g}"
 
 
-def _draw(
+def _draw_bars(
     ax: Axes,
     cases: Sequence[Case],
     choices: Sequence[str],
     cells: Mapping[tuple[Case, str], float],
-    unit: str,
 ) -> None:
-    """Draw one panel of grouped bars with their values; pairs without a row leave a gap."""
+    """Draw one panel of grouped bars with their values above; pairs without a row leave a gap."""
     width = 0.84 / len(choices)
-    found = {pair: t_end for pair, t_end in cells.items() if not math.isnan(t_end)}
-    best = {
-        case: min(
-            (found[case, choice] for choice in choices if (case, choice) in found),
-            default=math.nan,
-        )
-        for case in cases
-    }
     for column, choice in enumerate(choices):
         shift = (column - 0.5 * (len(choices) - 1)) * width
-        places = [
-            place + shift for place, case in enumerate(cases) if (case, choice) in found
-        ]
-        times = [found[case, choice] for case in cases if (case, choice) in found]
-        ax.bar(
-            places,
-            times,
-            0.9 * width,
-            label=style.plain(choice),
-            **style.bar_style(column),
-        )
+        bars = {}
         for place, case in enumerate(cases):
-            if (case, choice) in cells:
-                t_end = cells[case, choice]
-                _write(ax, place + shift, t_end, bold=t_end == best[case])
-    style.dress(ax, "", r"$t_\mathrm{E}$ (s)")
-    ax.set_xticks(
-        range(len(cases)), [style.plain(f"{_name(case)}{unit}") for case in cases]
-    )
-    ax.tick_params(axis="x", length=0.0)
-
-
-def _write(ax: Axes, place: float, value: float, *, bold: bool) -> None:
-    """Write a value above its bar."""
-    ax.annotate(
-        "no plan" if math.isnan(value) else f"{value:.3f}",
-        (place, 0.0 if math.isnan(value) else value),
-        xytext=(0.0, 2.0),
-        textcoords="offset points",
-        rotation=90.0,
-        fontsize=style.TICK_SIZE - 0.5,
-        fontweight="bold" if bold else "normal",
-        horizontalalignment="center",
-        verticalalignment="bottom",
-    )
+            t_end = cells.get((case, choice))
+            if t_end is None:
+                continue
+            text = "no plan"
+            if not math.isnan(t_end):
+                text = f"{t_end:.3f}"
+                bars[place + shift] = t_end
+            others = [cells.get((case, other), math.inf) for other in choices]
+            is_best = not any(other < t_end for other in others) and text != "no plan"
+            ax.annotate(
+                text,
+                (place + shift, bars.get(place + shift, 0.0)),
+                xytext=(0.0, 2.0),
+                textcoords="offset points",
+                rotation=90.0,
+                fontsize=style.TICK_SIZE - 0.5,
+                fontweight="bold" if is_best else "normal",
+                horizontalalignment="center",
+                verticalalignment="bottom",
+            )
+        look = style.bar_style(column)
+        label = style.plain(choice)
+        ax.bar(list(bars), list(bars.values()), 0.9 * width, label=label, **look)
 
 
 _MARKS: dict[str, dict[str, Any]] = {
@@ -235,49 +204,45 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     InputError
         `candidates` is empty, or has other entries than candidates.
     """
+    problem = None
     if not isinstance(candidates, Sequence) or not all(
         isinstance(each, Candidate) for each in candidates
     ):
-        allowed = "the candidates of a result: result.candidates"
+        problem = "wrong type"
+    elif not candidates:
+        problem = "there is nothing to draw"
+    if problem:
         raise InputError(
-            "wrong type",
+            problem,
             where="candidates",
-            found=type(candidates).__name__,
-            allowed=allowed,
+            found=type(candidates).__name__ if candidates else "none",
+            allowed="the candidates of a result: result.candidates",
         )
-    if not candidates:
-        raise InputError(
-            "there is nothing to draw",
-            where="candidates",
-            found="none",
-            allowed="at least one",
-        )
-    candidates = [
-        candidates[0],
-        *(each for each in candidates[1:] if each.status != SAME_MOTION),
-    ]
-    rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
-    fastest = candidates[0]
+    fastest, *others = candidates
+    shown = [fastest, *(each for each in others if each.status != SAME_MOTION)]
+    rows = list(dict.fromkeys(_row(candidate) for candidate in shown))
     refining = 1.0
     if math.isfinite(fastest.t_end):
         refining = fastest.t_end / fastest.coarse
-    end_times = [_time(candidate, refining, math.inf) for candidate in candidates]
-    edge = 1.05 * max(filter(math.isfinite, end_times), default=1.0)
+    drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
+    for candidate in shown:
+        is_refined = math.isfinite(candidate.t_end)
+        time = candidate.t_end if is_refined else refining * candidate.coarse
+        kind = "failed"
+        if candidate.verified:
+            kind = "fastest" if candidate is fastest else "refined"
+        elif not is_refined and math.isfinite(candidate.coarse):
+            kind = "planned"
+        drawn[kind].append((time, rows.index(_row(candidate))))
+    known = [time for marks in drawn.values() for time, _ in marks if time < math.inf]
+    edge = 1.05 * max(known, default=1.0)
     figure = style.new_figure(style.PAGE_WIDTH, 24.0 + 5.0 * len(rows))
     ax = figure.add_subplot()
-    drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
-    for number, candidate in enumerate(candidates):
-        drawn[_kind(candidate, first=number == 0)].append(
-            (_time(candidate, refining, edge), rows.index(_row(candidate)))
-        )
-    for kind, places in drawn.items():
-        if places:
-            times, heights = zip(*places, strict=True)
-            ax.scatter(
-                times,
-                heights,
-                **{"s": 18.0, "linewidths": 0.8, "zorder": 3.0, **_MARKS[kind]},
-            )
+    for kind, marks in drawn.items():
+        if marks:
+            times, heights = np.array(marks).T
+            look = {"s": 18.0, "linewidths": 0.8, "zorder": 3.0, **_MARKS[kind]}
+            ax.scatter(np.where(np.isfinite(times), times, edge), heights, **look)
     style.dress(ax, r"$t_\mathrm{E}$ (s)", "")
     ax.set_yticks(range(len(rows)), [style.plain(row) for row in rows])
     ax.set_ylim(len(rows) - 0.5, -0.5)
@@ -287,32 +252,11 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
 
 
 def _row(candidate: Candidate) -> str:
+    """Name the choice of redundant joints and the branch."""
     found = coordinates(candidate.redundant_joints, candidate.branch)
     joints = "no redundant joint" if found == "none" else found
-    return (
-        f"{joints}: {candidate.branch}"
-        if candidate.branch not in {"", joints}
-        else joints
-    )
-
-
-def _time(candidate: Candidate, refining: float, edge: float) -> float:
-    """Return the refined end time, else what refining would make of the planned one, else the right edge."""
-    times = (candidate.t_end, refining * candidate.coarse)
-    return next((time for time in times if math.isfinite(time)), edge)
-
-
-def _kind(candidate: Candidate, *, first: bool) -> str:
-    if candidate.verified:
-        return "fastest" if first else "refined"
-    return (
-        "planned"
-        if math.isfinite(candidate.coarse) and not math.isfinite(candidate.t_end)
-        else "failed"
-    )
-
-
-_ROOM = 1.15
+    is_named = candidate.branch not in {"", joints}
+    return f"{joints}: {candidate.branch}" if is_named else joints
 
 
 @of_motion
@@ -332,48 +276,34 @@ def plot_fit(trajectory: Trajectory) -> Figure:
     fits = [fit for fit in trajectory.task.fits if fit.profile]
     figure = style.new_figure(style.COLUMN_WIDTH, 45.0 * max(len(fits), 1))
     if not fits:
-        figure.text(
-            0.5,
-            0.5,
-            "the path was not fitted to points",
-            ha="center",
-            va="center",
-            fontsize=style.LABEL_SIZE,
-        )
+        text = "the path was not fitted to points"
+        size = style.LABEL_SIZE
+        figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=size)
     for i, fit in enumerate(fits):
-        _draw_fit(figure.add_subplot(len(fits), 1, i + 1), fit)
+        ax = figure.add_subplot(len(fits), 1, i + 1)
+        along, distances, angles = np.array(fit.profile).T
+        mm = 1e3 * along
+        style.dress(ax, "along the path (mm)", "distance (mm)")
+        _draw_error(ax, mm, 1e3 * distances, 1e3 * fit.position_tolerance, 0)
+        for corner in fit.corners:
+            at = 1e3 * corner.distance
+            ax.axvline(at, color=style.GREY, linewidth=0.6, linestyle=":")
+        ax.set_xlim(0.0, 1e3 * fit.length)
+        ax.set_title(style.plain(fit.source), fontsize=style.TICK_SIZE)
+        if fit.orientation_error > 0.0:
+            beside = ax.twinx()
+            style.dress(beside, "", "angle (deg)")
+            tolerance = float(np.rad2deg(fit.orientation_tolerance))
+            _draw_error(beside, mm, np.rad2deg(angles), tolerance, 1)
+            for axes, colour in ((ax, 0), (beside, 1)):
+                axes.yaxis.label.set_color(style.COLOURS[colour])
     return figure
 
 
-def _draw_fit(ax: Axes, fit: FitReport) -> None:
-    along, distances, angles = np.array(fit.profile).T
-    ax.plot(1e3 * along, 1e3 * distances, color=style.COLOURS[0], linewidth=0.6)
-    ax.axhline(
-        1e3 * fit.position_tolerance,
-        color=style.COLOURS[0],
-        linewidth=0.8,
-        linestyle="--",
-    )
-    for corner in fit.corners:
-        ax.axvline(
-            1e3 * corner.distance, color=style.GREY, linewidth=0.6, linestyle=":"
-        )
-    ax.set_xlim(0.0, 1e3 * fit.length)
-    ax.set_ylim(0.0, _ROOM * 1e3 * fit.position_tolerance)
-    style.dress(ax, "along the path (mm)", "distance (mm)")
-    ax.set_title(style.plain(fit.source), fontsize=style.TICK_SIZE)
-    if fit.orientation_error > 0.0:
-        beside = ax.twinx()
-        beside.plot(
-            1e3 * along, np.rad2deg(angles), color=style.COLOURS[1], linewidth=0.6
-        )
-        beside.axhline(
-            np.rad2deg(fit.orientation_tolerance),
-            color=style.COLOURS[1],
-            linewidth=0.8,
-            linestyle="--",
-        )
-        beside.set_ylim(0.0, _ROOM * np.rad2deg(fit.orientation_tolerance))
-        style.dress(beside, "", "angle (deg)")
-        beside.yaxis.label.set_color(style.COLOURS[1])
-        ax.yaxis.label.set_color(style.COLOURS[0])
+def _draw_error(
+    ax: Axes, along: np.ndarray, errors: np.ndarray, tolerance: float, colour: int
+) -> None:
+    """Draw errors of a fit over the path, and their tolerance."""
+    ax.plot(along, errors, linewidth=0.6, color=style.COLOURS[colour])
+    ax.axhline(tolerance, linewidth=0.8, linestyle="--", color=style.COLOURS[colour])
+    ax.set_ylim(0.0, 1.15 * tolerance)

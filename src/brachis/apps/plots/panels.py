@@ -6,7 +6,7 @@ A new panel is one row of `PANELS`, and a function if its values are not among t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +18,43 @@ from brachis.trajectory import Samples, Trajectory
 
 BLACK = 48
 """Style of curves of the whole arm: a number that gives a solid black line in all figures."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One curve of a panel.
+
+    Attributes
+    ----------
+    name : str
+        Of a joint, ``tool``, ...
+    style : int
+        Number of its colour and dashes: the index of the joint, or `BLACK`.
+    values : (K,) ndarray
+    lower, upper : float or (K,) ndarray
+        Limits; infinite without one.
+    centre : float
+        Value that uses nothing of the limits: zero, or the middle of a range of positions.
+    """
+
+    name: str
+    style: int
+    values: np.ndarray
+    lower: np.ndarray | float = -np.inf
+    upper: np.ndarray | float = np.inf
+    centre: float = 0.0
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether it has limits in both directions at all times."""
+        return bool(np.isfinite(self.lower).all() and np.isfinite(self.upper).all())
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """Values over the limits of their directions, both from the centre, (K,); of a curve that has both."""
+        away = self.values - self.centre
+        above = self.upper - self.centre
+        return np.asarray(away / np.where(away > 0.0, above, self.centre - self.lower))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +71,8 @@ class Panel:
         Of the values; empty if they are dimensionless.
     t : (K,) ndarray
         s.
-    names : tuple of str
-        Of the c curves: joints in chain order, ``tool``, ...
-    styles : (c,) int ndarray
-        Numbers of the curves' colours and dashes: the index of the joint, or `BLACK`.
-    values : (K, c) ndarray
-    lower, upper : (1, c) or (K, c) ndarray
-        Limits; infinite if a curve has none.
-    centre : (c,) ndarray
-        Values that use nothing of the limits: zero, or the middle of a range of positions.
+    curves : tuple of Curve
+        Joints in chain order.
     ratio_title : str
         Title of the values over their limits.
     is_ratio : bool
@@ -55,12 +85,7 @@ class Panel:
     symbol: str
     unit: str
     t: np.ndarray
-    names: tuple[str, ...]
-    styles: np.ndarray
-    values: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    centre: np.ndarray
+    curves: tuple[Curve, ...]
     ratio_title: str = ""
     is_ratio: bool = False
     ends: tuple[float | None, float | None] = (None, None)
@@ -76,54 +101,35 @@ class Panel:
         return f"{self.symbol} ({self.unit})" if self.unit else self.symbol
 
     @property
-    def is_limited(self) -> np.ndarray:
-        """Whether curves have limits in both directions at all times, (c,)."""
-        return (np.isfinite(self.lower) & np.isfinite(self.upper)).all(axis=0)
+    def values(self) -> np.ndarray:
+        """Values of all curves, (K, c)."""
+        return np.column_stack([curve.values for curve in self.curves])
 
-    @property
-    def ratios(self) -> np.ndarray:
-        """Values over the limits of their directions, both from the centre, (K, c); NaN without a limit."""
-        away = self.values - self.centre
-        room = np.where(away > 0.0, self.upper - self.centre, self.centre - self.lower)
-        return np.where(self.is_limited, away / room, np.nan)
-
-    def select(self, kept: np.ndarray) -> Panel:
-        """Return the panel with some of its curves, (c,) bool."""
-        names = zip(self.names, kept, strict=True)
-        return replace(
-            self,
-            names=tuple(name for name, is_kept in names if is_kept),
-            styles=self.styles[kept],
-            values=self.values[:, kept],
-            lower=self.lower[:, kept],
-            upper=self.upper[:, kept],
-            centre=self.centre[kept],
-        )
-
-    def near_limits(self) -> list[tuple[np.ndarray, list[int]]]:
+    def near_limits(self) -> list[tuple[np.ndarray, list[Curve]]]:
         """List the limits that are drawn: all of ratios, others if the motion comes within 30 % of its own range.
 
         Returns
         -------
-        list of ((1,) or (K,) ndarray, list of int)
+        list of ((K,) ndarray, list of Curve)
             The limit over time, NaN where it is far away, and the curves that share it.
         """
         reach = 0.3 * max(float(np.ptp(self.values)), 1e-9)
-        lowest = self.values.min(axis=0) - reach
-        highest = self.values.max(axis=0) + reach
-        found: dict[bytes, tuple[np.ndarray, list[int]]] = {}
-        for limit in (self.lower, self.upper):
-            is_near = (limit >= lowest) & (limit <= highest)
-            is_drawn = np.isfinite(limit) if self.is_ratio else is_near
-            for curve, line in enumerate(np.where(is_drawn, limit, np.nan).T):
-                if np.isfinite(line).any():
+        found: dict[bytes, tuple[np.ndarray, list[Curve]]] = {}
+        for curve in self.curves:
+            lowest = curve.values.min() - reach
+            highest = curve.values.max() + reach
+            for limit in (curve.lower, curve.upper):
+                is_near = (limit >= lowest) & (limit <= highest)
+                is_drawn = np.isfinite(limit) & (is_near | self.is_ratio)
+                if np.any(is_drawn):
+                    line = np.where(is_drawn, limit, np.nan) + np.zeros_like(self.t)
                     found.setdefault(line.tobytes(), (line, []))[1].append(curve)
         return list(found.values())
 
     def view(self) -> tuple[float, float]:
         """Return the ends of the axis: `ends`, or those of the values and of the limits near them."""
         limits = [line for line, _ in self.near_limits()]
-        shown = np.concatenate([self.values.ravel(), *limits])
+        shown = np.column_stack([self.values, *limits])
         low = float(np.nanmin(shown))
         high = float(np.nanmax(shown))
         margin = 0.05 * (high - low) if high - low > 1e-9 else 1.0
@@ -141,7 +147,7 @@ class Row:
     Attributes
     ----------
     values : callable
-        Of trajectory and samples: (K, n) for the joints, or (K, 1).
+        Of trajectory and samples: (K, n) for the joints, or (K,).
     symbol : str
         In Matplotlib's mathematics.
     prismatic : tuple of str
@@ -155,7 +161,7 @@ class Row:
     unit : str or None
         Unit of the values; None for joints, which have their own.
     largest : callable or None
-        Of trajectory and samples: the largest values that the task allows, (K, 1).
+        Of trajectory and samples: the largest values that the task allows, (K,).
     ends : (float or None, float or None)
         See `Panel`.
     """
@@ -167,16 +173,14 @@ class Row:
     ranges: Callable[[Limits], np.ndarray] | None = None
     only_if_limited: bool = False
     unit: str | None = None
-    largest: Callable[[Trajectory, Samples], np.ndarray] | None = None
+    largest: Callable[[Trajectory, Samples], np.ndarray | float] | None = None
     ends: tuple[float | None, float | None] = (None, None)
 
 
-def _allowed_tool_speed(trajectory: Trajectory, samples: Samples) -> np.ndarray:
-    """Return the largest speed of the tool that the task allows, (K, 1), m/s; infinite without a limit."""
+def _allowed_tool_speed(trajectory: Trajectory, samples: Samples) -> np.ndarray | float:
+    """Return the largest speed of the tool that the task allows, (K,), m/s; infinite without a limit."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
-    if limit is None:
-        return np.array([[np.inf]])
-    return limit.largest_at(samples.s)[0].min(axis=1, keepdims=True)
+    return np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
 
 
 PANELS = {
@@ -197,10 +201,10 @@ PANELS = {
         lambda _, samples: samples.tau, r"$\tau$", prismatic=("force", "$F$")
     ),
     "path coordinate": Row(
-        lambda _, samples: samples.s[:, None], "$s$", unit="", ends=(-0.04, 1.04)
+        lambda _, samples: samples.s, "$s$", unit="", ends=(-0.04, 1.04)
     ),
     "tool speed": Row(
-        lambda _, samples: samples.tool_speed[:, None],
+        lambda _, samples: samples.tool_speed,
         "tool speed",
         unit="m/s",
         largest=_allowed_tool_speed,
@@ -250,21 +254,11 @@ def panels_of(
             found += _joint_panels(trajectory, samples, name, degrees=degrees)
             continue
         values = row.values(trajectory, samples)
-        largest = row.largest(trajectory, samples) if row.largest else None
-        panel = Panel(
-            title=name,
-            symbol=row.symbol,
-            unit=row.unit,
-            t=samples.t,
-            names=("tool",),
-            styles=np.array([BLACK]),
-            values=values,
-            lower=np.array([[-np.inf]]),
-            upper=np.array([[np.inf]]) if largest is None else largest,
-            centre=np.zeros(1),
-            ends=row.ends,
+        largest = row.largest(trajectory, samples) if row.largest else np.inf
+        curve = Curve("tool", BLACK, values, upper=largest)
+        found.append(
+            Panel(name, row.symbol, row.unit, samples.t, (curve,), ends=row.ends)
         )
-        found.append(panel)
     return found
 
 
@@ -279,30 +273,22 @@ def _joint_panels(
     if row.ranges:
         is_range = np.isfinite(lower) & np.isfinite(upper)
         middle[is_range] = 0.5 * lower[is_range] + 0.5 * upper[is_range]
-    values = row.values(trajectory, samples)
+    columns = row.values(trajectory, samples).T
     found = []
     for base, is_shown in (("rad", robot.revolute), ("m", ~robot.revolute)):
-        if not is_shown.any():
-            continue
-        joints = np.flatnonzero(is_shown)
-        title, symbol = name, row.symbol
-        if base == "m" and row.prismatic:
-            title, symbol = row.prismatic
         unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
-        panel = Panel(
-            title=title,
-            symbol=symbol,
-            unit=unit.replace("^2", "²").replace("^3", "³"),
-            t=samples.t,
-            names=tuple(trajectory.joint_names[joint] for joint in joints),
-            styles=joints,
-            values=factor * values[:, joints],
-            lower=factor * lower[None, joints],
-            upper=factor * upper[None, joints],
-            centre=factor * middle[joints],
-            ratio_title=row.ratio_title or f"{title} / limit",
-        )
-        found.append(panel)
+        curves = []
+        for joint in np.flatnonzero(is_shown).tolist():
+            values = (columns[joint], lower[joint], upper[joint], middle[joint])
+            scaled = (factor * each for each in values)
+            curves.append(Curve(trajectory.joint_names[joint], joint, *scaled))
+        if not curves:
+            continue
+        own = row.prismatic if base == "m" else None
+        title, symbol = own or (name, row.symbol)
+        unit = unit.replace("^2", "²").replace("^3", "³")
+        ratio = row.ratio_title or f"{title} / limit"
+        found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
     return found
 
 
@@ -312,12 +298,10 @@ def _limits_of(limits: Limits, name: str) -> np.ndarray:
     return ranges(limits) if ranges else limits.both_ways(name)
 
 
-def select_joint(parts: Sequence[Panel], name: str) -> list[Panel]:
-    """Return the panels that show a joint, each with this joint alone."""
+def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, Curve]]:
+    """List the curves of a joint with their panels."""
     return [
-        part.select(np.array(part.names) == name)
-        for part in parts
-        if name in part.names
+        (panel, each) for panel in panels for each in panel.curves if each.name == name
     ]
 
 
@@ -337,25 +321,28 @@ def ratio_panel(
     """
     subjects = [label.subject for label in ratios.labels]
     order = list(dict.fromkeys((*trajectory.joint_names, *subjects)))
-    columns = [k for k, label in enumerate(ratios.labels) if label.axis in titles]
-    columns.sort(key=lambda column: order.index(subjects[column]))
-    names = tuple(subjects[column] for column in columns)
-    values = ratios.values[:, columns]
-    title = ", ".join(titles)
+    shown = [k for k, label in enumerate(ratios.labels) if label.axis in titles]
+    values = ratios.values[:, shown]
     is_signed = bool(values.min() < 0.0)
+    curves = [
+        Curve(
+            subjects[k],
+            order.index(subjects[k]),
+            ratios.values[:, k],
+            -1.0 if is_signed else -np.inf,
+            1.0,
+        )
+        for k in shown
+    ]
+    curves.sort(key=lambda curve: curve.style)
+    title = ", ".join(titles)
     top = 1.15 * max(1.0, float(np.abs(values).max()))
-    ones = np.ones((1, len(names)))
     return Panel(
-        title=title,
-        symbol=symbol or title,
-        unit="",
-        t=ratios.t,
-        names=names,
-        styles=np.array([order.index(name) for name in names]),
-        values=values,
-        lower=-ones if is_signed else -np.inf * ones,
-        upper=ones,
-        centre=np.zeros(len(names)),
+        title,
+        symbol or title,
+        "",
+        ratios.t,
+        tuple(curves),
         ratio_title=title,
         is_ratio=True,
         ends=(-top if is_signed else -0.05 * top, top),

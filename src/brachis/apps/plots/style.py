@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import io
-import itertools
 import os
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -132,10 +131,10 @@ LABEL_SIZE = 8.0
 TICK_SIZE = 7.0
 """Font size of all other text, points."""
 LINE_WIDTH = 1.2
-"""Of data, points."""
+"""Width of the lines of data, points."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's colours, told apart by colour-blind readers; their yellow is too faint on white."""
+"""Okabe and Ito's colours, which colour-blind readers can distinguish; without yellow, which is too faint on white."""
 LINE_STYLES: tuple[Any, ...] = (
     "-",
     (0, (6.0, 1.6)),
@@ -144,7 +143,7 @@ LINE_STYLES: tuple[Any, ...] = (
     (0, (2.6, 1.2)),
     (0, (6.0, 1.3, 1.2, 1.3, 1.2, 1.3)),
 )
-"""Told apart in print without colours. One fewer than colours, so that joints far down the chain still differ."""
+"""Line styles that differ in print without colours; one fewer than colours, so that joints of long chains differ."""
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
 LIMIT: dict[str, Any] = {
     "linewidth": 0.7,
@@ -155,25 +154,14 @@ LIMIT: dict[str, Any] = {
 """Line properties of limits."""
 GREY = "#666666"
 FAINT = "#CFCFCF"
-FORBIDDEN = "#EFEFEF"
-"""What is beyond limits."""
-
-_MM_PER_INCH = 25.4
-_MM_PER_CHARACTER = 1.45  # of TICK_SIZE, with some reserve
-_MM_PER_HANDLE = 10.5
 
 
 def new_figure(width: float, height: float) -> Figure:
     """Make an empty figure of `width` times `height`, mm, that no global state knows of."""
-    size = width / _MM_PER_INCH, height / _MM_PER_INCH
+    size = (width / 25.4, height / 25.4)
     figure = figure_class()(figsize=size, layout="constrained", facecolor="white")
     figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.04)  # type: ignore[union-attr,call-arg]
     return figure
-
-
-def stack_panels(figure: Figure, count: int) -> list[Axes]:
-    """Add panels of the same height, one below the other."""
-    return [figure.add_subplot(count, 1, row + 1) for row in range(count)]
 
 
 def joint_style(joint: int) -> dict[str, Any]:
@@ -197,10 +185,8 @@ def bar_style(column: int) -> dict[str, Any]:
 
 def limit_dashes(place: int, sharing: int) -> tuple[float, tuple[float, float]]:
     """Line style of a limit that some joints share: the dashes of each lie in the gaps of the others."""
-    dash = 4.0
-    gap = 2.0
-    period = (dash + gap) * sharing
-    return (period - place * (dash + gap)) % period, (dash, period - dash)
+    period = 6.0 * sharing
+    return (period - 6.0 * place) % period, (4.0, period - 4.0)
 
 
 def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
@@ -252,25 +238,36 @@ def legend_above(
         What the legend shows; by default the labelled artists of the axes.
     """
     lines = lines_by_label([ax]) if lines is None else lines
+    look = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     if lines:
-        ax.legend(
-            list(lines.values()),
-            list(lines),
-            loc="lower center",
-            bbox_to_anchor=(0.5, 1.0),
-            borderaxespad=0.2,
-            borderpad=0.2,
-            **_legend_look(lines, width),
-        )
+        _add_legend(ax, width, lines, borderaxespad=0.2, borderpad=0.2, **look)
 
 
 def legend_below(figure: Figure, width: float, lines: Mapping[str, Artist]) -> None:
     """Put one legend for all axes at the foot of the figure; `width` in mm."""
-    figure.legend(
+    _add_legend(figure, width, lines, loc="outside lower center")
+
+
+def _add_legend(
+    place: Axes | Figure, width: float, lines: Mapping[str, Artist], **look: Any
+) -> None:
+    """Add a legend with as many columns as fit into `width`, mm; Matplotlib fills column by column."""
+    labels = list(lines)
+    columns = len(labels)
+    while columns > 1:
+        longest = [max(map(len, part)) for part in np.array_split(labels, columns)]
+        if 10.5 * columns + 1.45 * sum(longest) <= width:  # mm of handles and letters
+            break
+        columns -= 1
+    place.legend(
         list(lines.values()),
-        list(lines),
-        loc="outside lower center",
-        **_legend_look(lines, width),
+        labels,
+        ncols=columns,
+        fontsize=TICK_SIZE,
+        frameon=False,
+        handlelength=2.3,
+        columnspacing=1.2,
+        **look,
     )
 
 
@@ -283,39 +280,11 @@ def lines_by_label(panels: Sequence[Axes]) -> dict[str, Artist]:
     }
 
 
-def _legend_look(lines: Mapping[str, Artist], width: float) -> dict[str, Any]:
-    return {
-        "ncols": _columns_that_fit(list(lines), width),
-        "fontsize": TICK_SIZE,
-        "frameon": False,
-        "handlelength": 2.3,
-        "columnspacing": 1.2,
-    }
-
-
 def draw_limit(ax: Axes, level: float, top: float) -> None:
     """Draw a limit, and shade what is beyond it, up to `top`."""
     ax.axhline(level, color=GREY, **LIMIT)
-    beyond: dict[str, Any] = {
-        "facecolor": FORBIDDEN,
-        "edgecolor": "none",
-        "zorder": 0.0,
-    }
-    ax.axhspan(level, np.sign(level) * top, **beyond)
-
-
-def _columns_that_fit(labels: Sequence[str], width: float) -> int:
-    """Return the largest number of legend columns within `width`, mm; Matplotlib fills column by column."""
-    for columns in range(len(labels), 1, -1):
-        rows, longer = divmod(len(labels), columns)
-        starts = [column * rows + min(column, longer) for column in range(columns + 1)]
-        longest = [
-            max(map(len, labels[begin:end]))
-            for begin, end in itertools.pairwise(starts)
-        ]
-        if columns * _MM_PER_HANDLE + sum(longest) * _MM_PER_CHARACTER <= width:
-            return columns
-    return 1
+    beyond: dict[str, Any] = {"facecolor": "#EFEFEF", "edgecolor": "none"}
+    ax.axhspan(level, np.sign(level) * top, zorder=0.0, **beyond)
 
 
 def plain(name: str) -> str:

@@ -11,10 +11,11 @@ from brachis.apps.bottleneck import THRESHOLD
 from brachis.apps.bottleneck.saturation import knot_times
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import (
+    Curve,
     Panel,
+    curves_of,
     joint_rows_of,
     panels_of,
-    select_joint,
     torque_panels,
 )
 from brachis.apps.plots.postures import plane_of, skeleton
@@ -45,7 +46,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     over_limits = torque_panels(trajectory, samples, motion.ratios)
     panels += [panel for panel in over_limits if panel.is_ratio]
     panels += panels_of(trajectory, samples, "tool speed")
-    heights = [210 if len(panel.names) > 2 else 130 for panel in panels]
+    heights = [210 if len(panel.curves) > 2 else 130 for panel in panels]
     ends = 1.0 - np.cumsum([0, *heights]) / sum(heights)
     layout = _layout(trajectory.t_end, sum(heights))
     data = []
@@ -59,10 +60,10 @@ def motion_figure(motion: ReportedMotion) -> Figure:
             "zeroline": True,
             "range": panel.view(),
         }
-        for curve, name in enumerate(panel.names):
-            is_new = name in trajectory.joint_names and name not in named
+        for curve in panel.curves:
+            is_new = curve.name in trajectory.joint_names and curve.name not in named
             data += _traces(panel, curve, f"y{number}", is_named=is_new)
-            named.add(name)
+            named.add(curve.name)
     layout["xaxis"] |= {
         "anchor": f"y{len(panels)}",
         "minor": {
@@ -75,25 +76,23 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 
 
 def _traces(
-    panel: Panel, curve: int, axis: str, *, is_named: bool
+    panel: Panel, curve: Curve, axis: str, *, is_named: bool
 ) -> list[dict[str, Any]]:
     """Draw one curve, and its limits as thin dashed lines."""
-    name = panel.names[curve]
-    number = int(panel.styles[curve])
-    look = style.joint_style(number)
+    look = style.joint_style(curve.style)
     shared = {
         "type": "scatter",
         "mode": "lines",
         "yaxis": axis,
-        "name": name,
-        "legendgroup": name,
-        "legendrank": number,
+        "name": curve.name,
+        "legendgroup": curve.name,
+        "legendrank": curve.style,
     }
     hover = f"%{{y:.4g}} {panel.unit}".rstrip()
     line = {
         **shared,
         "x": encode(panel.t),
-        "y": encode(panel.values[:, curve]),
+        "y": encode(curve.values),
         "showlegend": is_named,
         "line": {
             "color": look["color"],
@@ -102,21 +101,19 @@ def _traces(
             "simplify": False,
         },
     }
-    if panel.is_limited[curve] and not panel.is_ratio:
-        line["customdata"] = encode(100.0 * np.abs(panel.ratios[:, curve]))
+    if curve.is_limited and not panel.is_ratio:
+        line["customdata"] = encode(100.0 * np.abs(curve.ratios))
         hover += f", %{{customdata:.1f}} % ({panel.ratio_title})"
-    line["hovertemplate"] = f"{hover}<extra>{_escape(name)}</extra>"
+    line["hovertemplate"] = f"{hover}<extra>{_escape(curve.name)}</extra>"
     traces = [line]
-    for limits in (panel.lower, panel.upper):
-        limit = limits[:, curve]
+    for limit in (curve.lower, curve.upper):
         if not np.isfinite(limit).any():
             continue
-        t = panel.t if len(limit) > 1 else panel.t[[0, -1]]
-        values = np.where(np.isfinite(limit), limit, np.nan)
+        t = panel.t if np.ndim(limit) else panel.t[[0, -1]]
         dashed = {
             **shared,
             "x": encode(t),
-            "y": encode(np.broadcast_to(values, t.shape)),
+            "y": encode(np.where(np.isfinite(limit), limit, np.nan) + 0.0 * t),
             "line": {"color": look["color"], "width": 1, "dash": "4px,4px"},
             "showlegend": False,
             "hoverinfo": "skip",
@@ -224,7 +221,7 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
             "name": name,
             "redundant": name in trajectory.redundant_joints,
             "prismatic": unit == "m",
-            "quantities": [_quantity(panel) for panel in select_joint(panels, name)],
+            "quantities": [_quantity(*each) for each in curves_of(panels, name)],
         }
         joints.append(joint)
     return {
@@ -243,9 +240,9 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
     }
 
 
-def _quantity(panel: Panel) -> dict[str, Any]:
+def _quantity(panel: Panel, curve: Curve) -> dict[str, Any]:
     """Write the values of one joint, and how much of its limit they use."""
-    entry = {"unit": panel.unit, "values": encode(panel.values[:, 0])}
-    if panel.is_limited[0]:
-        entry["ratios"] = encode(np.abs(panel.ratios[:, 0]))
+    entry = {"unit": panel.unit, "values": encode(curve.values)}
+    if curve.is_limited:
+        entry["ratios"] = encode(np.abs(curve.ratios))
     return entry

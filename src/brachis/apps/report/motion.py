@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from brachis.apps import bottleneck
 from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
-from brachis.apps.bottleneck.saturation import dense_samples, saturations_of
-from brachis.apps.bottleneck.text import active_in_words
+from brachis.apps.bottleneck.report import write_active
+from brachis.apps.bottleneck.saturation import dense_samples, saturations
 from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
 from brachis.optimise.candidate import Candidate
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ReportedMotion:
-    """A motion with all that is said of it.
+    """A motion with everything that a report shows of it.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class ReportedMotion:
     candidates : tuple of Candidate
         What the search looked at; none for a saved motion.
     planned : dict of str to str
-        How the motion was planned, where that is known.
+        How the motion was planned, if that is known.
     degrees : bool
         Whether angles are shown in degrees.
     """
@@ -66,41 +66,38 @@ def reported_motion(
 ) -> ReportedMotion:
     """Gather what there is to say of a motion; a saved one is verified again."""
     limits: list[Limit] | None = None
-    not_completed: list[str] = []
+    not_completed: tuple[str, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    planned = {}
     if isinstance(motion, Trajectory):
         trajectory = motion
         verification = verify_trajectory(motion)
         remarks = of_robot(motion.robot) + of_task(motion.task)
-        candidates: tuple[Candidate, ...] = ()
-        planned = {}
     else:
         trajectory = motion.trajectory
         verification = motion.verification
         remarks = motion.warnings
         candidates = motion.candidates
         planned = _describe_plan(motion)
-        if motion.candidate.refined is not None:
-            limits = [
-                limit
-                for limit in motion.candidate.refined.program.limits
-                if limit.role is not Role.SAFEGUARD
-            ]
+        refined = motion.candidate.refined
+        if refined is not None:
+            every = refined.program.limits
+            limits = [limit for limit in every if limit.role is not Role.SAFEGUARD]
+        not_completed = motion.not_completed
         if motion.interrupted:
-            not_completed.append(
-                "the search was ended early: a faster motion may have been missed"
-            )
-        not_completed += motion.not_completed
+            early = "the search was ended early: a faster motion may have been missed"
+            not_completed = (early, *not_completed)
     ratios = limit_ratios(trajectory, limits)
-    saturations = saturations_of(ratios)
+    found = saturations(ratios)
     return ReportedMotion(
         trajectory=trajectory,
         samples=dense_samples(trajectory),
         verification=verification,
         ratios=ratios,
-        saturations=saturations,
-        held_back=_held_back(motion, saturations, degrees=degrees),
+        saturations=found,
+        held_back=_held_back(motion, found, degrees=degrees),
         remarks=remarks,
-        not_completed=tuple(not_completed),
+        not_completed=not_completed,
         candidates=candidates,
         planned=planned,
         degrees=degrees,
@@ -114,7 +111,7 @@ def _held_back(
     try:
         return tuple(bottleneck.report(source).text(degrees=degrees).splitlines())
     except BrachisError as error:
-        return (*active_in_words(found), f"What the limits cost is not known: {error}")
+        return (*write_active(found), f"What the limits cost is not known: {error}")
 
 
 def _describe_plan(result: PlannedMotion) -> dict[str, str]:

@@ -13,20 +13,17 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from brachis.apps.export.rows import require_library
 from brachis.apps.plots import as_html, plot_candidates, plot_fit, plot_overview
 from brachis.apps.plots.panels import joint_rows_of
 from brachis.apps.report import tables
 from brachis.apps.report.figures import motion_figure, scene, timeline_figure
 from brachis.apps.report.motion import ReportedMotion, reported_motion
 from brachis.common.files import atomic_write, check_suffix
-from brachis.errors import NotInstalledError
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
-
-_NEEDED_BY = "a report"
-_EXTRA = "report"
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,9 +61,8 @@ class Report:
     @property
     def content(self) -> bytes:
         """What the file holds."""
-        return self.html.encode(
-            errors="backslashreplace"
-        )  # names of files need not be text
+        # Names of files need not be text.
+        return self.html.encode(errors="backslashreplace")
 
     def __repr__(self) -> str:
         """Say what it is, not what is in it."""
@@ -109,7 +105,7 @@ def make_report(
     >>> page.save("out/report.html")  # doctest: +SKIP
     """
     template = _template()
-    program = _plotly()
+    plotly = _plotly()
     reported = reported_motion(motion, degrees=degrees)
     checks = tables.check_rows(reported)
     page = template.render(
@@ -136,7 +132,7 @@ def make_report(
                 "scene": scene(reported),
             }
         ),
-        plotly=program,
+        plotly=plotly,
         style=_part("page.css"),
         program=_part("page.js"),
     )
@@ -146,43 +142,30 @@ def make_report(
 def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
     """Captions and pictures, which print and show without JavaScript."""
     trajectory = reported.trajectory
-    yield (
-        "The motion at a glance; dashed lines are limits, faint ticks the knots of the splines",
-        as_html(plot_overview(trajectory)),
-    )
+    caption = "The motion at a glance; dashed lines are limits, faint ticks the knots of the splines"
+    yield caption, as_html(plot_overview(trajectory))
     if len(reported.candidates) > 1:
-        yield (
-            "End times of all that the search looked at",
-            as_html(plot_candidates(reported.candidates)),
-        )
+        caption = "End times of all that the search looked at"
+        yield caption, as_html(plot_candidates(reported.candidates))
     if any(fit.profile for fit in trajectory.task.fits):
-        yield (
-            "How far the points are from the path that was fitted to them",
-            as_html(plot_fit(trajectory)),
-        )
+        caption = "How far the points are from the path that was fitted to them"
+        yield caption, as_html(plot_fit(trajectory))
 
 
 def _json(data: dict[str, Any]) -> str:
     """Write data for a script element, which no text in it can end."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace(
-        "<", "\\u003c"
-    )
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
 
 
 def _part(name: str) -> str:
-    return (
-        resources.files("brachis.apps.report")
-        .joinpath(name)
-        .read_text(encoding="utf-8")
-    )
+    folder = resources.files("brachis.apps.report")
+    return folder.joinpath(name).read_text(encoding="utf-8")
 
 
 def _template() -> Any:
-    """Read the page's template; what is filled in is escaped unless it is said to be safe."""
-    try:
-        import jinja2
-    except ImportError:
-        raise NotInstalledError(_NEEDED_BY, "Jinja2", _EXTRA) from None
+    """Read the page's template; what is filled in is escaped unless the template marks it as safe."""
+    jinja2 = require_library("jinja2", "a report", library="Jinja2", extra="report")
     environment = jinja2.Environment(
         autoescape=True,
         trim_blocks=True,
@@ -195,8 +178,8 @@ def _template() -> Any:
 @cache
 def _plotly() -> str:
     """Pack Plotly's program: 1.5 of 4.8 MB."""
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError:
-        raise NotInstalledError(_NEEDED_BY, "Plotly", _EXTRA) from None
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode()
+    plotly = require_library(
+        "plotly.offline", "a report", library="Plotly", extra="report"
+    )
+    program = plotly.get_plotlyjs().encode()
+    return base64.b64encode(gzip.compress(program, mtime=0)).decode()

@@ -15,14 +15,13 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD
-from brachis.apps.plots.panels import Panel, joint_rows_of, panels_of, select_joint
+from brachis.apps.plots.panels import Curve, Panel, curves_of, joint_rows_of, panels_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.optimise.candidate import coordinates
 from brachis.robot.from_task import in_use
 from brachis.task import Task
 from brachis.verify import Check
 
-_LIBRARIES = ("pin", "numpy", "scipy", "plotly")
 NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
 _LISTED = 6
@@ -79,10 +78,9 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     samples = motion.samples
     verification = motion.verification
     boundary = trajectory.task.boundary
-    named = trajectory.branch not in {
-        "",
-        coordinates(trajectory.redundant_joints, trajectory.branch),
-    }
+    joints = coordinates(trajectory.redundant_joints, trajectory.branch)
+    branch = trajectory.branch
+    named = {} if branch in {"", joints} else {"branch": branch}
     fastest = int(np.argmax(samples.tool_speed))
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
@@ -94,8 +92,8 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
         "largest tool speed": f"{samples.tool_speed[fastest]:.3f} m/s at {samples.t[fastest]:.3f} s",
         "worst ratio to a limit": f"{verification.worst_ratio:.5f} (1 is the limit)",
         "largest distance from the path": f"{verification.path_error:.1e} m or rad",
-        "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
-        **({"branch": trajectory.branch} if named else {}),
+        "redundant joints": joints,
+        **named,
         **motion.planned,
     }
 
@@ -103,61 +101,59 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
 def identity(motion: ReportedMotion) -> dict[str, str]:
     """Say what the motion is of: robot, path, payload and where the robot stands; and when the page was made."""
     trajectory = motion.trajectory
-    urdf = trajectory.task.robot.urdf
-    recovered = trajectory.recovered
-    file = "" if urdf is None else f" ({_file_name(urdf)})"
-    way = float(
-        np.linalg.norm(np.diff(motion.samples.tool_position, axis=0), axis=1).sum()
-    )
-    task_space = trajectory.task.task_space
-    rows = task_space if isinstance(task_space, str) else ", ".join(task_space)
+    task = trajectory.task
+    name = trajectory.robot.name
+    if task.robot.urdf is not None:
+        name = f"{name} ({_file_name(task.robot.urdf)})".strip()
+    source = {}
+    if trajectory.recovered is not None:
+        source["recovered from"] = _file_name(trajectory.recovered.source)
+    steps = np.diff(motion.samples.tool_position, axis=0)
+    length = float(np.linalg.norm(steps, axis=1).sum())
+    space = task.task_space
+    rows = space if isinstance(space, str) else ", ".join(space)
+    texts = {"URDF": trajectory.urdf, "task as it stands below": task_text(task)}
     return {
-        "robot": f"{trajectory.robot.name}{file}".strip(),
-        "path": f"{path_in_words(trajectory.task)}; the tool moves {way:.3f} m; prescribed: {rows}",
-        **(
-            {}
-            if recovered is None
-            else {"recovered from": _file_name(recovered.source)}
-        ),
+        "robot": name,
+        "path": f"{describe_path(task)}; the tool moves {length:.3f} m; prescribed: {rows}",
+        **source,
         "payload": "none",
         "tool offset": "none",
         "mounting": "at the world's origin, upright",
         **in_use(trajectory.robot),
         "report of": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
-        "SHA-256 of the URDF": hashlib.sha256(trajectory.urdf.encode()).hexdigest(),
-        "SHA-256 of the task as it stands below": hashlib.sha256(
-            task_text(trajectory.task).encode()
-        ).hexdigest(),
+        **{
+            f"SHA-256 of the {what}": hashlib.sha256(text.encode()).hexdigest()
+            for what, text in texts.items()
+        },
     }
 
 
-def path_in_words(task: Task) -> str:
-    """Name the segments of a path, each by its shape and what the task says of it."""
-    segments = [segment.model_dump(exclude_defaults=True) for segment in task.path]
-    said = [
-        f"{shape.replace('_', ' ')} ({', '.join(_entry(key, value) for key, value in given.items())})"
-        for segment in segments
-        for shape, given in segment.items()
-        if isinstance(given, dict)
-    ]
-    more = f", and {len(said) - _LISTED} more" if len(said) > _LISTED else ""
-    return ", then ".join(said[:_LISTED]) + more
+def describe_path(task: Task) -> str:
+    """Name the segments of a path, each by its shape and its entries in the task."""
+    found = []
+    for segment in task.path:
+        for shape, given in segment.model_dump(exclude_defaults=True).items():
+            if isinstance(given, dict):
+                entries = [_entry(key, value) for key, value in given.items()]
+                found.append(f"{shape.replace('_', ' ')} ({', '.join(entries)})")
+    rest = len(found) - _LISTED
+    more = f", and {rest} more" if rest > 0 else ""
+    return ", then ".join(found[:_LISTED]) + more
 
 
 def _entry(key: str, value: object) -> str:
-    """Say what a task says of a segment: short lists as they are, long ones and mappings by their length."""
-    if (
-        isinstance(value, list | tuple)
-        and len(value) <= _LISTED
-        and not any(isinstance(each, list | tuple | dict) for each in value)
-    ):
-        shown = f"[{', '.join(f'{each:.4g}' if isinstance(each, float) else str(each) for each in value)}]"
-    elif isinstance(value, list | tuple | dict):
-        shown = f"{len(value)} entries"
-    elif isinstance(value, float):
+    """Write an entry of a segment: short lists as they are, long ones and mappings by their length."""
+    nested = (list, tuple, dict)
+    if isinstance(value, float):
         shown = f"{value:.4g}"
-    else:
+    elif not isinstance(value, list | tuple | dict):
         shown = _file_name(str(value))
+    elif len(value) > _LISTED or any(isinstance(each, nested) for each in value):
+        shown = f"{len(value)} entries"
+    else:
+        numbers = [f"{x:.4g}" if isinstance(x, float) else str(x) for x in value]
+        shown = f"[{', '.join(numbers)}]"
     return f"{key.replace('_', ' ')} {shown}"
 
 
@@ -186,11 +182,11 @@ def _file_name(text: str) -> str:
 def what_limits(motion: ReportedMotion) -> str:
     """Name the limits that are active longest, in one sentence."""
     active = [entry for entry in motion.saturations if entry.active][:3]
-    if not active:
-        return "No limit is active."
-    shares = (
+    shares = [
         f"{entry.label} ({100.0 * entry.share:.0f} % of the time)" for entry in active
-    )
+    ]
+    if not shares:
+        return "No limit is active."
     return f"At its limits longest: {', '.join(shares)}."
 
 
@@ -202,38 +198,34 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     panels = panels_of(trajectory, motion.samples, *rows, degrees=motion.degrees)
     found = []
     for name in trajectory.joint_names:
-        parts = select_joint(panels, name)
-        q = parts[0].values[:, 0]
-        unit = parts[0].unit
+        own = curves_of(panels, name)
+        panel, position = own[0]
+        q = position.values
+        unit = panel.unit
         row = JointRow(
             name=name,
             redundant=name in trajectory.redundant_joints,
             start=f"{q[0]:.4f} {unit}",
             end=f"{q[-1]:.4f} {unit}",
             travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
-            peaks=tuple(_peak(part, tolerance) for part in parts),
+            peaks=tuple(_peak(*each, tolerance) for each in own),
         )
         found.append(row)
     return found
 
 
-def _peak(part: Panel, tolerance: float) -> Row:
-    """Find the value of a joint that is nearest to its limit.
-
-    Without a limit it is the largest one.
-    """
-    values = part.values[:, 0]
-    upper = part.upper[0, 0]
-    lower = part.lower[0, 0]
-    if not part.is_limited[0]:
+def _peak(panel: Panel, curve: Curve, tolerance: float) -> Row:
+    """Find the value of a joint that is nearest to its limit, or without a limit the largest one."""
+    values = curve.values
+    if not curve.is_limited:
         largest = values[np.argmax(np.abs(values))]
-        return Row(_write_value(largest, part.unit), "", "", "")
-    ratios = np.abs(part.ratios[:, 0])
-    limit = f"{_write_number(upper)} {part.unit}"
-    if upper != -lower:
-        limit = f"{_write_number(lower)} to {limit}"
+        return Row(_write_value(largest, panel.unit), "", "", "")
+    ratios = np.abs(curve.ratios)
+    limit = f"{_write_number(float(curve.upper))} {panel.unit}"
+    if curve.upper != -curve.lower:
+        limit = f"{_write_number(float(curve.lower))} to {limit}"
     return Row(
-        value=_write_value(values[np.argmax(ratios)], part.unit),
+        value=_write_value(values[np.argmax(ratios)], panel.unit),
         limit=limit,
         share=f"{100.0 * ratios.max():.1f} %",
         level=_level(float(ratios.max()), tolerance),
@@ -277,22 +269,15 @@ def check_rows(motion: ReportedMotion) -> list[CheckRow]:
 def _check_row(check: Check, *, degrees: bool) -> CheckRow:
     found, allowed, unit = check.figures(degrees=degrees)
     after = "" if unit == "-" else f" {unit}"
-    parts = [check.subject or "", "" if check.time is None else f"{check.time:.4f} s"]
+    time = "" if check.time is None else f"{check.time:.4f} s"
+    where = " at ".join(filter(None, (check.subject, time)))
     return CheckRow(
-        name=check.name,
-        found=found + after,
-        allowed=allowed + after,
-        where=" at ".join(part for part in parts if part),
-        passed=check.passed,
-        remark=check.remark,
+        check.name, found + after, allowed + after, where, check.passed, check.remark
     )
 
 
 def versions() -> dict[str, str]:
     """Name the versions of what made the report."""
-    found = {name: importlib.metadata.version(name) for name in _LIBRARIES}
-    return {
-        "brachis": brachis.__version__,
-        "Python": platform.python_version(),
-        **found,
-    }
+    own = {"brachis": brachis.__version__, "Python": platform.python_version()}
+    libraries = ("pin", "numpy", "scipy", "plotly")
+    return own | {name: importlib.metadata.version(name) for name in libraries}

@@ -109,7 +109,7 @@ def _check_size(path: Path, room: int) -> int:
     Raises
     ------
     InputError
-        It is packed, so that nobody knows its size, or larger than `room`, bytes.
+        It is packed, so that its size is not known, or larger than `room`, bytes.
     """
     if path.suffix in {".gz", ".bz2"}:
         raise InputError(
@@ -172,7 +172,7 @@ def _meshes(
 
 
 def _place(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
-    """Place a mesh, and see to its colour where it has no picture on it."""
+    """Place a mesh, and colour it unless it has a picture on it."""
     # A material, or colours of the faces.
     look = getattr(mesh.visual, "material", mesh.visual)
     pictures = [getattr(look, name, None) for name in ("baseColorTexture", "image")]
@@ -196,34 +196,21 @@ def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trime
     return mesh
 
 
-@dataclass(frozen=True, eq=False)
-class Placements:
-    """Frames of a robot in the world frame at K postures.
+def placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forward kinematics of postures `q`, (K, n).
 
-    Attributes
-    ----------
+    Returns
+    -------
     positions : (K, n + 2, 3) ndarray
-        Of the world, of what every joint moves, and of the tool, m.
+        Of the world, of what every joint moves, and of the tool, in the world frame, m.
     quaternions : (K, n + 2, 4) ndarray
         w, x, y, z.
     """
-
-    positions: np.ndarray
-    quaternions: np.ndarray
-
-    @property
-    def tool(self) -> np.ndarray:
-        """Positions of the tool, (K, 3), m."""
-        return np.asarray(self.positions[:, -1])
-
-
-def placements(robot: Robot, q: np.ndarray) -> Placements:
-    """Forward kinematics of postures `q`, (K, n)."""
     frames = np.empty((len(q), robot.n + 2, 7))
     for rows, data in zip(frames, robot.place_joints(q), strict=True):
         placed = (*data.oMi, data.oMf[robot.frame_id])
         rows[:] = [pin.SE3ToXYZQUAT(placement) for placement in placed]
-    return Placements(frames[..., :3], frames[..., [6, 3, 4, 5]])
+    return frames[..., :3], frames[..., [6, 3, 4, 5]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +220,7 @@ class Bodies:
     Attributes
     ----------
     links : dict of int to list of Trimesh
-        What the URDF says the links look like; joint 0 is the world.
+        Visual shapes of the URDF; joint 0 is the world.
     skeleton : dict of int to list of Trimesh
         Joints and the straight lines between them.
     unread : tuple of str
@@ -258,6 +245,9 @@ class Bodies:
 
 def bodies_of(trajectory: Trajectory) -> Bodies:
     """Read a robot's shapes, and draw its skeleton as large as the robot is."""
+    import trimesh
+    from scipy.spatial.transform import Rotation
+
     robot = trajectory.robot
     shapes, unread = link_shapes(robot.urdf, Path(robot.source).absolute().parent)
     links: dict[int, list[trimesh.Trimesh]] = {}
@@ -267,33 +257,21 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
             mesh.apply_transform(frame.placement.homogeneous)
         links.setdefault(int(frame.parentJoint), []).extend(meshes)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
-    found = placements(robot, q)
-    size = float(np.ptp(found.positions.reshape(-1, 3), axis=0).max())
+    positions, quaternions = placements(robot, q)
+    size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
     skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
-    drawn = links or skeleton
-    moving = {joint: meshes for joint, meshes in drawn.items() if joint}
-    return Bodies(
-        links, skeleton, tuple(unread), _box(drawn, found), _box(moving, found)
+    fixed = [positions[:, 1:].reshape(-1, 3)]
+    moving = fixed.copy()
+    for joint, meshes in (links or skeleton).items():
+        own = np.concatenate([trimesh.bounds.corners(mesh.bounds) for mesh in meshes])
+        turns = Rotation.from_quat(quaternions[:, joint], scalar_first=True).as_matrix()
+        corners = positions[:, joint, None] + own @ turns.transpose(0, 2, 1)
+        (moving if joint else fixed).append(corners.reshape(-1, 3))
+    box, moving_box = (
+        np.array([points.min(axis=0), points.max(axis=0)])
+        for points in map(np.concatenate, (fixed + moving, moving))
     )
-
-
-def _box(
-    bodies: Mapping[int, Sequence[trimesh.Trimesh]], found: Placements
-) -> np.ndarray:
-    """Corners, (2, 3), of a box around joints, tool and bodies in all postures."""
-    import trimesh
-    from scipy.spatial.transform import Rotation
-
-    points = [found.positions[:, 1:].reshape(-1, 3)]
-    for joint, meshes in bodies.items():
-        corners = np.concatenate(
-            [trimesh.bounds.corners(each.bounds) for each in meshes]
-        )
-        turns = Rotation.from_quat(found.quaternions[:, joint], scalar_first=True)
-        for turn, position in zip(turns, found.positions[:, joint], strict=True):
-            points.append(position + turn.apply(corners))
-    every = np.concatenate(points)
-    return np.array([every.min(axis=0), every.max(axis=0)])
+    return Bodies(links, skeleton, tuple(unread), box, moving_box)
 
 
 def _skeleton(
@@ -352,41 +330,13 @@ def _range(trajectory: Trajectory, joint: int) -> np.ndarray:
     return np.where(np.isfinite(ends), ends, [q.min(), q.max()])
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A trajectory at even times.
-
-    Attributes
-    ----------
-    trajectory : Trajectory
-    samples : Samples
-        At K times from start to end.
-    frames : Placements
-        At the same times.
-    path : (K, 3) ndarray
-        The prescribed path at the motion's own s, m; what it does not prescribe is the tool's.
-    ghosts : Placements
-        At a few even times from start to end.
-    """
-
-    trajectory: Trajectory
-    samples: Samples
-    frames: Placements
-    path: np.ndarray
-    ghosts: Placements
-
-    @classmethod
-    def of(cls, trajectory: Trajectory) -> Motion:
-        """Evaluate a trajectory."""
-        samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
-        frames = placements(trajectory.robot, samples.q)
-        times = np.linspace(0.0, trajectory.t_end, 6)
-        ghosts = placements(trajectory.robot, trajectory.position(times))
-        path = frames.tool.copy()
-        task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-        axes = list(task_map.axes)
-        if axes:
-            prescribed = path_of(task_map, trajectory.task)
-            target = prescribed.sample(np.clip(samples.s, 0.0, 1.0)).target
-            path[:, axes] = target[:, : len(axes)]
-        return cls(trajectory, samples, frames, path, ghosts)
+def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
+    """Return the path at the motion's own s, (K, 3), m; what it does not prescribe is the tool's."""
+    task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
+    axes = list(task_map.axes)
+    points = samples.tool_position.copy()
+    if axes:
+        path = path_of(task_map, trajectory.task)
+        target = path.sample(np.clip(samples.s, 0.0, 1.0)).target
+        points[:, axes] = target[:, : len(axes)]
+    return points

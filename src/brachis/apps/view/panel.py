@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.bottleneck.saturation import limit_ratios
+from brachis.apps.bottleneck.saturation import LimitRatios, limit_ratios
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import Panel, panels_of, ratio_panel, titles_of
 from brachis.apps.view import tables
-from brachis.apps.view.bodies import Motion
 from brachis.apps.view.scene import Scene, speed_colours
 from brachis.errors import BrachisError
 from brachis.trajectory import Samples, Trajectory
@@ -50,16 +49,14 @@ def shown_panels(
         Whether angles of joints without limits are in degrees.
     """
     ratios = limit_ratios(trajectory)
-    found = []
-    for title in titles_of(ratios):
-        panel = ratio_panel(trajectory, ratios, title)
-        is_last = np.append(np.diff(panel.t) > 0.0, True)  # times of jumps occur twice
-        found.append(replace(panel, t=panel.t[is_last], values=panel.values[is_last]))
+    is_last = np.append(np.diff(ratios.t) > 0.0, True)  # times of jumps occur twice
+    once = LimitRatios(ratios.t[is_last], ratios.labels, ratios.values[is_last])
+    found = [ratio_panel(trajectory, once, title) for title in titles_of(once)]
     rows = ("torque", "velocity", "position")
     for panel in panels_of(trajectory, samples, *rows, degrees=degrees):
-        if not panel.is_limited.all():
-            free = panel.select(~panel.is_limited)
-            found.append(replace(free, unit=f"{free.unit}, no limit"))
+        free = tuple(curve for curve in panel.curves if not curve.is_limited)
+        if free:
+            found.append(replace(panel, curves=free, unit=f"{panel.unit}, no limit"))
     return [*found, *panels_of(trajectory, samples, "tool speed")]
 
 
@@ -78,14 +75,11 @@ class Chart:
         data = [panel.t]
         series: list[uplot.Series] = [{"label": "time (s)"}]
         for limit, _ in panel.near_limits():
-            data.append(np.broadcast_to(limit, panel.t.shape))
-            series.append(_series("limit", style.GREY, 1.0, (5.0, 4.0)))
-        for name, number, values in zip(
-            panel.names, panel.styles.tolist(), panel.values.T, strict=True
-        ):
-            colour, dash = look(number)
-            data.append(values)
-            series.append(_series(name, colour, 1.6, dash))
+            data.append(limit)
+            series.append(_series("limit", style.GREY, (5.0, 4.0), 1.0))
+        for curve in panel.curves:
+            data.append(curve.values)
+            series.append(_series(curve.name, *look(curve.style)))
         gui.add_html(_heading(panel))
         gui.add_uplot(
             tuple(data),
@@ -114,7 +108,7 @@ class Chart:
 
 
 def _series(
-    label: str, colour: str, width: float, dash: tuple[float, ...]
+    label: str, colour: str, dash: tuple[float, ...], width: float = 1.6
 ) -> uplot.Series:
     """Describe a line without points."""
     return {
@@ -153,13 +147,13 @@ def look(number: int) -> tuple[str, tuple[float, ...]]:
 def _heading(panel: Panel) -> str:
     """Title of a plot, and the names in the colours of their curves, as HTML."""
     entries = []
-    for name, number in zip(panel.names, panel.styles.tolist(), strict=True):
-        colour, dashes = look(number)
+    for curve in panel.curves:
+        colour, dashes = look(curve.style)
         border = f"2.5px {'dashed' if dashes else 'solid'} {colour}"
         line = f"display:inline-block;width:1.2em;border-top:{border};vertical-align:middle;margin-right:0.3em"
         entries.append(
             f'<span style="white-space:nowrap;margin-right:0.8em"><span style="{line}"></span>'
-            f"{html.escape(name)}</span>"
+            f"{html.escape(curve.name)}</span>"
         )
     return (
         '<div style="margin:0.3em 0.8em 0 0.8em">'
@@ -234,12 +228,12 @@ class Playback:
 
 
 class Controls:
-    """What is beside the scene.
+    """Controls, tables and plots at the sides of the scene.
 
     Parameters
     ----------
     server : viser.ViserServer
-    motion : Motion
+    trajectory : Trajectory
     scene : Scene
     playback : Playback
         Which the controls set.
@@ -247,10 +241,8 @@ class Controls:
         Called when the user has chosen another instant.
     candidates : sequence of mapping
         What the search looked at, as `Candidate.to_dict` gives it.
-    notes : sequence of str
-        What else the user should know.
     verified : bool or None
-        None where it is not known.
+        None if it is not known.
     degrees : bool
         Whether angles are in degrees.
     """
@@ -258,33 +250,31 @@ class Controls:
     def __init__(
         self,
         server: viser.ViserServer,
-        motion: Motion,
+        trajectory: Trajectory,
         scene: Scene,
         playback: Playback,
         show: Callable[[], None],
         candidates: Sequence[Mapping[str, Any]],
-        notes: Sequence[str],
         *,
         verified: bool | None,
         degrees: bool,
     ) -> None:
         self._degrees = degrees
         self._gui = server.gui
-        self._motion = motion
+        self._trajectory = trajectory
+        self._scene = scene
         self._playback = playback
         self._show = show
         self._gui.configure_theme(show_logo=False, show_share_button=False)
-        self._gui.add_html(tables.summary(motion.trajectory, notes, verified=verified))
+        notes = [f"not shown: {reason}" for reason in scene.bodies.unread]
+        self._gui.add_html(tables.summary(trajectory, notes, verified=verified))
         self._add_controls()
-        stops = [
-            f"rgb({red},{green},{blue})"
-            for red, green, blue in speed_colours(np.linspace(0.0, 1.0, 9))
-        ]
-        self._gui.add_html(
-            tables.speed_legend(stops, float(motion.samples.tool_speed.max()))
-        )
+        colours = speed_colours(np.linspace(0.0, 1.0, 9)).tolist()
+        stops = [f"rgb{tuple(colour)}" for colour in colours]
+        fastest = float(scene.samples.tool_speed.max())
+        self._gui.add_html(tables.speed_legend(stops, fastest))
         self._state = self._gui.add_html("")
-        self._add_switches(scene)
+        self._add_switches()
         self._charts = self._add_plots(candidates)
         self.update()
 
@@ -292,10 +282,9 @@ class Controls:
         """Show the instant of the playback in the slider, the table and the plots."""
         t = self._playback.time
         self.follow()
-        now = self._motion.trajectory.at(np.array([t]))
-        self._state.content = tables.state_table(
-            self._motion.trajectory, now, degrees=self._degrees
-        )
+        now = self._trajectory.at(np.array([t]))
+        table = tables.state_table(self._trajectory, now, degrees=self._degrees)
+        self._state.content = table
         for chart in self._charts:
             chart.mark(t)
 
@@ -349,7 +338,7 @@ class Controls:
         if event.client is None:
             return
         try:
-            page = make_report(self._motion.trajectory, degrees=self._degrees)
+            page = make_report(self._trajectory, degrees=self._degrees)
         except BrachisError as error:
             event.client.add_notification("The report cannot be made", str(error))
             return
@@ -357,40 +346,33 @@ class Controls:
             "report.html", page.content, save_immediately=True
         )
 
-    def _add_switches(self, scene: Scene) -> None:
+    def _add_switches(self) -> None:
         """Add a box to tick for every layer of the scene."""
-        with self._gui.add_folder(
-            f"show (a cell of the grid is {scene.cell:g} m)", expand_by_default=False
-        ):
-            for name, handles in scene.layers.items():
+        title = f"show (a cell of the grid is {self._scene.cell:g} m)"
+        with self._gui.add_folder(title, expand_by_default=False):
+            for name, handles in self._scene.layers.items():
                 if handles:
                     box = self._gui.add_checkbox(name, handles[0].visible)
-                    box.on_update(partial(_switch, scene, name))
+                    box.on_update(partial(self._switch, name))
+
+    def _switch(
+        self, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]
+    ) -> None:
+        """Show or hide a layer of the scene."""
+        self._scene.set_visible(name, visible=event.target.value)
 
     def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> list[Chart]:
         """Add a panel with the plots and the list of candidates."""
-        motion = self._motion
         panel = self._gui.add_panel()
         with panel.add_tab("limits"):
-            charts = [
-                Chart(self._gui, each)
-                for each in shown_panels(
-                    motion.trajectory, motion.samples, degrees=self._degrees
-                )
-            ]
-        with panel.add_tab(
-            f"candidates ({len(candidates)})" if candidates else "candidates"
-        ):
+            samples = self._scene.samples
+            shown = shown_panels(self._trajectory, samples, degrees=self._degrees)
+            charts = [Chart(self._gui, each) for each in shown]
+        count = f" ({len(candidates)})" if candidates else ""
+        with panel.add_tab(f"candidates{count}"):
             self._gui.add_html(tables.candidates_table(candidates))
         panel.dock_left()
         panel.set_width(350)
         self._gui.main_panel.dock_right()
         self._gui.main_panel.set_width(400)
         return charts
-
-
-def _switch(
-    scene: Scene, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]
-) -> None:
-    """Show or hide a layer of the scene."""
-    scene.set_visible(name, visible=event.target.value)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.apps.plots.postures import plane_of
-from brachis.apps.view.bodies import Bodies, Motion, placements
+from brachis.apps.view.bodies import bodies_of, placements, prescribed_path
+from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import viser
@@ -33,16 +34,26 @@ class Scene:
     Parameters
     ----------
     server : viser.ViserServer
-    motion : Motion
+    trajectory : Trajectory
+
+    Attributes
+    ----------
+    samples : Samples
+        The motion at even times.
     bodies : Bodies
+    layers : dict of str to list of handles
+        What can be shown and hidden, by `LAYERS`.
+    cell : float
+        Size of the cells of the ground's grid, m.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, motion: Motion, bodies: Bodies
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, trajectory: Trajectory) -> None:
         self._api = server.scene
-        self._motion = motion
-        self._bodies = bodies
+        self._trajectory = trajectory
+        self._robot = trajectory.robot
+        self.samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
+        self.bodies = bodies_of(trajectory)
+        self._size = float(np.linalg.norm(np.ptp(self.bodies.moving_box, axis=0)))
         # A plain light shows pale robots on the white page better.
         self._api.configure_environment_map(None)
         self._api.add_light_hemisphere(
@@ -51,8 +62,6 @@ class Scene:
             ground_color=(120, 120, 130),
             intensity=2.0,
         )
-        self._robot = motion.trajectory.robot
-        self._size = float(np.linalg.norm(np.ptp(bodies.moving_box, axis=0)))
         self.layers: dict[str, Layer] = {name: [] for name in LAYERS}
         self._frames = [
             self._api.add_frame(f"/joint {k}", show_axes=False)
@@ -66,7 +75,8 @@ class Scene:
         self._draw_path()
         self._draw_trace()
         self.cell = self._draw_ground()
-        for name in ("world frame", "skeleton" if bodies.shows_links else "robot"):
+        hidden = "skeleton" if self.bodies.shows_links else "robot"
+        for name in ("world frame", hidden):
             self.set_visible(name, visible=False)
         self._aim(server)
 
@@ -77,15 +87,10 @@ class Scene:
 
     def show(self, q: np.ndarray) -> None:
         """Move the robot into the posture `q`, (n,)."""
-        found = placements(self._robot, q[None])
-        for handle, position, quaternion in zip(
-            (*self._frames, self._tool),
-            found.positions[0],
-            found.quaternions[0],
-            strict=True,
-        ):
-            handle.position = position
-            handle.wxyz = quaternion
+        positions, quaternions = placements(self._robot, q[None])
+        for k, handle in enumerate((*self._frames, self._tool)):
+            handle.position = positions[0, k]
+            handle.wxyz = quaternions[0, k]
 
     def _frame(self, name: str, part: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""
@@ -101,7 +106,7 @@ class Scene:
         """Hang links and skeleton on the joints' frames, one asset for each."""
         import trimesh
 
-        layers = {"robot": self._bodies.links, "skeleton": self._bodies.skeleton}
+        layers = {"robot": self.bodies.links, "skeleton": self.bodies.skeleton}
         for layer, bodies in layers.items():
             for joint, meshes in bodies.items():
                 asset = trimesh.Scene(list(meshes)).export(file_type="glb")
@@ -112,15 +117,15 @@ class Scene:
         """Draw what moves a few times, fainter, the later the darker; meshes of many faces as their convex hulls."""
         import trimesh
 
-        links = self._bodies.links
-        bodies = links if self._bodies.shows_links else self._bodies.skeleton
-        ghosts = self._motion.ghosts
-        first = (190.0, 214.0, 235.0)
-        last = (25.0, 75.0, 125.0)
-        shades = np.linspace(first, last, len(ghosts.positions)).astype(np.uint8)
+        links = self.bodies.links
+        bodies = links if self.bodies.shows_links else self.bodies.skeleton
+        times = np.linspace(0.0, self._trajectory.t_end, 6)
+        frames = placements(self._robot, self._trajectory.position(times))
+        shades = np.linspace([190, 214, 235], [25, 75, 125], 6).astype(np.uint8)
         for joint, meshes in bodies.items():
-            frames = (ghosts.positions[:, joint], ghosts.quaternions[:, joint])
-            if np.ptp(np.hstack(frames), axis=0).max() < 1e-9:  # it stands still
+            positions, quaternions = (each[:, joint] for each in frames)
+            turned = np.ptp(quaternions, axis=0).max()
+            if max(turned, np.ptp(positions, axis=0).max()) < 1e-9:  # it stands still
                 continue
             coarse = [
                 mesh.convex_hull if len(mesh.faces) > 2000 else mesh for mesh in meshes
@@ -132,8 +137,8 @@ class Scene:
                 f"/ghosts/{joint}",
                 whole.vertices,
                 whole.faces,
-                batched_positions=frames[0],
-                batched_wxyzs=frames[1],
+                batched_positions=positions,
+                batched_wxyzs=quaternions,
                 batched_colors=shades,
                 opacity=0.13,
                 cast_shadow=False,
@@ -143,38 +148,45 @@ class Scene:
 
     def _draw_path(self) -> None:
         """Draw the prescribed path with its ends."""
-        points = self._motion.path
-        self._draw_line("path", "/path", _segments(points), (30, 30, 30), 2.5)
-        ends = {"start": (points[0], (0, 158, 115)), "end": (points[-1], (213, 94, 0))}
-        for name, (point, colour) in ends.items():
+        points = prescribed_path(self._trajectory, self.samples)
+        self._draw_line("path", "/path", points, (30, 30, 30), 2.5)
+        for name, k, colour in (("start", 0, (0, 158, 115)), ("end", -1, (213, 94, 0))):
             ball = self._api.add_icosphere(
-                f"/path/{name}", 0.009 * self._size, color=colour, position=point
+                f"/path/{name}", 0.009 * self._size, color=colour, position=points[k]
             )
             self.layers["path"].append(ball)
 
     def _draw_trace(self) -> None:
         """Draw the way of the tool in 32 colours of its speed; viser shows colours of single points too light."""
-        speed = self._motion.samples.tool_speed
-        segments = _segments(self._motion.frames.tool)
+        speed = self.samples.tool_speed
         parts = 0.5 * (speed[:-1] + speed[1:]) / max(float(speed.max()), 1e-9)
         shades = np.round(31.0 * parts).astype(int)
         colours = speed_colours(np.linspace(0.0, 1.0, 32))
+        points = self.samples.tool_position
         for shade in np.unique(shades).tolist():
-            pieces = segments[shades == shade]
-            self._draw_line("tool trace", f"/trace/{shade}", pieces, colours[shade], 7)
+            name = f"/trace/{shade}"
+            drawn = shades == shade
+            self._draw_line("tool trace", name, points, colours[shade], 7.0, drawn)
 
     def _draw_line(
-        self, layer: str, name: str, segments: np.ndarray, colour: Any, thickness: float
+        self,
+        layer: str,
+        name: str,
+        points: np.ndarray,
+        colour: Any,
+        thickness: float,
+        drawn: np.ndarray | slice = slice(None),
     ) -> None:
-        """Draw straight pieces (K, 2, 3), so many pixels thick."""
+        """Draw some of the straight pieces between points, (K, 3), so many pixels thick."""
+        pieces = np.stack([points[:-1], points[1:]], axis=1)[drawn]
         line = self._api.add_line_segments(
-            name, segments, colour, thickness=thickness, thickness_units="screen"
+            name, pieces, colour, thickness=thickness, thickness_units="screen"
         )
         self.layers[layer].append(line)
 
     def _draw_ground(self) -> float:
         """Draw a grid below everything; returns the size of its cells, m."""
-        low, high = self._bodies.box
+        low, high = self.bodies.box
         cell = float(10.0 ** np.round(np.log10(0.06 * self._size)))
         section = 10.0 * cell
         width, height = section * np.ceil((high - low)[:2] / section + 1.0)
@@ -201,13 +213,13 @@ class Scene:
         distance = 1.35 * 0.5 * self._size / np.sin(0.5 * camera.fov)
         camera.near = 0.005 * distance
         camera.far = 100.0 * distance
-        camera.look_at = self._bodies.moving_box.mean(axis=0)
+        camera.look_at = self.bodies.moving_box.mean(axis=0)
         camera.position = camera.look_at + distance * self._direction()
 
     def _direction(self) -> np.ndarray:
         """Return the unit vector from the scene to the camera, (3,)."""
-        frames = self._motion.frames
-        reach = frames.tool.mean(axis=0) - frames.positions[:, 1].mean(axis=0)
+        positions, _ = placements(self._robot, self.samples.q)
+        reach = (self.samples.tool_position - positions[:, 1]).mean(axis=0)
         azimuth = np.arctan2(reach[1], reach[0]) - np.radians(50.0)
         directions = {
             None: (np.cos(azimuth), np.sin(azimuth), 0.55),
@@ -215,13 +227,8 @@ class Scene:
             (0, 2): (0.0, -1.0, 0.3),
             (1, 2): (1.0, 0.0, 0.3),
         }
-        direction = np.array(directions[plane_of(self._motion.trajectory)])
+        direction = np.array(directions[plane_of(self._trajectory)])
         return np.asarray(direction / np.linalg.norm(direction))
-
-
-def _segments(points: np.ndarray) -> np.ndarray:
-    """Straight pieces (K - 1, 2, 3) between points (K, 3)."""
-    return np.stack([points[:-1], points[1:]], axis=1)
 
 
 def speed_colours(parts: np.ndarray) -> np.ndarray:

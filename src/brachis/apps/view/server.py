@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 8080
-"""The port that is tried first if none is asked for."""
+"""The port that is tried first if the user gives none."""
 
 
 def start_server(host: str, port: int | None) -> viser.ViserServer:
@@ -42,7 +42,7 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
     import viser
 
     class Server(viser.ViserServer):  # type: ignore[misc]  # not read by mypy
-        """A server that is silent, and whose scene stays here: viser's own can be told by a page to publish it."""
+        """A silent server whose scene stays on this machine: with viser's own, a page can have it published."""
 
         def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT002  (viser's signature)
             """Refuse to give the scene a public address."""
@@ -57,7 +57,7 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
     first = FIRST_PORT if port is None else port  # viser takes the next free one
     with _quiet():
         server = Server(host=host, port=first, label="brachis", verbose=False)
-    if port and port != server.get_port():  # somebody took it in between
+    if port and port != server.get_port():  # another process took it in between
         server.stop()
         raise _in_use(host, port)
     return server

@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from brachis.apps.plots.panels import panels_of, select_joint
+from brachis.apps.plots.panels import curves_of, panels_of
 from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import Samples, Trajectory
 
@@ -37,10 +37,10 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
     rows = []
     for name in trajectory.joint_names:
-        parts = zip(select_joint(panels, name), _STATE.values(), strict=True)
+        own = zip(curves_of(panels, name), _STATE.values(), strict=True)
         cells = [
-            f"{_write_number(part.values[0, 0], digits)} {part.unit}"
-            for part, digits in parts
+            f"{_write_number(curve.values[0], digits)} {panel.unit}"
+            for (panel, curve), digits in own
         ]
         rows.append([name, *cells])
     return head + _table(("joint", "position", "velocity", "torque, force"), rows)
@@ -53,7 +53,7 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
     """
     if not candidates:
         return _paragraph(
-            "The candidates of the search are not known: they are in result.json beside result.npz."
+            "The candidates of the search are not known: they are in result.json, in the folder of result.npz."
         )
     rows = candidate_rows(candidates)
     left = len(candidates) - len(rows[:_MANY])
@@ -77,12 +77,12 @@ def summary(
     trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None
 ) -> str:
     """End time, what is known of the verification, and what else the user should know."""
-    told = {
+    verdict = {
         None: "",
         True: ", verified",
         False: ', <b style="color:#D00000">NOT verified</b>',
     }[verified]
-    text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{told}</div>'
+    text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{verdict}</div>'
     return text + (_paragraph(*notes) if notes else "")
 
 

@@ -10,7 +10,6 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
-from brachis.apps.view.bodies import Motion, bodies_of
 from brachis.apps.view.panel import Controls, Playback, first_rate
 from brachis.apps.view.scene import Scene
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
@@ -27,11 +26,11 @@ class Viewer:
     candidates : sequence of mapping, optional
         What the search looked at, as `Candidate.to_dict` gives it.
     verified : bool, optional
-        Whether the motion passed the verification, where that is known.
+        Whether the motion passed the verification, if that is known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address that the server listens on; by default nobody but this machine reaches it.
+        Address that the server listens on; by default only this machine reaches it.
     port : int, optional
         0 takes any free port; the first free one from 8080 on if left out.
 
@@ -40,7 +39,7 @@ class Viewer:
     url : str
         Where to look at it.
     local : bool
-        Whether nobody but this machine reaches it.
+        Whether only this machine reaches it.
     playback : Playback
         Which instant is shown.
 
@@ -69,19 +68,16 @@ class Viewer:
         )
         self._trajectory = trajectory
         self._lock = threading.RLock()
-        motion = Motion.of(trajectory)
-        bodies = bodies_of(trajectory)
         self._server = start_server(host, port)
         try:
-            self._scene = Scene(self._server, motion, bodies)
+            self._scene = Scene(self._server, trajectory)
             self._panel = Controls(
                 self._server,
-                motion,
+                trajectory,
                 self._scene,
                 self.playback,
                 self.show,
                 candidates,
-                [f"not shown: {reason}" for reason in bodies.unread],
                 verified=verified,
                 degrees=degrees,
             )
@@ -136,7 +132,7 @@ class Viewer:
         return f'<iframe src="{url}" width="100%" height="640" style="border:0"></iframe><a href="{url}">{url}</a>'
 
     def _run(self) -> None:
-        """Play the motion as long as somebody looks: 30 pictures/s of the robot, 10 of the plots and the table."""
+        """Play the motion while a page is open: 30 pictures/s of the robot, 10 of the plots and the table."""
         before = time.monotonic()
         picture = 0
         while not self._stopped.wait(1.0 / 30.0):
@@ -176,11 +172,11 @@ def view(
     candidates : sequence of mapping, optional
         What the search looked at, as `Result.to_dict` lists it.
     verified : bool, optional
-        Whether the motion passed the verification, where that is known.
+        Whether the motion passed the verification, if that is known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address that the viewer listens on; by default nobody but this machine reaches it.
+        Address that the viewer listens on; by default only this machine reaches it.
     port : int, optional
         0 takes any free port; the first free one from 8080 on if left out.
     block : bool, optional
