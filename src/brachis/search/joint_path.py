@@ -79,7 +79,7 @@ class DeadEnd:
         return f"{place} {next(iter(self.causes))}"
 
 
-def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
+def distinct(joint_paths: Sequence[JointPath], most: int) -> list[int]:
     """Choose up to `most` joint paths: the shortest one, and others far from those chosen.
 
     The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
@@ -93,7 +93,8 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
 
     Returns
     -------
-    list of JointPath
+    list of int
+        Their indices.
     """
     branches = np.array([joint_path.branch for joint_path in joint_paths])
     q = np.array([joint_path.q for joint_path in joint_paths])
@@ -113,7 +114,7 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
         largest = distance[np.isfinite(distance)].max(initial=0.0)
         if distance[best] <= 0.02 * largest:
             break
-    return [joint_paths[one] for one in chosen]
+    return chosen
 
 
 def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.ndarray:
