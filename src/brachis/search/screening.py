@@ -21,9 +21,9 @@ from brachis.optimise.backends import SolverOptions, solver_named
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
+from brachis.search.candidates import solve_in_chart
 from brachis.search.phase_plane import initial_guess
 from brachis.search.processes import each, processes
-from brachis.search.solving import solve_in_chart
 
 _DEGREE = 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few intervals say most."""
