@@ -18,8 +18,7 @@ from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_no_motion
 from brachis.search.joint_path import DeadEnd
-from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import lattice_starts
+from brachis.search.starts import SEARCH_LEVELS, lattice_starts
 from support.pose_arms import panda
 
 ROOT = Path(__file__).parents[2]

@@ -12,8 +12,7 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import screening
-from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import chart_starts
+from brachis.search.starts import SEARCH_LEVELS, chart_starts
 from brachis.task import load_task
 
 MOST = 2

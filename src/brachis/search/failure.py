@@ -7,7 +7,7 @@ beyond the joint ranges, on another branch, or too heavy to hold?
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,6 @@ from brachis.robot.joints import in_turn_of
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd, sampling_box
 from brachis.task import SolverSettings, Task
 
-_STATIONS = 101
 _NO_TIME = "There was no time to find out why: raise search.time_limit"
 
 
@@ -100,7 +99,7 @@ def explain_reach(
         np.zeros(problem.robot.n) if posture is None else posture,
         decomposition.branches[0],
     )
-    s = np.linspace(0.0, 1.0, _STATIONS)
+    s = np.linspace(0.0, 1.0, 101)
     found = _sample_postures(joint_map, s, deadline)
     if found is None:
         return _NO_TIME
@@ -113,45 +112,47 @@ def explain_reach(
         anywhere = np.concatenate([found, wider], axis=1)
     own = found if posture is None else found[:, :, joint_map.branch][:, :, None]
 
-    def list_reasons() -> Iterator[tuple[np.ndarray, str, str, list[Remedy]]]:
-        yield (
+    def fail(
+        possible: np.ndarray, cause: str, hint: str, remedies: Sequence[Remedy] = ()
+    ) -> Failure | None:
+        if possible.all():
+            return None
+        first, last = (float(end) for end in s[np.flatnonzero(~possible)[[0, -1]]])
+        return Failure(
+            cause.format(first=first),
+            phase="path",
+            s_interval=(first, last),
+            hint=hint,
+            remedies=tuple(remedies),
+        )
+
+    robot = problem.robot
+    within = _has_any(_are_within(robot, found))
+    failure = (
+        fail(
             _has_any(_exist(anywhere)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
             "Shorten or move the path, or choose another start posture",
-            [],
         )
-        within = _has_any(_are_within(problem.robot, found))
-        yield (
+        or fail(
             within,
             "no posture within the joint ranges was found from s = {first:.3g} on"
-            + _describe_nearest(problem.robot, anywhere[np.argmin(within)]),
+            + _describe_nearest(robot, anywhere[np.argmin(within)]),
             "Shorten or move the path, or widen the joint ranges",
-            [],
         )
-        yield (
-            _has_any(_are_within(problem.robot, own)),
+        or fail(
+            _has_any(_are_within(robot, own)),
             f"the branch {joint_map.branch_label!r} of the {given} posture does not reach s = {{first:.3g}}",
             f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
-            [],
         )
-        for limit in problem.limits:
-            if limit.at_rest == "posture":
-                allowed, nearest, remedies = _check_at_rest(problem.robot, limit, own)
-                cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
-                yield allowed, cause, "Lead the path elsewhere", remedies
-
-    for possible, cause, hint, remedies in list_reasons():
-        if not possible.all():
-            first, last = s[np.flatnonzero(~possible)[[0, -1]]]
-            return Failure(
-                cause.format(first=first),
-                phase="path",
-                s_interval=(float(first), float(last)),
-                hint=hint,
-                remedies=tuple(remedies),
-            )
+    )
+    for limit in problem.limits:
+        if failure is None and limit.at_rest == "posture":
+            allowed, nearest, remedies = _check_at_rest(robot, limit, own)
+            cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
+            failure = fail(allowed, cause, "Lead the path elsewhere", remedies)
     others = "other redundant joints, " if joint_map.r else ""
-    return (
+    return failure or (
         "Every point of the path is within reach of this branch, but no joint path through them was found; "
         f"try {others}another {given} posture"
     )

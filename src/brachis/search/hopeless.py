@@ -28,7 +28,12 @@ from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.feasibility import in_figures, load_remedies
 from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
-from brachis.search.phase_plane import fastest, postures_along, spread_stations
+from brachis.search.phase_plane import (
+    fastest,
+    interpolate,
+    postures_along,
+    spread_stations,
+)
 
 UNLIKELY = 0.8
 """Share of a speed below which no other joint path, and no more knots, make up for what a plan falls short by."""
@@ -188,7 +193,7 @@ def explain_speed(
         moments = phase.joint_map.state(*motion.at(t), t=t)
     except UnreachableError:
         return None
-    q = np.column_stack([np.interp(_S, moments.s, joint) for joint in moments.q.T])
+    q = interpolate(_S, moments.s, moments.q)
     return _explain_shortfall(start, moments, "in the fastest motion without it", q)
 
 
@@ -217,12 +222,10 @@ def _explain_in_phase_plane(start: InitialGuess) -> Failure | None:
     if rate is None:
         return _explain_end_speed(problem, q, stations)
     q_ds = np.gradient(q, _S, axis=0, edge_order=2)
-    places, slopes = (
-        np.column_stack([np.interp(stations, _S, joint) for joint in part.T])
-        for part in (q, q_ds)
-    )
+    places = interpolate(stations, _S, q)
+    qdot = interpolate(stations, _S, q_ds) * rate[:, None]
     still = np.zeros_like(places)
-    moments = Moments(places, slopes * rate[:, None], still, still, stations)
+    moments = Moments(places, qdot, still, still, stations)
     best = "along the best joint path that was found"
     return _explain_shortfall(
         start, moments, best if start.joint_map.r else "in the fastest motion", q

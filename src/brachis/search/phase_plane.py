@@ -148,7 +148,7 @@ def _collect_lines(
     """Collect the lines of all limits at stations of a joint path."""
     q_ds = np.gradient(q, s, axis=0, edge_order=2)
     q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
-    joints = [_interpolate(stations, s, part) for part in (q, q_ds, q_dds)]
+    joints = [interpolate(stations, s, part) for part in (q, q_ds, q_dds)]
     floor = np.zeros(len(stations))
     ceiling = np.full(len(stations), np.inf)
     sloped = []
@@ -171,7 +171,7 @@ def _collect_lines(
     return _Lines(-b / a, np.minimum(*ends), np.maximum(*ends), floor, ceiling)
 
 
-def _interpolate(places: np.ndarray, s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def interpolate(places: np.ndarray, s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Interpolate values (S, c) at s, (S,), linearly at places, (P,)."""
     return np.column_stack([np.interp(places, s, column) for column in values.T])
 
@@ -272,7 +272,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
         curves, times = guess
         # Even times: the run-up to a speed is passed in milliseconds.
         even = np.linspace(0.0, times[-1], 64 * _STATIONS)
-        motion = _interpolate(even, times, curves)
+        motion = interpolate(even, times, curves)
         x = starting_point(program, [motion], times[-1], keep=keep)
         if x is not None:
             return x
@@ -321,7 +321,7 @@ def _phase_plane_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | N
 def _curves_along(start: InitialGuess, s: np.ndarray) -> np.ndarray:
     """Curves, (S, c), of a guess at path coordinates, (S,)."""
     path = start.joint_path
-    return np.column_stack([s, _interpolate(s, path[:, 0], path)[:, 1:]])
+    return np.column_stack([s, interpolate(s, path[:, 0], path)[:, 1:]])
 
 
 def postures_along(start: InitialGuess, s: np.ndarray) -> np.ndarray | None:

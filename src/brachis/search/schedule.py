@@ -21,9 +21,10 @@ from brachis.robot.task_map import JointSpace
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import DeadEnd
-from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.processes import each, processes
 from brachis.search.starts import (
+    SEARCH_LEVELS,
+    SearchLevel,
     chart_starts,
     joint_space_start,
     lattice_starts,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,8 +29,7 @@ from brachis.search.failure import Failure
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.levels import SEARCH_LEVELS, SearchLevel
-from brachis.search.phase_plane import least_time, least_times
+from brachis.search.phase_plane import interpolate, least_time, least_times
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.processes import ignore
 from brachis.search.screening import screen
@@ -38,6 +38,62 @@ SCREENED = 4
 """So many times the joint paths that a level plans are looked at."""
 FAMILY = "path of joints"
 """Family, and origin, of the guess for a path of joints."""
+
+
+@dataclass(frozen=True)
+class SearchLevel:
+    """One level of the search.
+
+    Attributes
+    ----------
+    decompositions : int
+        Decompositions that are looked at; those farthest from singularity at the start come first.
+    joint_paths : int
+        Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
+    numeric : int
+        Joint paths by numeric inverse kinematics as well, if the start posture is given.
+    in_charts : int
+        Plans in charts; four times as many joint paths are looked at.
+    in_closed_forms : int
+        Coarse plans in closed forms; those with the least estimated time come first.
+    refined : int
+        Plans that are refined and verified at most, as long as they may beat the best one.
+    cells_per_turn, nodes : int
+        Of the lattice.
+    only_minima : bool
+        Whether of the lattice of all postures only joint paths of locally least length are taken.
+    fallback : bool
+        Whether it is gone through only while no motion is verified.
+    """
+
+    decompositions: int
+    joint_paths: int
+    numeric: int
+    in_charts: int
+    in_closed_forms: int
+    refined: int
+    cells_per_turn: int = 72
+    nodes: int = 120
+    only_minima: bool = True
+    fallback: bool = False
+
+
+_SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
+_FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
+_THOROUGH = SearchLevel(
+    20, 8, 8, 8, 100, 12, cells_per_turn=96, nodes=300, only_minima=False
+)
+_EXHAUSTIVE = SearchLevel(
+    10_000, 30, 8, 12, 10_000, 40, cells_per_turn=144, nodes=600, only_minima=False
+)
+
+SEARCH_LEVELS = {
+    "single": (_SINGLE, dataclasses.replace(_FAST, fallback=True)),
+    "fast": (_FAST,),
+    "thorough": (_FAST, _THOROUGH),
+    "exhaustive": (_FAST, _THOROUGH, _EXHAUSTIVE),
+}
+"""Levels that are gone through one after the other, by the task's ``search.effort``; so a good motion is known soon."""
 
 
 def lattice_starts(
@@ -94,8 +150,7 @@ def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, pieces + 1), np.ones(3)]
         spline = make_lsq_spline(s, joint_path.q, knots, k=3, w=weights)
         yield fine, np.asarray(spline(fine))
-    columns = [np.interp(fine, s, column) for column in joint_path.q.T]
-    yield fine, np.column_stack(columns)
+    yield fine, interpolate(fine, s, joint_path.q)
 
 
 def _guess_on_branch(
