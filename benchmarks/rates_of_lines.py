@@ -37,7 +37,7 @@ def understated(result: brachis.Result) -> np.ndarray:
     assert refined is not None
     (phase,) = refined.program.phases
     t_norm = np.linspace(0.0, 1.0, 3 * phase.intervals + 1)
-    state = phase.with_grid(t_norm).state(refined.x)
+    state = phase.with_points(t_norm).state(refined.x)
     differences = np.abs(np.diff(state.qddot, axis=0)).max(axis=1) / (
         np.diff(t_norm) * refined.t_end
     )

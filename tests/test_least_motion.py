@@ -186,5 +186,5 @@ def test_joints_count_in_proportion_to_their_velocity_limits():
         objective.weights[:-1] * limits[:-1], objective.weights[0] * limits[0]
     )
     assert objective.weights[-1] == 0.0, "the virtual roll is no joint"
-    assert program.minimising(objective).objective(x) == pytest.approx(1.0)
+    assert program.with_objective(objective).objective(x) == pytest.approx(1.0)
     np.testing.assert_allclose(objective.longest, 1.01 * x[0])

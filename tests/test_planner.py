@@ -69,7 +69,7 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
     )
     first = solve_with_uno(program, next(starting_points(program)))
     (phase,) = program.phases
-    dense = phase.with_grid(np.linspace(0.0, 1.0, 2001))
+    dense = phase.with_points(np.linspace(0.0, 1.0, 2001))
     assert phase.violation(first.x).max() < 1e-6
     assert dense.violation(first.x).max() > 0.01
     refined = refine(program, first, solve_with_uno, RefinementOptions())

@@ -21,7 +21,7 @@ from brachis import __version__, planner
 from brachis.apps import plots
 from brachis.apps.cli import planning
 from brachis.errors import InputError
-from brachis.optimise import completion
+from brachis.optimise import candidate
 from brachis.search import candidates
 from brachis.trajectory import Trajectory
 
@@ -180,14 +180,14 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
 
 
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
-    honest = completion.verify_trajectory
+    honest = candidate.verify_trajectory
 
     def endless(trajectory, **more):
         return replace(
             honest(trajectory, **more), worst_ratio=math.inf, path_error=math.nan
         )
 
-    monkeypatch.setattr(completion, "verify_trajectory", endless)
+    monkeypatch.setattr(candidate, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     for text in (outcome.out, (tmp_path / "out/result.json").read_text()):
         data = json.loads(text, parse_constant=pytest.fail)

@@ -14,7 +14,6 @@ from brachis.optimise import mesh
 from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
-    MeshOptions,
     adapt_mesh,
     coarsest,
     optimise_knots,
@@ -104,7 +103,9 @@ def test_a_motion_along_a_branch_boundary_is_verified_too():
 
 def test_intervals_are_refined_where_the_motion_switches(solved):
     program = solved.program
-    finer = refine_mesh(solved, solve, MeshOptions(tolerance=0.02), NEVER).program
+    finer = refine_mesh(
+        solved, solve, SplineSettings(intervals="auto", tolerance=0.02), NEVER
+    ).program
     lengths = np.diff(finer.phases[0].breaks)
     assert len(lengths) < 60
     assert lengths.max() >= 4.0 * lengths.min()
@@ -117,8 +118,12 @@ def test_intervals_are_refined_where_the_motion_switches(solved):
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     program = solved.program
     report = solved.report
-    rough = refine_mesh(solved, solve, MeshOptions(tolerance=0.1), NEVER)
-    fine = refine_mesh(solved, solve, MeshOptions(tolerance=0.01), NEVER)
+    rough = refine_mesh(
+        solved, solve, SplineSettings(intervals="auto", tolerance=0.1), NEVER
+    )
+    fine = refine_mesh(
+        solved, solve, SplineSettings(intervals="auto", tolerance=0.01), NEVER
+    )
     assert program.intervals < rough.program.intervals < fine.program.intervals
     assert fine.report.objective < rough.report.objective < report.objective
     assert rough.reports[0] is report
@@ -128,9 +133,13 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
 
 def test_a_round_beyond_its_end_gains_little(solved):
     tolerance = 0.02
-    fine = refine_mesh(solved, solve, MeshOptions(tolerance), NEVER)
+    fine = refine_mesh(
+        solved, solve, SplineSettings(intervals="auto", tolerance=tolerance), NEVER
+    )
     first = SolvedProgram(fine.program, (fine.report,))
-    again = refine_mesh(first, solve, MeshOptions(tolerance), NEVER)
+    again = refine_mesh(
+        first, solve, SplineSettings(intervals="auto", tolerance=tolerance), NEVER
+    )
     assert again.program.intervals > fine.program.intervals
     assert again.t_end > (1.0 - tolerance) * fine.t_end
 
@@ -138,7 +147,9 @@ def test_a_round_beyond_its_end_gains_little(solved):
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
     program = solved.program
     report = solved.report
-    same = refine_mesh(solved, failing, MeshOptions(), NEVER)
+    same = refine_mesh(
+        solved, failing, SplineSettings(intervals="auto", tolerance=1e-3), NEVER
+    )
     assert same.program is program
     assert same.report is report
     assert len(same.reports) == 2

@@ -96,7 +96,7 @@ def test_states_are_those_of_the_curves(case):
 def test_resampled_keeps_the_meaning_of_x():
     phase = phase_of("r2")
     t_norm = np.linspace(0.0, 1.0, 37)
-    other = phase.with_grid(t_norm)
+    other = phase.with_points(t_norm)
     (x,) = reachable_points(phase, 1)
     np.testing.assert_allclose(
         other.motion(x).control_points, phase.motion(x).control_points, atol=1e-12

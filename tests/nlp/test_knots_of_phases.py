@@ -46,7 +46,7 @@ def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
     fine = finer(phase)
     assert fine.variables == phase.variables + 3 * (1 + phase.joint_map.r)
     for x in reachable_points(phase, 3):
-        inserted = phase.motion(x).over(fine.knots)
+        inserted = phase.motion(x).with_knots(fine.knots)
         there = fine.variables_from(inserted)
         assert_same_motion(fine.motion(there), phase.motion(x))
         # Ties and fixed control points of the finer phase hold exactly: nothing was averaged away.
@@ -65,8 +65,8 @@ def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
 def test_a_feasible_motion_stays_feasible_at_old_points():
     phase = phase_of("r1", intervals=6)
     x = reachable_points(phase, 1, spread=0.0)[0]
-    fine = finer(phase).with_grid(phase.t_norm)
-    there = fine.variables_from(phase.motion(x).over(fine.knots))
+    fine = finer(phase).with_points(phase.t_norm)
+    there = fine.variables_from(phase.motion(x).with_knots(fine.knots))
     # A mean over time is one of the values at the points, weighted by the intervals that they are in.
     rows = np.concatenate(
         [
@@ -121,13 +121,13 @@ def test_frozen():
     phase = phase_of("r2")
     (x,) = reachable_points(phase, 1)
     free, there = moved(phase, x)
-    fixed = free.frozen(there)
+    fixed = free.fix_knots(there)
     same = fixed.variables_from(free.motion(there))
     assert fixed.variables == phase.variables
     assert_same_motion(fixed.motion(same), free.motion(there))
     np.testing.assert_allclose(fixed.violation(same), free.violation(there), atol=1e-9)
-    assert phase.frozen(x).grid is phase.grid
-    assert phase.frozen(x).variables == phase.variables
+    assert phase.fix_knots(x).grid is phase.grid
+    assert phase.fix_knots(x).variables == phase.variables
 
 
 def test_lengths_that_do_not_add_up_make_a_longer_motion():

@@ -27,7 +27,7 @@ def with_boundary(case, degree, **conditions):
         "derivatives": own.derivatives,
         **conditions,
     }
-    return phase.over(phase.grid, Boundary(**values))
+    return phase.with_grid(phase.grid, Boundary(**values))
 
 
 def moving(case, degree, derivatives):
@@ -66,7 +66,7 @@ def test_jacobian_equals_differences(phase):
     for x in reachable_points(phase, 2):
         # Process speeds set in, and curves of torque over speed bend, within 1e-3.
         exact, expected = dense(phase, x), differences(phase, x, 2e-6)
-        count = len(phase._progress.offset)
+        count = len(phase._layout.progress.offset)
         kinds = {
             limit.kind: phase.rows_of(limit).ravel()[told(phase, limit, x)]
             for limit in phase.limits
@@ -135,7 +135,7 @@ def test_monotone_rows_say_whether_progress_is_monotone(phase):
             phase.boundary.periodic and x[own].min() < 0.0
         ):  # which bounds on x take care of
             continue
-        monotone.append(phase._progress.values(x).min() >= 0.0)
+        monotone.append(phase._layout.progress.values(x).min() >= 0.0)
         assert monotone[-1] == (
             np.diff(phase.motion(x).control_points[0]).min() >= -1e-15
         )

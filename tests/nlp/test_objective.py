@@ -31,7 +31,7 @@ def test_gradient_of_least_acceleration_equals_differences(case, knots):
     phase = phase_of(case)
     if knots == "free":
         phase = phase.with_free_knots(0.1)
-    program = Program([phase]).minimising(
+    program = Program([phase]).with_objective(
         LeastAcceleration(weights_of(case), np.array([5.0]))
     )
     for x in reachable_points(phase, 2):
@@ -54,19 +54,19 @@ def test_phases_add_up():
         atol=1e-6 * np.abs(both.gradient(x)).max(),
     )
     np.testing.assert_array_equal(both.x_upper[[0, phase.variables]], [3.0, 4.0])
-    finer = both.with_grid([np.linspace(0.0, 1.0, 31)] * 2)
+    finer = both.with_points([np.linspace(0.0, 1.0, 31)] * 2)
     assert finer.minimised is objective
     np.testing.assert_array_equal(finer.x_upper, both.x_upper)
 
 
 def test_value_is_the_mean_square_over_time():
-    phase = phase_of("r1").with_grid(
+    phase = phase_of("r1").with_points(
         np.union1d(np.linspace(0.0, 1.0, 4001), [0.123, 0.1231, 0.7])
     )
     weights = weights_of("r1")
     (x,) = reachable_points(phase, 1)
     t_norm = np.linspace(0.0, 1.0, 4001)
-    qddot = phase.with_grid(t_norm).state(x).qddot
+    qddot = phase.with_points(t_norm).state(x).qddot
     expected = np.mean(
         0.5 * ((qddot[1:] * weights) ** 2 + (qddot[:-1] * weights) ** 2).sum(axis=1)
     )

@@ -21,8 +21,8 @@ from brachis.optimise.boundary import Boundary
 from brachis.optimise.bspline import clamped_uniform_knots, spread
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
+from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
-    MeshOptions,
     coarsest,
     optimise_knots,
     refine_mesh,
@@ -32,6 +32,7 @@ from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.robot import Robot
+from brachis.task import SplineSettings
 from support.chains import INERTIAL, Joint, chain_urdf
 from support.phases import phase_of, reachable_points
 
@@ -126,7 +127,7 @@ def test_refinement_holds_the_limits_in_every_phase():
     report = solve(program, first_point(program))
 
     def worst(x):
-        dense = program.with_grid([np.linspace(0.0, 1.0, 2001)] * 2)
+        dense = program.with_points([np.linspace(0.0, 1.0, 2001)] * 2)
         return [phase.violation(part).max() for phase, part in dense.split(x)]
 
     assert min(worst(report.x)) > 1e-3
@@ -141,22 +142,27 @@ def test_refinement_holds_the_limits_in_every_phase():
 def test_meshes_of_every_phase_are_refined():
     program = two_moves(degree=3, intervals=4)
     report = solve(program, first_point(program))
-    mesh, reports, undone = refine_mesh(
-        program, report, solve, MeshOptions(tolerance=1e-3), NEVER
+    fine = refine_mesh(
+        SolvedProgram(program, (report,)),
+        solve,
+        SplineSettings(intervals="auto", tolerance=1e-3),
+        NEVER,
     )
-    assert not undone
-    assert min(phase.intervals for phase in mesh.phases) > 8
-    assert reports[-1].objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
-    assert report.objective > 1.01 * reports[-1].objective
+    assert not fine.not_completed
+    assert min(phase.intervals for phase in fine.program.phases) > 8
+    assert fine.t_end == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
+    assert report.objective > 1.01 * fine.t_end
 
 
 def test_knots_of_every_phase_are_freed():
     program = two_moves(degree=3, intervals=3)
     report = solve(program, first_point(program))
-    free, reports, _ = optimise_knots(program, report, solve, 0.03, RefinementOptions())
-    assert free.variables == program.variables
-    assert reports[-1].objective < 0.99 * report.objective
-    assert reports[-1].objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
+    moved = optimise_knots(
+        SolvedProgram(program, (report,)), solve, 0.03, RefinementOptions()
+    )
+    assert moved.program.variables == program.variables
+    assert moved.report.objective < 0.99 * report.objective
+    assert moved.report.objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
 
 
 def test_phases_are_solved_from_few_intervals():
@@ -168,10 +174,10 @@ def test_phases_are_solved_from_few_intervals():
     coarse = coarsest(program)
     assert [phase.intervals for phase in coarse.phases] == [15, 14]
     report = solve(coarse, first_point(coarse))
-    nested, reports, undone = solve_nested(program, coarse, report, solve)
-    assert not undone
-    assert [phase.intervals for phase in nested.phases] == [60, 14]
-    assert reports[-1].objective < report.objective
+    nested = solve_nested(program, SolvedProgram(coarse, (report,)), solve)
+    assert not nested.not_completed
+    assert [phase.intervals for phase in nested.program.phases] == [60, 14]
+    assert nested.report.objective < report.objective
 
 
 def test_a_limit_of_several_phases_is_one_figure():

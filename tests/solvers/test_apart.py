@@ -83,7 +83,7 @@ def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
         target=child_process._work,
         args=(
             sender,
-            "brachis.optimise.backends.uno",
+            uno.run,
             disc(),
             START,
             SolverOptions(time_limit=0.05),
@@ -119,7 +119,7 @@ def test_a_process_that_may_start_none_solves_itself(monkeypatch):
     monkeypatch.setitem(multiprocessing.current_process()._config, "daemon", 1)
     monkeypatch.setattr(
         child_process,
-        "_solve_apart",
+        "subprocess_solve",
         lambda *_: pytest.fail("a daemonic process may have no children"),
     )
     assert solve().status is SolveStatus.OPTIMAL

@@ -16,7 +16,7 @@ from brachis.optimise.backends import (
     residual,
     solver_named,
 )
-from brachis.optimise.backends.monitor import Watch
+from brachis.optimise.backends.monitor import SolveMonitor
 from brachis.optimise.backends.registry import TABLE
 from support.programs import bounded, corner, curved, disc, impossible
 
@@ -221,11 +221,11 @@ def test_backends_get_finite_numbers_only(bad):
         {"row_values": lambda _x: np.array([bad])},
         {"row_slopes": lambda _x: np.array([[1.0, bad]])},
     ):
-        watch = Watch(dataclasses.replace(disc(), **wrong), OPTIONS, None)
+        watch = SolveMonitor(dataclasses.replace(disc(), **wrong), OPTIONS, None)
         with pytest.raises(UnreachableError, match="not a finite number"):
             _ = watch.rows(np.zeros(2)), watch.jacobian(np.zeros(2))
     with pytest.raises(UnreachableError, match="not finite"):
-        Watch(disc(), OPTIONS, None).rows(np.array([bad, 0.0]))
+        SolveMonitor(disc(), OPTIONS, None).rows(np.array([bad, 0.0]))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

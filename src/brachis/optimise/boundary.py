@@ -18,9 +18,6 @@ import numpy as np
 
 from brachis.optimise.bspline import ORDERS, local_basis
 
-_SAME_TIME = 1e-13
-"""Normalised times this near to a knot are at the knot."""
-
 
 @dataclass(frozen=True)
 class EndCondition:
@@ -50,10 +47,8 @@ class BoundarySpline:
     knots : (N + 2 d + 1,) ndarray
     degree : int
         d.
-    variable : (N + d, w) int ndarray
-        Free variables that make up every control point, -1 for none.
-    weight : (N + d, w) ndarray
-        Their weights; rows of S.
+    matrix : (N + d, free) ndarray
+        S.
     fixed : (N + d,) ndarray
         What the control points have besides.
     rate : (N + d,) ndarray
@@ -62,8 +57,7 @@ class BoundarySpline:
 
     knots: np.ndarray
     degree: int
-    variable: np.ndarray
-    weight: np.ndarray
+    matrix: np.ndarray
     fixed: np.ndarray
     rate: np.ndarray
 
@@ -74,17 +68,17 @@ class BoundarySpline:
         """Build a spline with conditions at both ends."""
         abscissae = greville(knots, degree)
         count = len(abscissae)
+        # Control points of one group are one variable; those of group -1 are fixed.
         group = np.arange(count)
         fixed = np.zeros(count)
         rate = np.zeros(count)
-        first, last = (
-            1 if np.isnan(each.rate) else 1 + each.derivatives for each in (start, end)
-        )
-        ends = slice(None, first), slice(count - last, None)
-        for condition, anchor, own, other in (
-            (start, 0, *ends),
-            (end, count - 1, *ends[::-1]),
-        ):
+        given = [
+            1 if np.isnan(own.rate) else 1 + own.derivatives for own in (start, end)
+        ]
+        first = slice(None, given[0])
+        last = slice(count - given[1], None)
+        sides = ((start, 0, first, last), (end, count - 1, last, first))
+        for condition, anchor, own, other in sides:
             group[own] = anchor if np.isnan(condition.value) else -1
             fixed[own] = np.nan_to_num(condition.value)
             away = abscissae - abscissae[anchor]
@@ -92,46 +86,35 @@ class BoundarySpline:
             fading[own] = away[own]
             fading[other] = 0.0
             rate += np.nan_to_num(condition.rate) * fading
-        variable = np.full(count, -1)
-        _, variable[group >= 0] = np.unique(group[group >= 0], return_inverse=True)
-        return cls(knots, degree, variable[:, None], np.ones((count, 1)), fixed, rate)
+        free = np.unique(group[group >= 0])
+        matrix = (group[:, None] == free).astype(float)
+        return cls(knots, degree, matrix, fixed, rate)
 
     @property
     def free(self) -> int:
         """Number of free variables."""
-        return int(self.variable.max()) + 1
+        return self.matrix.shape[1]
 
     @property
     def greville(self) -> np.ndarray:
         """Greville abscissae (N + d,): the normalised times to which the control points belong."""
         return greville(self.knots, self.degree)
 
-    @property
-    def matrix(self) -> np.ndarray:
-        """S, (N + d, free)."""
-        matrix = np.zeros((len(self.fixed), self.free))
-        point, entry = np.nonzero(self.variable >= 0)
-        np.add.at(
-            matrix, (point, self.variable[point, entry]), self.weight[point, entry]
-        )
-        return matrix
-
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
-        or_none = np.append(free, 0.0)  # which -1 points at
-        parts = self.weight * or_none[self.variable]
-        return np.asarray(parts.sum(axis=1) + self.fixed + duration * self.rate)
+        return np.asarray(self.matrix @ free + self.fixed + duration * self.rate)
 
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
         """Free variables that come nearest to given control points: means over those that are one variable each."""
         own_part = control_points - self.fixed - duration * self.rate
-        alone = (
-            ((self.variable >= 0).sum(axis=1) == 1)
-            & (self.weight[:, 0] == 1.0)
-            & (self.variable[:, 0] >= 0)
-        )
-        own = self.variable[alone, 0]
-        return np.asarray(np.bincount(own, weights=own_part[alone]) / np.bincount(own))
+        is_alone = np.count_nonzero(self.matrix, axis=1) == 1
+        is_alone &= self.matrix.max(axis=1, initial=0.0) == 1.0
+        own = self.matrix[is_alone]
+        return np.asarray(own_part[is_alone] @ own / own.sum(axis=0))
+
+    def end_variable(self, point: int) -> int:
+        """Variable that the value at the start (`point` 0) or end (-1) is; -1 where that is fixed."""
+        return int(np.argmax(self.matrix[point])) if self.matrix[point].any() else -1
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:
@@ -161,25 +144,16 @@ def periodic(
     _, derivatives = local_basis(knots, degree, np.array([0.0, 1.0]))
     first = derivatives[:orders, 0, :orders]
     last = derivatives[:orders, 1, -orders:]
-    count = len(knots) - degree - 1
-    variable = np.full((count, orders), -1)
-    weight = np.zeros((count, orders))
-    fixed = np.zeros(count)
-    variable[: count - orders, 0] = np.arange(count - orders)
-    weight[: count - orders, 0] = 1.0
-    variable[count - orders :] = np.arange(orders)
-    weight[count - orders :] = np.linalg.solve(last, first)
-    fixed[count - orders :] = jump
-    weight[-1], variable[-1, 1:] = (
-        np.eye(orders)[0],
-        -1,
-    )  # the value itself, without rounding
+    free = len(knots) - degree - 1 - orders
+    matrix = np.eye(free + orders, free)
+    matrix[free:, :orders] = np.linalg.solve(last, first)
+    matrix[-1] = np.eye(free)[0]  # the value itself, without rounding
+    fixed = np.zeros(len(matrix))
+    fixed[free:] = jump
     if not np.isnan(start):
-        fixed += start * np.where(variable == 0, weight, 0.0).sum(axis=1)
-        variable -= 1
-    return BoundarySpline(
-        knots, degree, np.maximum(variable, -1), weight, fixed, np.zeros(count)
-    )
+        fixed += start * matrix[:, 0]
+        matrix = matrix[:, 1:]
+    return BoundarySpline(knots, degree, matrix, fixed, np.zeros(len(matrix)))
 
 
 @dataclass(frozen=True)
@@ -209,27 +183,20 @@ class Boundary:
     def splines(self, knots: np.ndarray, degree: int) -> tuple[BoundarySpline, ...]:
         """Build the conditions into splines."""
         if self.periodic:
-            ahead = np.nan_to_num(self.end - self.start)
-            pairs = zip(self.start, ahead, strict=True)
-            return tuple(
-                periodic(knots, degree, float(start), float(jump))
-                for start, jump in pairs
-            )
+            pairs = zip(self.start, np.nan_to_num(self.end - self.start), strict=True)
+            return tuple(periodic(knots, degree, *pair) for pair in pairs)
         rest = np.zeros(len(self.start))
-        rates = (
-            rest if each is None else each
-            for each in (self.start_rates, self.end_rates)
-        )
-        starts, ends = (
-            [
-                EndCondition(float(value), float(rate), self.derivatives)
-                for value, rate in zip(*pair, strict=True)
-            ]
-            for pair in zip((self.start, self.end), rates, strict=True)
-        )
+        first_rates = rest if self.start_rates is None else self.start_rates
+        last_rates = rest if self.end_rates is None else self.end_rates
+        columns = zip(self.start, first_rates, self.end, last_rates, strict=True)
         return tuple(
-            BoundarySpline.between(knots, degree, *pair)
-            for pair in zip(starts, ends, strict=True)
+            BoundarySpline.between(
+                knots,
+                degree,
+                EndCondition(start, first, self.derivatives),
+                EndCondition(end, last, self.derivatives),
+            )
+            for start, first, end, last in columns
         )
 
 
@@ -251,21 +218,18 @@ class LocalBasis:
     @classmethod
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
         """Sample the basis at normalised times `t_norm`, (K,); at knots behind them."""
-        breaks = np.unique(knots)
-        near = breaks[
-            np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)
-        ]
         # Rounding must not choose the side of a knot: the highest derivative jumps there.
-        first, values = local_basis(
-            knots, degree, np.where(np.abs(near - t_norm) <= _SAME_TIME, near, t_norm)
-        )
+        breaks = np.unique(knots)
+        place = np.searchsorted(breaks, t_norm - 1e-13).clip(max=len(breaks) - 1)
+        near = breaks[place]
+        at = np.where(np.abs(near - t_norm) <= 1e-13, near, t_norm)
+        first, values = local_basis(knots, degree, at)
         return cls(first[:, None] + np.arange(degree + 1), values)
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
         """Value and three derivatives (4, K, c) of c splines with control points (c, N + d)."""
-        return np.asarray(
-            np.einsum("okw,ckw->okc", self.values, control_points[:, self.columns])
-        )
+        points = control_points[:, self.columns]
+        return np.asarray(np.einsum("okw,ckw->okc", self.values, points))
 
 
 @dataclass(frozen=True)
@@ -279,33 +243,23 @@ class SparsityPattern:
 
     point: np.ndarray
     variable: np.ndarray
-    _kept: np.ndarray
+    _terms: tuple[np.ndarray, np.ndarray]
     _place: np.ndarray
     _weight: np.ndarray
 
     @classmethod
     def of(cls, columns: np.ndarray, spline: BoundarySpline) -> SparsityPattern:
         """Find the places of a spline's local basis, whose `columns` are (K, d + 1)."""
-        variable = spline.variable[columns]
-        kept = variable >= 0
-        numbers = (np.arange(len(variable))[:, None, None] * spline.free + variable)[
-            kept
-        ]
+        weights = spline.matrix[columns]
+        point, function, variable = np.nonzero(weights)
+        numbers = point * spline.free + variable
         unique, place = np.unique(numbers, return_inverse=True)
-        return cls(
-            unique // spline.free,
-            unique % spline.free,
-            kept,
-            place,
-            spline.weight[columns][kept],
-        )
+        weight = weights[point, function, variable]
+        own_point, own_variable = np.divmod(unique, max(spline.free, 1))
+        return cls(own_point, own_variable, (point, function), place, weight)
 
     def entries(self, values: np.ndarray) -> np.ndarray:
         """Differentiate value and three derivatives by the free variables, (4, z); `values` are (4, K, d + 1)."""
-        spread = np.broadcast_to(values[..., None], (len(values), *self._kept.shape))
-        return np.array(
-            [
-                np.bincount(self._place, weights=self._weight * value[self._kept])
-                for value in spread
-            ]
-        )
+        terms = self._weight * values[:, *self._terms]
+        count = len(self.point)
+        return np.array([np.bincount(self._place, own, count) for own in terms])

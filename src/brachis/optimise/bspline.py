@@ -6,9 +6,7 @@ The NURBS Book, A2.2). Its denominators are never less than the point's own inte
 zero: beyond the ends of a clamped knot vector they do. The recursion is rational and takes complex lengths; a step
 along the imaginary axis gives derivatives without cancellation (Squire and Trapp, 1998).
 
-Clamped knot vectors in normalised time.
-
-Knot insertion: the same curves over a finer knot vector.
+Knot insertion gives the same curves over a finer knot vector.
 
 A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots
 behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). For a finer knot vector the blossom of the old piece is evaluated at
@@ -22,7 +20,6 @@ import numpy as np
 
 ORDERS = 4
 """Value and three derivatives."""
-_STEP = 1e-30
 
 
 def local_basis(
@@ -85,15 +82,13 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     own = lengths[..., middle : middle + 1]
     part = fraction[..., None] * own
     # left[m]: from the m-th knot before the point to the point; right[m]: from it to the m-th knot behind.
-    left = np.cumsum(
-        np.concatenate([part, lengths[..., :middle][..., ::-1]], axis=-1), axis=-1
-    )
-    right = np.cumsum(
-        np.concatenate([own - part, lengths[..., middle + 1 :]], axis=-1), axis=-1
-    )
+    before = lengths[..., :middle][..., ::-1]
+    behind = lengths[..., middle + 1 :]
+    left = np.cumsum(np.concatenate([part, before], axis=-1), axis=-1)
+    right = np.cumsum(np.concatenate([own - part, behind], axis=-1), axis=-1)
     value = [np.ones_like(part)]
     for p in range(1, degree + 1):
-        value.append(_raised(value[-1], left, right, p))
+        value.append(_raise_degree(value[-1], left, right, p))
     orders = [value[degree]]
     for order in range(1, ORDERS):
         part = value[degree - order] if order <= degree else np.zeros_like(value[0])
@@ -115,20 +110,19 @@ def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     -------
     (4, 2 d - 1, K, d + 1) ndarray
     """
-    steps = 1j * _STEP * np.eye(lengths.shape[-1])
-    return np.asarray(
-        basis_functions(lengths + steps[:, None], fraction[None]).imag / _STEP
-    )
+    step = 1e-30
+    moved = lengths + 1j * step * np.eye(lengths.shape[-1])[:, None]
+    return np.asarray(basis_functions(moved, fraction[None]).imag / step)
 
 
-def _raised(
+def _raise_degree(
     value: np.ndarray, left: np.ndarray, right: np.ndarray, p: int
 ) -> np.ndarray:
     """Basis functions of degree p from those of degree p - 1."""
     before = left[..., :p][..., ::-1]
     behind = right[..., :p]
     share = value / (before + behind)
-    return _shifted(before * share) + _padded(behind * share)
+    return _add_shifted(before * share, behind * share)
 
 
 def _slope(
@@ -136,15 +130,14 @@ def _slope(
 ) -> np.ndarray:
     """Differentiate functions of degree p, given `lower`, the same functions of degree p - 1."""
     share = p * lower / (left[..., :p][..., ::-1] + right[..., :p])
-    return _shifted(share) - _padded(share)
+    return _add_shifted(share, -share)
 
 
-def _padded(values: np.ndarray) -> np.ndarray:
-    return np.concatenate([values, np.zeros_like(values[..., :1])], axis=-1)
-
-
-def _shifted(values: np.ndarray) -> np.ndarray:
-    return np.concatenate([np.zeros_like(values[..., :1]), values], axis=-1)
+def _add_shifted(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Add values, the first of them moved by one function."""
+    zero = np.zeros_like(first[..., :1])
+    moved = np.concatenate([zero, first], axis=-1)
+    return moved + np.concatenate([second, zero], axis=-1)
 
 
 def clamped_knots(degree: int, breaks: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""What the search tries: starts, and the attempts that are made from them."""
+"""What the search tries: initial guesses, the candidates that are made from them, and how these are finished."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +11,21 @@ from typing import Any
 import numpy as np
 
 from brachis.common.summary import Summary
-from brachis.errors import write_count
-from brachis.kinematics import CHART, ChartMap, ClosedFormMap, JointSpaceMap
+from brachis.errors import UnreachableError, write_count
+from brachis.kinematics import (
+    CHART,
+    ChartMap,
+    ClosedFormMap,
+    JointSpaceMap,
+    interpolate,
+)
 from brachis.optimise.backends import SolverReport
-from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.program import Program
+from brachis.optimise.refine import RefinementOptions, refine
 from brachis.problem.problem import Problem
-from brachis.trajectory import Trajectory
-from brachis.verify import Verification
+from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
+from brachis.verify import Verification, verify_trajectory
 
 PathMap = ClosedFormMap | ChartMap | JointSpaceMap
 """Joint maps along a path."""
@@ -40,11 +48,11 @@ class InitialGuess(Summary):
     joint_path : (S, 1 + r) ndarray
         Successive values of the map's curves: s and the redundant joints, or s and the chart's sigma.
     estimate : float
-        Least time along the joint path from the phase plane, or of a quick solve, s; infinite where there is none.
+        Least time along the joint path from the phase plane, or of a quick solve, s; infinite where nobody knows.
     origin : str
         Where it is from, in plain words, for example ``lattice 2``.
     family : str
-        Family of the closed form; ``chart`` or ``path of joints`` where there is none.
+        Family of the closed form; ``chart`` or ``path of joints`` without one.
     solver : str
         The solver that plans from it; empty while none is chosen.
     timed : bool
@@ -66,13 +74,13 @@ class InitialGuess(Summary):
         return isinstance(self.joint_map, ChartMap)
 
     def with_solver(self, name: str) -> InitialGuess:
-        """Return the same start for a solver."""
+        """Return the same guess for another solver."""
         return dataclasses.replace(self, solver=name)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Summary):
-    """What came of a start: first a solved program, then, once it is finished, a verified motion.
+    """What came of an initial guess: first a solved program, then, once it is finished, a verified motion.
 
     Attributes
     ----------
@@ -88,7 +96,7 @@ class Candidate(Summary):
         See `InitialGuess`; a rough one.
     status : str
         In plain words.
-    start : Start or None
+    start : InitialGuess or None
         None where no joint path was found, and once the search is over.
     program : Program or None
         The first one that was solved; None where there was none, and once the search is over.
@@ -97,7 +105,7 @@ class Candidate(Summary):
     reports : tuple of SolverReport
         Of all solves: with ever smaller branch margins, on ever finer meshes, then of the refinement rounds.
     coarse : float
-        End time at the first collocation points, s; infinite where there is none.
+        End time at the first collocation points, s; infinite without a motion.
     refined : SolvedProgram or None
         The last program, its answer and its multipliers; None while it is not finished.
     trajectory : Trajectory or None
@@ -133,29 +141,16 @@ class Candidate(Summary):
 
     @classmethod
     def of(cls, start: InitialGuess, status: str, **more: Any) -> Candidate:
-        """Begin an attempt."""
-        joint_map = start.joint_map
-        names = joint_map.redundant_joints
-        branch = joint_map.branch_label
-        return cls(
-            names,
-            branch,
-            start.origin,
-            start.solver,
-            start.estimate,
-            status,
-            start,
-            **more,
-        )
+        """Begin with an initial guess."""
+        names = start.joint_map.redundant_joints
+        branch = start.joint_map.branch_label
+        known = (start.origin, start.solver, start.estimate)
+        return cls(names, branch, *known, status, start, **more)
 
     @property
     def usable(self) -> bool:
         """True where there is a first plan that can be finished."""
-        return (
-            self.program is not None
-            and bool(self.reports)
-            and self.reports[-1].status.usable
-        )
+        return self.program is not None and self.reports[-1].status.usable
 
     @property
     def in_chart(self) -> bool:
@@ -164,19 +159,16 @@ class Candidate(Summary):
 
     @property
     def keeps_knots(self) -> bool:
-        """True where the finished plan has the same knots, so that its end time is no shorter."""
+        """True where the finished plan has the same knots, so that its end time cannot be shorter."""
         if self.start is None or self.program is None or self.target is None:
             return False
         spline = self.start.problem.task.spline
-        return (
-            spline.knots != "free"
-            and spline.intervals != "auto"
-            and self.program.intervals == self.target.intervals
-        )
+        is_given = spline.knots != "free" and spline.intervals != "auto"
+        return is_given and self.program.intervals == self.target.intervals
 
     @property
     def t_end(self) -> float:
-        """End time of the trajectory, s; infinite where there is none."""
+        """End time of the trajectory, s; infinite without one."""
         return np.inf if self.trajectory is None else self.trajectory.t_end
 
     @property
@@ -204,79 +196,175 @@ class Candidate(Summary):
         """Number of collocation points of the last program."""
         return 0 if self.refined is None else self.refined.program.collocation_points
 
-    def finished(
-        self,
-        *,
-        reports: tuple[SolverReport, ...],
-        refined: SolvedProgram,
-        trajectory: Trajectory | None,
-        verification: Verification | None,
-        tolerance: float,
-    ) -> Candidate:
-        """Return the attempt with its motion, and with a status that says what became of it.
-
-        Parameters
-        ----------
-        reports, refined, trajectory, verification
-            See the attributes.
-        tolerance : float
-            Largest violation of a limit that is allowed, as a fraction of it.
-        """
-        last = refined.reports[-1]
-        if verification is not None and verification.passed:
-            status = "verified"
-        elif not refined.converged:
-            status = f"{last.solver}: {last.status.value}"
-        elif not np.isfinite(refined.violation):
-            status = f"{last.solver}: the motion leaves the branch, or the chart, between collocation points"
-        else:
-            if refined.violation > tolerance:
-                found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
-            else:
-                found = (
-                    "too sharp for a trajectory"
-                    if verification is None
-                    else "the verification fails"
-                )
-            rounds = write_count(len(refined.reports) - 1, "refinement round")
-            status = (
-                f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {found}"
-            )
-        (phase,) = refined.program.phases
-        return dataclasses.replace(
-            self,
-            redundant_joints=phase.joint_map.redundant_joints,
-            branch=phase.joint_map.branch_label,
-            status=status,
-            reports=reports,
-            refined=refined,
-            trajectory=trajectory,
-            verification=verification,
-        )
-
     def without_programs(self) -> Candidate:
-        """Return the attempt without what only the search needs."""
+        """Return the candidate without what only the search needs."""
         return dataclasses.replace(self, start=None, program=None, target=None)
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown: what was tried and what came of it."""
-        tried = {
-            "joints": coordinates(self.redundant_joints, self.branch),
-            "origin": self.origin,
-        }
-        ended = {"t_end": f"{self.t_end:.4f} s"} if np.isfinite(self.t_end) else {}
-        return {**tried, **ended, "status": self.status}
+        joints = coordinates(self.redundant_joints, self.branch)
+        shown = {"joints": joints, "origin": self.origin}
+        if self.trajectory is not None:
+            shown["t_end"] = f"{self.t_end:.4f} s"
+        return {**shown, "status": self.status}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
-        return {
-            "redundant_joints": list(self.redundant_joints),
-            "branch": self.branch,
-            "origin": self.origin,
-            "solver": self.solver,
-            "estimate": self.estimate,
-            "coarse": self.coarse,
-            "t_end": self.t_end,
-            "status": self.status,
-            "verified": self.verified,
-        }
+        names = ("branch", "origin", "solver", "estimate", "coarse", "t_end", "status")
+        plain = {name: getattr(self, name) for name in (*names, "verified")}
+        return {"redundant_joints": list(self.redundant_joints), **plain}
+
+
+def extract_trajectory(start: InitialGuess, solved: SolvedProgram) -> Trajectory:
+    """Turn the answer of a program into a trajectory that can be evaluated without the closed form.
+
+    Parameters
+    ----------
+    start : InitialGuess
+    solved : SolvedProgram
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    UnreachableError
+        The motion leaves the branch between the collocation points.
+    """
+    (phase,) = solved.program.phases
+    (motion,) = solved.program.motions(solved.x)
+    joint_map = phase.joint_map
+    assert joint_map.path is not None
+    joins = motion.times_of(joint_map.path.breaks[1:-1])
+    gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
+    breaks = np.union1d(motion.breaks, joins[gaps > 1e-7 * motion.t_end])
+    jumps = motion.degree < CONTINUOUS_TORQUE
+    nodes = interpolate(joint_map, motion.at, breaks, jumps=jumps)
+    rows = np.empty((0, 0, 0))
+    knots = np.empty(0)
+    if isinstance(joint_map, ChartMap):
+        rows, knots = joint_map.rows.arrays()
+    return Trajectory(
+        task=start.problem.task,
+        urdf=joint_map.robot.urdf,
+        robot=joint_map.robot,
+        redundant_joints=joint_map.redundant_joints,
+        branch=joint_map.branch_label,
+        times=nodes.times,
+        q=nodes.q,
+        qdot=nodes.qdot,
+        qddot=nodes.qddot,
+        qddot_before=nodes.qddot_before,
+        knots=motion.knots,
+        degree=motion.degree,
+        control_points=motion.control_points,
+        chart_rows=rows,
+        chart_knots=knots,
+    )
+
+
+def refine_and_verify(
+    candidate: Candidate,
+    program: Program,
+    reports: tuple[SolverReport, ...],
+    solve: Solve,
+    options: RefinementOptions,
+) -> Candidate:
+    """Refine and verify; only verify where the time is up.
+
+    A motion that the verification refuses is refined up to four times again, where it failed.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Of which the program is made.
+    program : Program
+    reports : tuple of SolverReport
+        Of all solves so far; the last one is the program's.
+    solve : callable
+        ``solve(program, x)`` returns a `SolverReport`.
+    options : RefinementOptions
+
+    Returns
+    -------
+    Candidate
+    """
+    report = reports[-1]
+    for looks_left in range(4 if options.max_rounds else 0, -1, -1):
+        refined = refine(program, report, solve, options)
+        done = _verify(candidate, reports[:-1], refined)
+        if not looks_left or options.deadline.passed:
+            break
+        finer = with_points_at_violations(done)
+        if finer is None:
+            break
+        report = solve(finer, refined.x)
+        if not report.status.usable:
+            break
+        program = finer
+    return done
+
+
+def with_points_at_violations(candidate: Candidate) -> Program | None:
+    """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
+    refined = candidate.refined
+    if refined is None or candidate.verification is None:
+        return None
+    failed = [check for check in candidate.verification.checks if not check.passed]
+    if not failed or any(not check.of_limit or check.time is None for check in failed):
+        return None
+    t_norm = np.array([check.time for check in failed]) / candidate.t_end
+    # A peak moves when it is held down.
+    near = t_norm[:, None] + 1e-4 * np.array([-1.0, 0.0, 1.0])
+    (phase,) = refined.program.phases
+    points = np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))
+    return refined.program.with_points([points])
+
+
+def _verify(
+    candidate: Candidate, before: tuple[SolverReport, ...], refined: SolvedProgram
+) -> Candidate:
+    """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
+    start = candidate.start
+    assert start is not None
+    problem = start.problem
+    trajectory = None
+    verification = None
+    if refined.converged and np.isfinite(refined.violation):
+        with contextlib.suppress(UnreachableError):
+            trajectory = extract_trajectory(start, refined)
+            verification = verify_trajectory(trajectory, own_limits=problem.further)
+    (phase,) = refined.program.phases
+    tolerance = problem.task.refinement.tolerance
+    return dataclasses.replace(
+        candidate,
+        redundant_joints=phase.joint_map.redundant_joints,
+        branch=phase.joint_map.branch_label,
+        status=_in_words(refined, verification, tolerance),
+        reports=(*before, *refined.reports),
+        refined=refined,
+        trajectory=trajectory,
+        verification=verification,
+    )
+
+
+def _in_words(
+    refined: SolvedProgram, verification: Verification | None, tolerance: float
+) -> str:
+    """Say what became of a refined program, whose limits may be exceeded by a fraction `tolerance`."""
+    last = refined.report
+    if verification is not None and verification.passed:
+        return "verified"
+    if not refined.converged:
+        return f"{last.solver}: {last.status.value}"
+    if not np.isfinite(refined.violation):
+        return f"{last.solver}: the motion leaves the branch, or the chart, between collocation points"
+    if refined.violation > tolerance:
+        found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
+    elif verification is None:
+        found = "too sharp for a trajectory"
+    else:
+        found = "the verification fails"
+    rounds = write_count(len(refined.reports) - 1, "refinement round")
+    return f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {found}"

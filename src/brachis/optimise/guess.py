@@ -6,8 +6,7 @@ The end time is scaled until all limits hold, which gives the solver a feasible 
 from __future__ import annotations
 
 import contextlib
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,17 +14,6 @@ from brachis.errors import UnreachableError
 from brachis.optimise.bspline import basis_matrix, spread
 from brachis.optimise.phase import Motion, Phase
 from brachis.optimise.program import Program
-
-_STRETCH = 1.1
-_SHRINKAGE = 0.8
-_SHORTEST_TIME = 0.01
-_LONGEST_TIME = 200.0
-_FIT_DENSITY = 4
-_MISSED = 0.1
-"""Part of a least speed that a fit may miss."""
-
-TimeLaw = Callable[[np.ndarray], np.ndarray]
-"""Which part of a joint path is passed at normalised times."""
 
 
 def starting_point(
@@ -57,96 +45,65 @@ def starting_point(
         None where the fit is out of reach at a collocation point.
     """
     pairs = list(zip(program.phases, joint_paths, strict=True))
-    for paced, fit in itertools.product(
-        (True, False) if keep else (False,), (_smoothed, _followed)
-    ):
-        with contextlib.suppress(UnreachableError):
-            parts = [
-                fit(phase, _closed(phase, joint_path), duration)
-                for phase, joint_path in pairs
-            ]
-            x = np.concatenate(parts)
-            if not paced:
-                return shortest_time(program, x)
-            if _fast_enough(program, x):
-                return x
+    for is_timed in (True, False) if keep else (False,):
+        for fit in (_smooth, _follow):
+            with contextlib.suppress(UnreachableError):
+                x = np.concatenate([fit(*pair, duration) for pair in pairs])
+                if not is_timed:
+                    return shortest_time(program, x)
+                if _is_fast_enough(program, x):
+                    return x
     return None
 
 
-def _fast_enough(program: Program, x: np.ndarray) -> bool:
-    """Tell whether no least speed is missed by much."""
-    of_phases = ((phase, phase.state(part)) for phase, part in program.split(x))
+def _is_fast_enough(program: Program, x: np.ndarray) -> bool:
+    """Tell whether no least speed is missed by more than a tenth."""
     missed = [
-        limit.violation(limit.values(state)).max()
-        for phase, state in of_phases
-        for limit in phase.limits
-        if limit.longer_time == "violates"
+        phase.evaluate(part).violation(lambda limit: limit.longer_time == "violates")
+        for phase, part in program.split(x)
     ]
-    return max(missed, default=0.0) <= _MISSED
+    return bool(max(own.max(initial=0.0) for own in missed) <= 0.1)
 
 
-def _smoothed(
-    phase: Phase, joint_path: np.ndarray, duration: float | None
-) -> np.ndarray:
-    points = _values(joint_path, _law(phase, duration)(phase.splines[0].greville))
-    return phase.variables_from(
-        Motion(_first_duration(phase, duration), phase.knots, phase.degree, points.T)
-    )
+def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
+    """Take control points from the joint path."""
+    t_norm = phase.splines[0].greville
+    t_end, points = _motion_along(phase, joint_path, duration, t_norm)
+    return phase.variables_from(Motion(t_end, phase.knots, phase.degree, points.T))
 
 
-def _followed(
-    phase: Phase, joint_path: np.ndarray, duration: float | None
-) -> np.ndarray:
-    t_norm = spread(phase.breaks, _FIT_DENSITY)
-    return fit_curves(
-        phase,
-        _first_duration(phase, duration),
-        t_norm,
-        _values(joint_path, _law(phase, duration)(t_norm)),
-    )
+def _follow(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
+    """Fit curves to the joint path."""
+    t_norm = spread(phase.breaks, 4)
+    t_end, wanted = _motion_along(phase, joint_path, duration, t_norm)
+    return fit_curves(phase, t_end, t_norm, wanted)
 
 
-def _rates(phase: Phase) -> tuple[float, float]:
-    """Rates of the first curve at both ends, 1/s."""
-    ends = phase.boundary.start_rates, phase.boundary.end_rates
-    first, last = (0.0 if rates is None else float(rates[0]) for rates in ends)
-    return first, last
+def _motion_along(
+    phase: Phase, joint_path: np.ndarray, duration: float | None, t_norm: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Duration, s, and values (K, c) at normalised times, (K,), of a motion along a joint path, (S, c).
 
-
-def _first_duration(phase: Phase, duration: float | None) -> float:
-    """Duration of a fit, s: as given, or that of a constant acceleration between moving ends; 1 from rest to rest."""
-    total = sum(_rates(phase))
-    return duration or (2.0 / total if total else 1.0)
-
-
-def _law(phase: Phase, duration: float | None) -> TimeLaw:
-    """Tell which part of a joint path is passed when: even parts of a motion's own, otherwise a smooth motion.
-
-    From rest to rest that is smooth; between other speeds the acceleration is constant.
+    A path with a duration has its values at even times. Else the motion is smooth from rest to rest, and takes 1 s; or
+    its first curve has a constant acceleration between the rates at the ends.
     """
-    first, last = _rates(phase)
-    if duration is not None:
-        return lambda t_norm: t_norm
-    if first == last == 0.0:
-        return lambda t_norm: t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
-    return lambda t_norm: (
-        t_norm * (2.0 * first + (last - first) * t_norm) / (first + last)
-    )
-
-
-def _closed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
-    """Let the joint path of a periodic motion end as far ahead of its start as it has to, by an even drift."""
-    if not phase.boundary.periodic:
-        return joint_path
-    ahead = np.nan_to_num(phase.boundary.end - phase.boundary.start)
-    part = np.linspace(0.0, 1.0, len(joint_path))[:, None]
-    return joint_path + part * (ahead - (joint_path[-1] - joint_path[0]))
-
-
-def _values(joint_path: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Values (K, c) of a joint path, (S, c), at places from 0 to 1, (K,)."""
     grid = np.linspace(0.0, 1.0, len(joint_path))
-    return np.column_stack([np.interp(places, grid, column) for column in joint_path.T])
+    boundary = phase.boundary
+    if boundary.periodic:
+        # An even drift lets the path end as far ahead of its start as it has to.
+        ahead = np.nan_to_num(boundary.end - boundary.start)
+        missing = ahead - (joint_path[-1] - joint_path[0])
+        joint_path = joint_path + grid[:, None] * missing
+    ends = (boundary.start_rates, boundary.end_rates)
+    first, last = (0.0 if rates is None else float(rates[0]) for rates in ends)
+    total = first + last
+    part = t_norm
+    if duration is None and total == 0.0:
+        part = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+    elif duration is None:
+        part = t_norm * (2.0 * first + (last - first) * t_norm) / total
+    values = [np.interp(part, grid, column) for column in joint_path.T]
+    return duration or (2.0 / total if total else 1.0), np.column_stack(values)
 
 
 def fit_curves(
@@ -171,10 +128,8 @@ def fit_curves(
     basis = basis_matrix(phase.knots, phase.degree, t_norm)
     parts = [np.array([duration])]
     for spline, values in zip(phase.splines, wanted.T, strict=True):
-        given = basis @ (spline.fixed + duration * spline.rate)
-        parts.append(
-            np.linalg.lstsq(basis @ spline.matrix, values - given, rcond=None)[0]
-        )
+        missing = values - basis @ (spline.fixed + duration * spline.rate)
+        parts.append(np.linalg.lstsq(basis @ spline.matrix, missing, rcond=None)[0])
     parts.append(phase.grid.lengths_of(phase.knots))
     return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
 
@@ -193,7 +148,7 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     """
     best = x
     least = np.inf
-    while program.end_time(x) < _LONGEST_TIME:
+    while program.end_time(x) < 200.0:
         worst = worst_time_scaling_ratio(program, x)
         if worst <= 1.0:
             break
@@ -202,12 +157,12 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
         best = x
         least = worst
         # Without gravity and friction, torque falls with the square of the time.
-        x = program.with_time_scaled(x, _STRETCH * min(np.sqrt(worst), 8.0))
+        x = program.with_time_scaled(x, 1.1 * min(np.sqrt(worst), 8.0))
     else:
         return best
     shorter = x
-    while program.end_time(shorter) > _SHORTEST_TIME:
-        shorter = program.with_time_scaled(shorter, _SHRINKAGE)
+    while program.end_time(shorter) > 0.01:
+        shorter = program.with_time_scaled(shorter, 0.8)
         if worst_time_scaling_ratio(program, shorter) > 1.0:
             break
         x = shorter
@@ -216,9 +171,6 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
 
 def worst_time_scaling_ratio(program: Program, x: np.ndarray) -> float:
     """Largest ratio to a limit that a longer time relieves, such as those of velocity, acceleration and torque."""
-    return float(
-        max(
-            np.abs(phase.time_scaling_ratios(part)).max()
-            for phase, part in program.split(x)
-        )
-    )
+    pairs = program.split(x)
+    ratios = [np.abs(phase.time_scaling_ratios(part)).max() for phase, part in pairs]
+    return float(max(ratios))

@@ -6,15 +6,12 @@ points and have no rows. Where the knots are free, the interval lengths h in nor
 
 Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on, or
 their c means over time where it is held over the whole motion; along a path then differences of successive control
-points of s, which are >= 0 so that ds/dt >= 0 holds at all times (see `progress`); where the knots are free, last the
+points of s, which are >= 0 so that ds/dt >= 0 holds at all times (see `Progress`); where the knots are free, last the
 sum of h, which is 1. All rows are dimensionless.
 
-Entries of the Jacobian: for each of `batches` those of all its limits by T, by the variables of each curve and by h,
-all points of a place together, or of means those by all variables; then those of the differences; last 1 for each of h.
-
-From a limit's partials with respect to the joints to its derivatives with respect to curves and end time.
-
-Rows that keep ds/dt >= 0 at all times: the control points of s do not decrease.
+Entries of the Jacobian: of all limits that hold at every point, those by T, by the variables of each curve and by h,
+all columns of a point together; then of the means, those by all variables; then those of the differences; last 1 for
+each of h.
 """
 
 from __future__ import annotations
@@ -25,39 +22,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kinematics import JointState
-from brachis.limits import Limit, Partials
+from brachis.limits import Limit
 from brachis.optimise.boundary import BoundarySpline, SparsityPattern
-from brachis.optimise.grid import Grid
+from brachis.optimise.grid import FixedGrid
 
-
-def chain(partials: Partials, state: JointState) -> tuple[np.ndarray, ...]:
-    """Differentiate a limit with respect to y, ydot, yddot and, where it asks for the jerk, ydddot, (K, c, 1 + r) each.
-
-    See `joint_map` for the derivatives of the jerk.
-    """
-    exact = state.derivatives
-    given = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
-    shape = next(part.shape[:2] for part in given if part is not None)
-    by_y = by_ydot = by_yddot = np.zeros((*shape, state.y.shape[1]))
-    if partials.q is not None:
-        by_y = by_y + partials.q @ state.gradient
-    if partials.s is not None:
-        by_y = by_y.copy()
-        by_y[:, :, 0] += partials.s
-    if partials.qdot is not None:
-        by_y = by_y + partials.qdot @ exact.qdot_y
-        by_ydot = by_ydot + partials.qdot @ state.gradient
-    if partials.qddot is not None:
-        by_y = by_y + partials.qddot @ exact.qddot_y
-        by_ydot = by_ydot + partials.qddot @ exact.qddot_ydot
-        by_yddot = by_yddot + partials.qddot @ state.gradient
-    if partials.qdddot is None:
-        return by_y, by_ydot, by_yddot
-    by_y = by_y + partials.qdddot @ state.qdddot_y
-    by_ydot = by_ydot + 3.0 * partials.qdddot @ exact.qddot_y
-    by_yddot = by_yddot + 3.0 * partials.qdddot @ exact.qdot_y
-    return by_y, by_ydot, by_yddot, partials.qdddot @ state.gradient
+SHORTEST_TIME = 1e-4
+"""Least duration of a phase, s: a motion that takes no longer is not held back by any limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,43 +49,14 @@ class Progress:
     weight: np.ndarray
 
     @classmethod
-    def of(cls, spline: BoundarySpline, first: int) -> Progress:
-        """Take the differences of a spline whose free variables begin at `first`; the duration is variable 0."""
-        point, entry = np.nonzero(spline.variable >= 0)
-        variable = first + spline.variable[point, entry]
-        weight = spline.weight[point, entry]
-        every = np.arange(len(spline.rate))
-        point = np.append(point, every)
-        variable = np.append(variable, np.zeros_like(every))
-        weight = np.append(weight, spline.rate)
-        # Control point i is in difference i - 1, and with the other sign in difference i.
-        number = np.concatenate([point - 1, point])
-        places = number * (first + spline.free) + np.tile(variable, 2)
-        unique, place = np.unique(
-            places[(number >= 0) & (number < len(every) - 1)], return_inverse=True
-        )
-        signed = np.concatenate([weight, -weight])[
-            (number >= 0) & (number < len(every) - 1)
-        ]
-        total = np.bincount(place, weights=signed)
-        unique = unique[total != 0.0]
-        total = total[total != 0.0]
-        number, variable = np.divmod(unique, first + spline.free)
-        several = np.bincount(number, minlength=len(every) - 1) > 1
-        kept = several[number]
-        row = np.cumsum(several) - 1
-        return cls(
-            np.diff(spline.fixed)[several],
-            row[number[kept]],
-            variable[kept],
-            total[kept],
-        )
-
-    @classmethod
-    def none(cls) -> Progress:
-        """Return no rows, where there is no path."""
-        nothing = np.empty(0, dtype=int)
-        return cls(np.empty(0), nothing, nothing, np.empty(0))
+    def of(cls, spline: BoundarySpline) -> Progress:
+        """Take the differences of a spline whose free variables follow the duration, variable 0."""
+        differences = np.diff(np.column_stack([spline.rate, spline.matrix]), axis=0)
+        several = np.count_nonzero(differences, axis=1) > 1
+        kept = differences[several]
+        row, variable = np.nonzero(kept)
+        offset = np.diff(spline.fixed)[several]
+        return cls(offset, row, variable, kept[row, variable])
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (p,)."""
@@ -123,10 +64,6 @@ class Progress:
             self.row, weights=self.weight * x[self.variable], minlength=len(self.offset)
         )
         return np.asarray(self.offset + parts)
-
-
-SHORTEST_TIME = 1e-4
-"""Least duration, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,12 +74,16 @@ class Layout:
     ----------
     slices : tuple of slice
         Variables of each curve.
-    progress : Progress
-        Differences of control points of s; none where there is no path.
     lengths : slice
-        Variables h; none where the knots are fixed.
-    places : tuple of SparsityPattern
+        Variables h; empty where the knots are fixed.
+    patterns : tuple of SparsityPattern
         Where the variables of each curve matter.
+    point, variable : (z,) int ndarray
+        Where variables matter at all, by T, by each curve, then by h.
+    progress : Progress
+        Differences of control points of s; empty without a path.
+    limit_rows : tuple of (K, c) or (1, c) int ndarray
+        Numbers of the rows of each limit.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -151,9 +92,12 @@ class Layout:
     """
 
     slices: tuple[slice, ...]
-    progress: Progress
     lengths: slice
-    places: tuple[SparsityPattern, ...]
+    patterns: tuple[SparsityPattern, ...]
+    point: np.ndarray
+    variable: np.ndarray
+    progress: Progress
+    limit_rows: tuple[np.ndarray, ...]
     x_lower: np.ndarray
     x_upper: np.ndarray
     lower: np.ndarray
@@ -164,110 +108,81 @@ class Layout:
     @classmethod
     def of(
         cls,
-        grid: Grid,
+        grid: FixedGrid,
         splines: Sequence[BoundarySpline],
         limits: Sequence[Limit],
         *,
-        path: bool,
+        has_path: bool,
     ) -> Layout:
         """Lay a phase out over a grid; the first of its `splines` is s where there is a path."""
-        ends = np.cumsum([1, *(spline.free for spline in splines)])
-        slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
+        ends = np.cumsum([1, *(spline.free for spline in splines)]).tolist()
+        slices = tuple(itertools.starmap(slice, itertools.pairwise(ends)))
+        lengths = slice(ends[-1], ends[-1] + len(grid.lower))
         x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
         x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
         x_lower[0] = SHORTEST_TIME
-        if path and not splines[0].rate.any():
+        nothing = np.empty(0, dtype=int)
+        progress = Progress(np.empty(0), nothing, nothing, np.empty(0))
+        if has_path:
+            progress = Progress.of(splines[0])
+        if has_path and not splines[0].rate.any():
             x_lower[slices[0]] = 0.0
             x_upper[slices[0]] = 1.0
-        progress = Progress.of(splines[0], slices[0].start) if path else Progress.none()
-        lengths = slice(int(ends[-1]), len(x_lower))
-        basis = grid.basis(grid.lengths_of(grid.knots))
-        places = tuple(SparsityPattern.of(basis.columns, spline) for spline in splines)
-        pattern = _pattern(grid, limits, slices, progress, lengths, places)
-        bounds = _bounds(grid, limits, len(progress.offset))
-        return cls(
-            slices, progress, lengths, places, x_lower, x_upper, *bounds, *pattern
-        )
 
-
-def height(limit: Limit, count: int) -> int:
-    """Return how many times a limit's c values are rows, with `count` collocation points."""
-    return 1 if limit.guarantee.is_mean else count
-
-
-def batches(limits: Sequence[Limit]) -> list[list[Limit]]:
-    """Limits that are differentiated together: those held at every point, and those whose means are."""
-    kinds = dict.fromkeys(limit.guarantee.is_mean for limit in limits)
-    return [
-        [limit for limit in limits if limit.guarantee.is_mean == is_mean]
-        for is_mean in kinds
-    ]
-
-
-def _bounds(
-    grid: Grid, limits: Sequence[Limit], steps: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the rows, (c,) each, with `steps` differences of control points of s."""
-    count = len(grid.t_norm)
-    lower = [
-        *(np.tile(each.lower, height(each, count)) for each in limits),
-        np.zeros(steps),
-        grid.total,
-    ]
-    upper = [
-        *(np.tile(each.upper, height(each, count)) for each in limits),
-        np.full(steps, np.inf),
-        grid.total,
-    ]
-    return np.concatenate(lower), np.concatenate(upper)
-
-
-def _pattern(
-    grid: Grid,
-    limits: Sequence[Limit],
-    slices: Sequence[slice],
-    progress: Progress,
-    lengths: slice,
-    places: Sequence[SparsityPattern],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the Jacobian's entries, (nnz,) each."""
-    count = len(grid.t_norm)
-    patterns = [(np.arange(count), np.zeros(count, dtype=int))]
-    patterns += [
-        (place.point, place.variable + part.start)
-        for place, part in zip(places, slices, strict=True)
-    ]
-    patterns.append((grid.point, grid.variable + lengths.start))
-    counts = [height(limit, count) for limit in limits]
-    ends = np.cumsum(
-        [
-            0,
-            *(
-                times * len(limit.lower)
-                for times, limit in zip(counts, limits, strict=True)
-            ),
+        columns = grid.basis(grid.lengths_of(grid.knots)).columns
+        patterns = tuple(SparsityPattern.of(columns, spline) for spline in splines)
+        count = len(grid.t_norm)
+        of_curves = [
+            pattern.variable + own.start
+            for pattern, own in zip(patterns, slices, strict=True)
         ]
-    )
-    numbers = {
-        id(limit): np.arange(*pair).reshape(times, -1)
-        for limit, times, pair in zip(
-            limits, counts, itertools.pairwise(ends), strict=True
+        points = [np.arange(count), *(pattern.point for pattern in patterns)]
+        point = np.concatenate([*points, grid.point])
+        of_time = np.zeros(count, dtype=int)
+        of_lengths = grid.variable + lengths.start
+        variable = np.concatenate([of_time, *of_curves, of_lengths])
+
+        limit_rows = []
+        first = 0
+        for limit in limits:
+            times = 1 if limit.guarantee.is_mean else count
+            size = times * len(limit.lower)
+            limit_rows.append(np.arange(first, first + size).reshape(times, -1))
+            first += size
+        pairs = list(zip(limits, limit_rows, strict=True))
+        steps = len(progress.offset)
+        lower = [np.tile(limit.lower, len(rows)) for limit, rows in pairs]
+        upper = [np.tile(limit.upper, len(rows)) for limit, rows in pairs]
+
+        at_points = [rows for limit, rows in pairs if not limit.guarantee.is_mean]
+        of_means = [rows.ravel() for limit, rows in pairs if limit.guarantee.is_mean]
+        pointwise = np.hstack([np.empty((count, 0), dtype=int), *at_points])
+        means = np.concatenate([nothing, *of_means])
+        h = np.arange(lengths.start, lengths.stop)
+        jacobian_rows = [
+            pointwise[point].ravel(),
+            np.repeat(means, lengths.stop),
+            first + progress.row,
+            np.full(len(h), first + steps),
+        ]
+        jacobian_columns = [
+            np.repeat(variable, pointwise.shape[1]),
+            np.tile(np.arange(lengths.stop), len(means)),
+            progress.variable,
+            h,
+        ]
+        return cls(
+            slices,
+            lengths,
+            patterns,
+            point,
+            variable,
+            progress,
+            tuple(limit_rows),
+            x_lower,
+            x_upper,
+            np.concatenate([*lower, np.zeros(steps), grid.total]),
+            np.concatenate([*upper, np.full(steps, np.inf), grid.total]),
+            np.concatenate(jacobian_rows),
+            np.concatenate(jacobian_columns),
         )
-    }
-    rows = []
-    columns = []
-    for batch in batches(limits):
-        together = np.concatenate([numbers[id(limit)] for limit in batch], axis=1)
-        if batch[0].guarantee.is_mean:
-            rows.append(np.repeat(together, lengths.stop))
-            columns.append(np.tile(np.arange(lengths.stop), together.size))
-        else:
-            rows += [together[point].ravel() for point, _ in patterns]
-            columns += [
-                np.repeat(variable, together.shape[1]) for _, variable in patterns
-            ]
-    first = int(ends[-1])
-    of_h = np.arange(lengths.start, lengths.stop)
-    rows += [first + progress.row, np.full(len(of_h), first + len(progress.offset))]
-    columns += [progress.variable, of_h]
-    return np.concatenate(rows), np.concatenate(columns)

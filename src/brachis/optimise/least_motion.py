@@ -29,24 +29,21 @@ from brachis.optimise.backends import (
     SolverReport,
     solver_named,
 )
-from brachis.optimise.candidate import Candidate
-from brachis.optimise.completion import refine_and_verify
+from brachis.optimise.candidate import Candidate, refine_and_verify
 from brachis.optimise.program import LeastAcceleration, Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.session import SolverSession
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
-AS_FAST = 1e-4
-"""Motions whose end times differ by a smaller fraction are equally fast."""
-_KEPT_BACK = 0.1e-4
-"""Part of the end time by which refinement may still lengthen the motion."""
+_AS_FAST = 1e-4
+"""Motions are equally fast whose end times differ by no more than this fraction."""
+_KEPT_BACK = 0.1 * _AS_FAST
+"""Fraction of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
-"""A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
+"""A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
 _FOR_MANY = "ipopt"
 """With more than 150 variables active sets take seconds an iteration; a few iterations of an interior point do."""
-_PROGRESS = 1e-2
-"""A solve ends where several iterations lower the mean square by less than this fraction: near enough will do."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,11 +86,11 @@ class LeastMotion(Summary):
 def find_least_motion(
     fastest: Candidate, deadline: Deadline, listener: Listener
 ) -> LeastMotion:
-    """Find the calmest motion that is as fast as a finished attempt, or as little slower as the task allows.
+    """Find the calmest motion that is as fast as a candidate, or as little slower as the task allows.
 
     Parameters
     ----------
-    fastest : Attempt
+    fastest : Candidate
         Finished.
     deadline : Deadline
     listener : callable
@@ -105,39 +102,36 @@ def find_least_motion(
     try:
         return _solve(fastest, deadline, listener)
     except UnreachableError as error:
-        return _kept(fastest, f"the fastest motion stays: {error}")
+        return _keep(fastest, f"the fastest motion stays: {error}")
     except KeyboardInterrupt:
         interrupts.clear()
-        return _kept(fastest, "interrupted")
+        return _keep(fastest, "interrupted")
 
 
 def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastMotion:
-    """Solve, and complete what came of it if it is worth it."""
+    """Solve, refine and verify, and take the new motion if it is verified and calmer by a fraction that is worth it."""
     start = fastest.start
     before = fastest.refined
     assert start is not None and before is not None
+    if not fastest.verified or deadline.passed:
+        late = "no time was left"
+        status = late if fastest.verified else "the fastest motion is not verified"
+        return _keep(fastest, status)
     task = start.problem.task
-    slower = max(task.search.slower, AS_FAST)
-    if not fastest.verified:
-        return _kept(fastest, "the fastest motion is not verified")
-    if deadline.passed:
-        return _kept(fastest, "no time was left")
+    slower = max(task.search.slower, _AS_FAST)
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
-    program = before.program.minimising(objective)
+    program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
     name = _FOR_MANY if program.variables > 150 else start.solver
     solve = _session(name, soon, listener, patience=5)
-    first = solve(
-        program, program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
-    )
+    longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
+    first = solve(program, longest)
     if not first.status.usable:
-        return _kept(
-            fastest, f"the fastest motion stays: {first.status.value}", (first,)
-        )
+        status = f"the fastest motion stays: {first.status.value}"
+        return _keep(fastest, status, (first,))
+    hardly_any = "the fastest motion stays: hardly any other is calmer"
     if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
-        return _kept(
-            fastest, "the fastest motion stays: hardly any other is calmer", (first,)
-        )
+        return _keep(fastest, hardly_any, (first,))
     settings = task.refinement
     options = RefinementOptions(
         settings.tolerance,
@@ -149,40 +143,21 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     # Rounds of refinement begin near enough, and end sooner.
     solve = _session(name, soon, listener, patience=2)
     found = refine_and_verify(fastest, program, (first,), solve, options)
-    return _better(
-        fastest,
-        found,
-        1.0 - np.sqrt(program.objective(found.refined.x)) if found.refined else 0.0,
-    )
-
-
-def _better(fastest: Candidate, found: Candidate, reduction: float) -> LeastMotion:
-    """Take the motion that was found if it is verified and calmer by a fraction that is worth it."""
-    if found.trajectory is None or found.verification is None or not found.verified:
-        return _kept(
-            fastest,
-            "the fastest motion stays: a calmer one was not verified",
-            found.reports,
-        )
+    if found.trajectory is None or found.refined is None or not found.verified:
+        status = "the fastest motion stays: a calmer one was not verified"
+        return _keep(fastest, status, found.reports)
+    reduction = float(1.0 - np.sqrt(program.objective(found.refined.x)))
     if reduction < _WORTH_IT:
-        return _kept(
-            fastest,
-            "the fastest motion stays: hardly any other is calmer",
-            found.reports,
-        )
+        return _keep(fastest, hardly_any, found.reports)
     later = found.t_end / fastest.t_end - 1.0
     status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
+    assert found.verification is not None
     return LeastMotion(
-        found.trajectory,
-        found.verification,
-        float(reduction),
-        later,
-        status,
-        found.reports,
+        found.trajectory, found.verification, reduction, later, status, found.reports
     )
 
 
-def _kept(
+def _keep(
     fastest: Candidate, status: str, reports: tuple[SolverReport, ...] = ()
 ) -> LeastMotion:
     """Keep the fastest motion."""
@@ -212,7 +187,7 @@ def least_acceleration(
         if speeds[own].any():
             weights[own] = 1.0 / speeds[own].max()
     longest = np.array([part[0] for _, part in program.split(x)]) * (1.0 + slower)
-    size = program.minimising(LeastAcceleration(weights, longest)).objective(x)
+    size = program.with_objective(LeastAcceleration(weights, longest)).objective(x)
     return LeastAcceleration(
         weights / np.sqrt(size) if size > 0.0 else weights, longest
     )
@@ -227,7 +202,7 @@ def _session(
         tolerance=1e-6,
         max_iterations=20 if name == _FOR_MANY else 60,
         time_limit=np.inf,
-        progress=_PROGRESS,
+        progress=1e-2,  # near enough will do
         patience=patience,
         anywhere=True,
     )

@@ -12,8 +12,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,15 +31,11 @@ from brachis.optimise.improve import (
 )
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
-from brachis.optimise.refine import RefinementOptions, merged, refine
+from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
-SHORTEST = 5e-5
+_SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
-
-
-_FEWEST, _WITH_LEAST_SPEED = 12, 36
-"""Intervals of the coarsest level, at least; more where a limit asks for a least speed, for fewer may not keep it."""
 
 
 def coarsest(program: Program) -> Program:
@@ -72,11 +68,18 @@ def solve_nested(
     """
 
     def change_to(level: Program) -> Change:
-        return lambda solved: _over_level(solved, level)
+        def change(solved: SolvedProgram) -> tuple[Program, np.ndarray]:
+            pairs = zip(solved.program.phases, level.phases, strict=True)
+            # The solved program may have another branch margin.
+            phases = [own.with_knots(fine.knots, fine.t_norm) for own, fine in pairs]
+            return _transfer(solved, phases)
 
+        return change
+
+    levels = _levels(target)
     finer = (
         change_to(level)
-        for level in _levels(target)
+        for level in levels
         if level.intervals > coarse.program.intervals
     )
     attempt = attempt_once(solve, accept_early_end=True)
@@ -88,83 +91,51 @@ def solve_nested(
     return replace(reached, not_completed=not_completed)
 
 
-def _over_level(solved: SolvedProgram, level: Program) -> tuple[Program, np.ndarray]:
-    """Write a solved program, and its answer, over the knots and points of a finer one."""
-    pairs = list(zip(solved.program.split(solved.x), level.phases, strict=True))
-    finer = solved.program.with_phases(
-        own.with_knots(fine.knots, fine.t_norm) for (own, _), fine in pairs
-    )
-    motions = [own.motion(part).over(fine.knots) for (own, part), fine in pairs]
+def _transfer(
+    solved: SolvedProgram, phases: Sequence[Phase]
+) -> tuple[Program, np.ndarray]:
+    """Write a solved program, and its answer, over the knots of phases that contain its own."""
+    finer = solved.program.with_phases(phases)
+    pairs = zip(solved.program.motions(solved.x), phases, strict=True)
+    motions = [motion.with_knots(phase.knots) for motion, phase in pairs]
     return finer, finer.variables_from(motions)
 
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    fewest = (
-        _WITH_LEAST_SPEED
-        if any(limit.longer_time == "violates" for limit in program.limits)
-        else _FEWEST
-    )
-    steps = [
-        int(np.log2(max(phase.intervals / fewest, 1.0))) for phase in program.phases
-    ]
-    for k in range(max(steps), 0, -1):
-        pairs = zip(program.phases, steps, strict=True)
+    # Few intervals may not keep a least speed.
+    has_least_speed = any(limit.longer_time == "violates" for limit in program.limits)
+    fewest = 36 if has_least_speed else 12
+    halvings = [int(np.log2(max(own.intervals / fewest, 1))) for own in program.phases]
+    for k in range(max(halvings), 0, -1):
+        pairs = zip(program.phases, halvings, strict=True)
         yield program.with_phases(
-            _thinned(phase, 2 ** min(k, own)) for phase, own in pairs
+            _thin_out(own, 2 ** min(k, most)) for own, most in pairs
         )
     yield program
 
 
-def _thinned(phase: Phase, every: int) -> Phase:
+def _thin_out(phase: Phase, step: int) -> Phase:
     """Keep every so many-th knot and collocation point, and the last ones."""
-    breaks, t_norm = (
-        values[_every(len(values), every)] for values in (phase.breaks, phase.t_norm)
-    )
-    return phase.with_knots(clamped_knots(phase.degree, breaks), t_norm)
 
+    def thin_out(values: np.ndarray) -> np.ndarray:
+        return np.union1d(values[::step], values[-1:])
 
-def _every(count: int, step: int) -> np.ndarray:
-    return np.unique(np.append(np.arange(0, count, step), count - 1))
+    knots = clamped_knots(phase.degree, thin_out(phase.breaks))
+    return phase.with_knots(knots, thin_out(phase.t_norm))
 
 
 COARSE_INTERVALS = 10
 """Intervals with which a mesh begins."""
-_SHARE = 0.6
-"""A round halves the intervals that lose most, and that lose this part of the time lost altogether."""
-_ENOUGH = 0.5
-"""Rounds end when the last two gained less than this part of the tolerance: further ones would gain as much."""
 _FEW_VARIABLES = 150
 """Up to so many it is cheap to halve every interval, in case the wrong ones were thought to lose most."""
-_SAMPLES = 8
-_SHORTEST = 0.5
-"""No interval gets shorter than this part of the tolerance, for it cannot lose more than its own length."""
 _MOST_VARIABLES = 300
 """Solves with more take seconds each, and gain some 0.1 %."""
-_MOST_ROUNDS = 20
-_GROWTH = 3.0
-"""So many times as long as a round the next one may take."""
-_UNDONE = "the mesh is coarser than spline.tolerance asks for"
-
-
-@dataclass(frozen=True)
-class MeshOptions:
-    """When a mesh is fine enough.
-
-    Attributes
-    ----------
-    tolerance : float
-        Of the end time, as a fraction of it: the refinement ends when two rounds together gain less than half of it.
-    points_per_interval : int
-        Collocation points of every interval.
-    """
-
-    tolerance: float = 1e-3
-    points_per_interval: int = 3
+_COARSER = "the mesh is coarser than spline.tolerance asks for"
 
 
 def refine_mesh(
-    solved: SolvedProgram, solve: Solve, options: MeshOptions, deadline: Deadline
+    solved: SolvedProgram, solve: Solve, spline: SplineSettings, deadline: Deadline
 ) -> SolvedProgram:
     """Insert knots into a solved program until that gains little.
 
@@ -177,7 +148,8 @@ def refine_mesh(
         Of one report.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
-    options : MeshOptions
+    spline : SplineSettings
+        Its tolerance is a fraction of the end time.
     deadline : Deadline
         After it no round is begun; nor is one that looks as if it would end later.
 
@@ -186,99 +158,74 @@ def refine_mesh(
     SolvedProgram
         Over all knots.
     """
+    # An interval cannot lose more than its own length.
+    shortest = max(0.5 * spline.tolerance, _SHORTEST)
 
     def halve(solved: SolvedProgram) -> tuple[Program, np.ndarray] | str | None:
         program = solved.program
         times = np.array([report.objective for report in solved.reports])
         gains = 1.0 - times[1:] / times[:-1]
-        is_settled = len(gains) > 1 and gains[-2:].sum() < _ENOUGH * options.tolerance
+        is_settled = len(gains) > 1 and gains[-2:].sum() < 0.5 * spline.tolerance
         if is_settled and 2 * program.variables > _FEW_VARIABLES:
             return None
-        if _GROWTH * solved.report.wall_time > deadline.left:
-            return _UNDONE
-        intervals = (
-            _every_interval(program)
-            if is_settled
-            else _losers(program, solved.x, options)
-        )
-        finer, x = _halved(program, solved.x, intervals, options)
+        # The next round may take three times as long.
+        if 3.0 * solved.report.wall_time > deadline.left:
+            return _COARSER
+        allowed = [np.diff(own.breaks) >= 2.0 * shortest for own in program.phases]
+        chosen = allowed if is_settled else _choose_intervals(solved, allowed)
+        pairs = zip(program.phases, chosen, strict=True)
+        points = spline.points_per_interval
+        finer, x = _transfer(solved, [_halve(*pair, points) for pair in pairs])
         if finer.variables > _MOST_VARIABLES:
-            return _UNDONE
+            return _COARSER
         return None if finer.variables == program.variables else (finer, x)
 
     attempt = attempt_once(solve, accept_early_end=True)
-    return improve(solved, [halve] * _MOST_ROUNDS, attempt)
+    return improve(solved, [halve] * 20, attempt)
 
 
-def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.ndarray]:
-    """Intervals of every phase that lose most time and are long enough to be halved, ascending."""
-    whole = program.end_time(x)
+def _choose_intervals(
+    solved: SolvedProgram, allowed: Sequence[np.ndarray]
+) -> Sequence[np.ndarray]:
+    """Choose among the intervals of every phase those that lose most time, and 60 % of all that is lost."""
+    x = solved.x
     try:
-        lost = [
-            _lost(phase, part) * (part[0] / whole) * _can_be_halved(phase, options)
-            for phase, part in program.split(x)
-        ]
+        losses = [_loss(*pair) for pair in solved.program.split(x)]
     except UnreachableError:  # between the collocation points
-        return _every_interval(program)
-    together = np.concatenate(lost)
-    order = np.argsort(-together, kind="stable")
-    most = np.searchsorted(np.cumsum(together[order]), _SHARE * together.sum()) + 1
-    chosen = np.isin(np.arange(len(together)), order[:most])
-    return [
-        np.flatnonzero(own)
-        for own in np.split(chosen, np.cumsum([len(own) for own in lost])[:-1])
-    ]
+        return allowed
+    pairs = zip(losses, allowed, strict=True)
+    lost = np.concatenate([loss * mask for loss, mask in pairs])
+    order = np.argsort(-lost, kind="stable")
+    most = np.searchsorted(np.cumsum(lost[order]), 0.6 * lost.sum()) + 1
+    chosen = np.zeros(len(lost), dtype=bool)
+    chosen[order[:most]] = True
+    ends = np.cumsum([len(loss) for loss in losses])
+    parts = np.split(chosen, ends[:-1])
+    return [part & mask for part, mask in zip(parts, allowed, strict=True)]
 
 
-def _lost(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Part of the duration that each interval loses, (N,): how far as many limits as there are curves swing."""
+def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
+    """Time that each interval loses, (N,), s: how far as many limits as there are curves swing within it."""
     breaks = phase.breaks
-    ratios = np.abs(phase.with_grid(spread(breaks, _SAMPLES)).time_scaling_ratios(x))
+    samples = 8
+    ratios = np.abs(phase.with_points(spread(breaks, samples)).time_scaling_ratios(x))
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :].clip(max=1.0)
-    within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[
-        ::_SAMPLES
-    ]
-    return np.asarray(np.ptp(within, axis=2).sum(axis=1) * np.diff(breaks))
+    windows = np.lib.stride_tricks.sliding_window_view(slack, samples + 1, axis=0)
+    swing = np.ptp(windows[::samples], axis=2).sum(axis=1)
+    return np.asarray(swing * np.diff(breaks) * x[0])
 
 
-def _every_interval(program: Program) -> list[np.ndarray]:
-    return [np.arange(phase.intervals) for phase in program.phases]
-
-
-def _halved(
-    program: Program, x: np.ndarray, intervals: list[np.ndarray], options: MeshOptions
-) -> tuple[Program, np.ndarray]:
-    """Halve intervals of every phase: the finer program, and the same motion as its point."""
-    pairs = zip(program.phases, intervals, strict=True)
-    finer = program.with_phases(
-        _with_halves(phase, own, options) for phase, own in pairs
-    )
-    motions = zip(program.motions(x), finer.phases, strict=True)
-    return finer, finer.variables_from(
-        [motion.over(phase.knots) for motion, phase in motions]
-    )
-
-
-def _can_be_halved(phase: Phase, options: MeshOptions) -> np.ndarray:
-    """Tell of every interval, (N,), whether its halves are long enough."""
-    return np.diff(phase.breaks) >= 2.0 * max(_SHORTEST * options.tolerance, SHORTEST)
-
-
-def _with_halves(phase: Phase, intervals: np.ndarray, options: MeshOptions) -> Phase:
+def _halve(phase: Phase, chosen: np.ndarray, points: int) -> Phase:
+    """Halve the chosen intervals, (N,), and add collocation points, so many an interval."""
     breaks = phase.breaks
-    intervals = intervals[_can_be_halved(phase, options)[intervals]]
-    finer = np.union1d(breaks, 0.5 * (breaks[intervals] + breaks[intervals + 1]))
-    return phase.with_knots(
-        clamped_knots(phase.degree, finer),
-        merged(phase, spread(finer, options.points_per_interval)),
-    )
+    middles = 0.5 * (breaks[:-1] + breaks[1:])
+    finer = np.union1d(breaks, middles[chosen])
+    t_norm = merge_points(phase, spread(finer, points))
+    return phase.with_knots(clamped_knots(phase.degree, finer), t_norm)
 
 
-_ROUNDS = 5
 _BEYOND_LIMITS = 1e9
 """Stands for the end time of motions beyond the limits, s: any motion within them is better."""
-_WORTH_IT = 2e-4
-"""Knots are moved again as long as that shortens the motion by this part of it."""
 
 
 def optimise_knots(
@@ -310,7 +257,7 @@ def optimise_knots(
         With knots fixed where they are best; the given program if moving them led to no motion within the limits.
     """
     most = max(phase.intervals for phase in solved.program.phases)
-    shortest = max(shortest, SHORTEST * most)
+    shortest = max(shortest, _SHORTEST * most)
 
     def free_knots(solved: SolvedProgram) -> tuple[Program, np.ndarray]:
         free = solved.program.with_free_knots(shortest)
@@ -318,7 +265,7 @@ def optimise_knots(
 
     def move_fix_and_refine(free: Program, x: np.ndarray) -> SolvedProgram:
         moved = solve(free, x)
-        fixed, start = free.frozen(moved.x)
+        fixed, start = free.fix_knots(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
         report = with_early_end_accepted(solve(fixed, start), free.end_time(x))
         refined = refine(fixed, report, solve, refinement)
@@ -333,18 +280,16 @@ def optimise_knots(
 
     best = improve(
         solved,
-        [free_knots] * _ROUNDS,
+        [free_knots] * 5,
         move_fix_and_refine,
         least_gain=0.0,
-        go_on_above=_WORTH_IT,
+        go_on_above=2e-4,
         judge=judge,
         deadline=refinement.deadline,
     )
-    not_completed = (
-        "the knots were not moved as far as that pays"
-        if refinement.deadline.passed
-        else ""
-    )
+    not_completed = ""
+    if refinement.deadline.passed:
+        not_completed = "the knots were not moved as far as that pays"
     if judge(best) < _BEYOND_LIMITS:
         return SolvedProgram(best.program, best.reports, not_completed)
     reports = with_last(solved.report, best.reports)
@@ -386,8 +331,7 @@ def adapt_mesh(
     if spline.knots == "free":
         adapted = optimise_knots(last, solve, spline.shortest_interval, refinement)
     elif spline.intervals == "auto":
-        options = MeshOptions(spline.tolerance, spline.points_per_interval)
-        adapted = refine_mesh(last, solve, options, refinement.deadline)
+        adapted = refine_mesh(last, solve, spline, refinement.deadline)
     else:
         adapted = last
     messages = filter(None, (nested.not_completed, adapted.not_completed))

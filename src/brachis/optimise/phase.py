@@ -6,17 +6,12 @@ see `layout`. With basis matrices B, B', B'' in normalised time,
     dy/dc = B,  dydot/dc = B' / T,  dyddot/dc = B'' / T^2,  dydot/dT = -ydot / T,  dyddot/dT = -2 yddot / T
     dy/dh = dB/dh c,  dydot/dh = dB'/dh c / T,  dyddot/dh = dB''/dh c / T^2,  and so on
 
-and a limit with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
-d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from the joint map; one that asks for the
-jerk likewise (`chain`, `joint_map`).
-
-A point of a phase as curves over time.
+Slopes of the limits by y and its derivatives come from the `evaluator`.
 """
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,10 +22,30 @@ from brachis.limits import Limit, Partials, Role
 from brachis.limits.safeguards import MARGIN, build_branch_margins
 from brachis.optimise.boundary import Boundary, LocalBasis
 from brachis.optimise.bspline import insert_knots
-from brachis.optimise.grid import FixedGrid, FreeGrid, Grid
-from brachis.optimise.layout import Layout, batches, chain, height
+from brachis.optimise.evaluator import Evaluation, Evaluator
+from brachis.optimise.grid import FixedGrid, FreeGrid
+from brachis.optimise.layout import Layout
 
-_BISECTIONS = 45
+
+def bisect(
+    is_before: Callable[[np.ndarray], np.ndarray], end: np.ndarray
+) -> np.ndarray:
+    """Find numbers between 0 and `end`, (P,), up to which a condition holds.
+
+    Parameters
+    ----------
+    is_before : callable
+        Tells of trial numbers, (P,), whether they come before the ones that are sought.
+    end : (P,) ndarray
+    """
+    low = np.zeros(len(end))
+    high = end
+    for _ in range(45 if len(end) else 0):  # to 3e-14 of the end
+        middle = 0.5 * (low + high)
+        before = is_before(middle)
+        low = np.where(before, middle, low)
+        high = np.where(before, high, middle)
+    return np.asarray(0.5 * (low + high))
 
 
 def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
@@ -71,23 +86,21 @@ class Motion(Summary):
         basis = LocalBasis.of(self.knots, self.degree, t / self.t_end)
         return per_second(basis.curves(self.control_points), self.t_end)
 
-    def over(self, knots: np.ndarray) -> Motion:
+    def with_knots(self, knots: np.ndarray) -> Motion:
         """Return the same curves over a clamped knot vector that contains the present one."""
         points = insert_knots(self.control_points, self.knots, knots, self.degree)
         return Motion(self.t_end, knots, self.degree, points)
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-        low = np.zeros(len(s))
-        high = np.full(len(s), self.t_end)
-        for _ in range(_BISECTIONS if len(s) else 0):
-            middle = 0.5 * (low + high)
-            order = np.argsort(middle, kind="stable")
+
+        def is_before(t: np.ndarray) -> np.ndarray:
+            order = np.argsort(t, kind="stable")
             before = np.empty(len(s), dtype=bool)
-            before[order] = self.at(middle[order])[0][:, 0] < s[order]
-            low = np.where(before, middle, low)
-            high = np.where(before, high, middle)
-        return 0.5 * (low + high)
+            before[order] = self.at(t[order])[0][:, 0] < s[order]
+            return before
+
+        return bisect(is_before, np.full(len(s), self.t_end))
 
 
 class Phase:
@@ -97,10 +110,13 @@ class Phase:
     ----------
     joint_map : JointMap
     limits : sequence of Limit
-        Of robot, process and scene; safeguards of the joint map are added.
-    grid : Grid
-        Knots and collocation points.
+        Of robot, process and scene.
+    grid : FixedGrid
+        Knots and collocation points; the knots are variables with a `FreeGrid`.
     boundary : Boundary
+    margin : float or None, optional
+        Least branch margin, where the joint map has one: a safeguard that is added to the limits. None: nothing is
+        added.
 
     Attributes
     ----------
@@ -108,6 +124,8 @@ class Phase:
         As given.
     limits : tuple of Limit
         Those given, then the safeguards.
+    evaluator : Evaluator
+        Of joint map and limits.
     splines : tuple of BoundarySpline
         Of each curve.
     slices : tuple of slice
@@ -125,25 +143,22 @@ class Phase:
         self,
         joint_map: JointMap,
         limits: Sequence[Limit],
-        grid: Grid,
+        grid: FixedGrid,
         boundary: Boundary,
+        *,
+        margin: float | None = MARGIN,
     ) -> None:
+        safeguards = () if margin is None else build_branch_margins(joint_map, margin)
         self.joint_map = joint_map
-        self.limits = (*limits, *build_branch_margins(joint_map, MARGIN))
-        self._lay_out(grid, boundary)
-
-    def _lay_out(self, grid: Grid, boundary: Boundary) -> None:
-        """Set grid and boundary conditions, and all that depends on them."""
+        self.limits = (*limits, *safeguards)
+        self.evaluator = Evaluator(joint_map, self.limits)
         self.grid = grid
         self.boundary = boundary
         self.splines = boundary.splines(grid.knots, grid.degree)
-        layout = Layout.of(
-            grid, self.splines, self.limits, path=self.joint_map.path is not None
-        )
+        has_path = joint_map.path is not None
+        layout = Layout.of(grid, self.splines, self.limits, has_path=has_path)
+        self._layout = layout
         self.slices = layout.slices
-        self._lengths = layout.lengths
-        self._places = layout.places
-        self._progress = layout.progress
         self.x_lower = layout.x_lower
         self.x_upper = layout.x_upper
         self.lower = layout.lower
@@ -151,47 +166,43 @@ class Phase:
         self.jacobian_rows = layout.jacobian_rows
         self.jacobian_columns = layout.jacobian_columns
         self._entries: tuple[LocalBasis, list[np.ndarray]] | None = None
-        self._last: tuple[bytes, JointState] | None = None
+        self._last: tuple[bytes, Evaluation] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
 
-    def over(self, grid: Grid, boundary: Boundary | None = None) -> Phase:
+    def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
         """Return the same phase over another grid, and with other boundary conditions where they are given."""
-        other = copy.copy(self)
-        other._lay_out(grid, boundary or self.boundary)  # noqa: SLF001  (its own class)
-        return other
+        boundary = boundary or self.boundary
+        return Phase(self.joint_map, self.limits, grid, boundary, margin=None)
 
-    def with_grid(self, t_norm: np.ndarray) -> Phase:
+    def with_points(self, t_norm: np.ndarray) -> Phase:
         """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
         return self.with_knots(self.knots, t_norm)
 
     def with_knots(self, knots: np.ndarray, t_norm: np.ndarray) -> Phase:
         """Return the same phase over other fixed knots, with collocation points `t_norm`, ascending from 0 to 1.
 
-        Where `knots` contain the present ones, ``variables_from(before.motion(x).over(knots))`` is the same motion.
+        Where `knots` contain the present ones, ``variables_from(before.motion(x).with_knots(knots))`` is the same
+        motion.
         """
-        return self.over(FixedGrid(knots, self.degree, t_norm))
+        return self.with_grid(FixedGrid(knots, self.degree, t_norm))
 
     def with_free_knots(self, shortest: float) -> Phase:
         """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals."""
-        return self.over(
-            FreeGrid(self.knots, self.degree, self.t_norm, shortest / self.intervals)
-        )
+        shortest = shortest / self.intervals
+        return self.with_grid(FreeGrid(self.knots, self.degree, self.t_norm, shortest))
 
-    def frozen(self, x: np.ndarray) -> Phase:
+    def fix_knots(self, x: np.ndarray) -> Phase:
         """Return the phase with its knots fixed where they are at x."""
-        return self.over(self.grid.frozen(x[self._lengths]))
+        return self.with_grid(self.grid.fix(self._h(x)))
 
-    def with_limits(self, limits: tuple[Limit, ...]) -> Phase:
+    def with_limits(self, limits: Sequence[Limit]) -> Phase:
         """Return the same phase with other limits, safeguards included; x keeps its meaning."""
-        other = copy.copy(self)
-        other.limits = limits
-        other._lay_out(self.grid, self.boundary)  # noqa: SLF001  (its own class)
-        return other
+        return Phase(self.joint_map, limits, self.grid, self.boundary, margin=None)
 
     def with_margin(self, margin: float) -> Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""
-        own = tuple(limit for limit in self.limits if limit.role is not Role.SAFEGUARD)
-        return self.with_limits((*own, *build_branch_margins(self.joint_map, margin)))
+        own = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
+        return self.with_limits([*own, *build_branch_margins(self.joint_map, margin)])
 
     @property
     def variables(self) -> int:
@@ -205,13 +216,13 @@ class Phase:
 
     @property
     def knots(self) -> np.ndarray:
-        """Clamped knot vector; see `Grid`."""
+        """Clamped knot vector; see `FixedGrid`."""
         return self.grid.knots
 
     @property
     def breaks(self) -> np.ndarray:
         """Ends of the knot intervals in normalised time, (N + 1,)."""
-        return self.knots[self.degree : len(self.knots) - self.degree]
+        return self.grid.breaks
 
     @property
     def jumps(self) -> np.ndarray:
@@ -222,32 +233,30 @@ class Phase:
     @property
     def intervals(self) -> int:
         """Number of knot intervals, N."""
-        return len(self.knots) - 2 * self.degree - 1
+        return len(self.breaks) - 1
 
     @property
     def t_norm(self) -> np.ndarray:
-        """Collocation points in normalised time, (K,); see `Grid`."""
+        """Collocation points in normalised time, (K,); see `FixedGrid`."""
         return self.grid.t_norm
+
+    def _h(self, x: np.ndarray) -> np.ndarray:
+        """Interval lengths that are variables; empty where the knots are fixed."""
+        return x[self._layout.lengths]
 
     def end_variables(self, point: int) -> np.ndarray:
         """Variables that are the curves' values at the start (`point` 0) or end (-1), (c,); -1 where fixed."""
-        pairs = zip(self.splines, self.slices, strict=True)
-        found = ((int(spline.variable[point, 0]), part.start) for spline, part in pairs)
-        return np.array(
-            [first + own if own >= 0 else -1 for own, first in found], dtype=int
-        )
+        own = np.array([spline.end_variable(point) for spline in self.splines])
+        first = np.array([part.start for part in self.slices])
+        return np.where(own >= 0, first + own, -1)
 
     def motion(self, x: np.ndarray) -> Motion:
         """Curves that belong to x."""
-        h = x[self._lengths]
+        h = self._h(x)
         # Should the lengths add up to a little more or less than 1, so much longer or shorter is the motion.
-        span = self.grid.t_norm_at(h)[-1]
-        return Motion(
-            float(x[0] * span),
-            self.grid.knots_at(h),
-            self.degree,
-            self._control_points(x),
-        )
+        t_end = float(x[0] * self.grid.t_norm_at(h)[-1])
+        points = self._control_points(x)
+        return Motion(t_end, self.grid.knots_at(h), self.degree, points)
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
@@ -260,12 +269,11 @@ class Phase:
         """Point x nearest to given curves over the same knots, or over as many where these are free."""
         pairs = zip(self.splines, motion.control_points, strict=True)
         free = [spline.free_from(points, motion.t_end) for spline, points in pairs]
-        return np.concatenate(
-            [[motion.t_end], *free, self.grid.lengths_of(motion.knots)]
-        )
+        h = self.grid.lengths_of(motion.knots)
+        return np.concatenate([[motion.t_end], *free, h])
 
-    def state(self, x: np.ndarray) -> JointState:
-        """Joint motion at the collocation points; kept until x changes, so that rows and Jacobian share it.
+    def evaluate(self, x: np.ndarray) -> Evaluation:
+        """Joint motion and limits at the collocation points; kept until x changes, so that rows and Jacobian share it.
 
         Raises
         ------
@@ -275,30 +283,33 @@ class Phase:
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self.evaluations["states"] += 1
-            h = x[self._lengths]
-            curves = per_second(
-                self.grid.basis(h).curves(self._control_points(x)), x[0]
-            )
-            self._last = (
-                key,
-                self.joint_map.state(*curves, t=self.grid.t_norm_at(h) * x[0]),
-            )
+            h = self._h(x)
+            basis = self.grid.basis(h)
+            curves = per_second(basis.curves(self._control_points(x)), x[0])
+            t = self.grid.t_norm_at(h) * x[0]
+            self._last = (key, self.evaluator.evaluate(*curves, t=t))
         return self._last[1]
 
-    def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows, (c,); raises UnreachableError as `state` does."""
-        values = [self._held(limit, x).ravel() for limit in self.limits]
-        totals = np.full(len(self.grid.total), x[self._lengths].sum())
-        return np.concatenate([*values, self._progress.values(x), totals])
+    def state(self, x: np.ndarray) -> JointState:
+        """Joint motion at the collocation points; raises as `evaluate` does."""
+        return self.evaluate(x).motion
 
-    def _held(self, limit: Limit, x: np.ndarray) -> np.ndarray:
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of the rows, (c,); raises UnreachableError as `evaluate` does."""
+        values = [self._limit_values(limit, x).ravel() for limit in self.limits]
+        totals = np.full(len(self.grid.total), self._h(x).sum())
+        return np.concatenate([*values, self._layout.progress.values(x), totals])
+
+    def _number(self, limit: Limit) -> int:
+        """Place of a limit, the very object, among the phase's; raises ValueError where it has another one."""
+        return [id(each) for each in self.limits].index(id(limit))
+
+    def _limit_values(self, limit: Limit, x: np.ndarray) -> np.ndarray:
         """Values of a limit that are rows, (K, c), or (1, c) where their means are."""
-        values = limit.values(self.state(x))
-        return (
-            self.grid.mean_weights(x[self._lengths])[None] @ values
-            if limit.guarantee.is_mean
-            else values
-        )
+        values = self.evaluate(x).by_limit[self._number(limit)]
+        if limit.guarantee.is_mean:
+            return np.asarray(self.grid.mean_weights(self._h(x))[None] @ values)
+        return values
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
@@ -306,17 +317,12 @@ class Phase:
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of one of the limits, (K, c), or (1, c) where its means are rows."""
-        before = self.limits[: [each is limit for each in self.limits].index(True)]
-        count = len(self.t_norm)
-        first = sum(height(each, count) * len(each.lower) for each in before)
-        return first + np.arange(height(limit, count) * len(limit.lower)).reshape(
-            -1, len(limit.lower)
-        )
+        return self._layout.limit_rows[self._number(limit)]
 
     def violation_of_means(self, x: np.ndarray) -> float:
-        """How far the limits that hold over the whole motion are violated; -inf where there are none."""
+        """How far the limits that hold over the whole motion are violated; -inf without such limits."""
         means = [
-            limit.violation(self._held(limit, x)).max()
+            limit.violation(self._limit_values(limit, x)).max()
             for limit in self.limits
             if limit.guarantee.is_mean
         ]
@@ -325,61 +331,54 @@ class Phase:
     def violation(self, x: np.ndarray) -> np.ndarray:
         """How far the limits are violated at every collocation point, (K, c); negative inside.
 
-        Those that hold over the whole motion are left out. So are safeguards: falling a little short of one harms
-        nobody. Raises UnreachableError as `state` does.
+        Limits that hold over the whole motion are left out. So are safeguards, which are numerical and not physical.
+        Raises UnreachableError as `evaluate` does.
         """
-        return self._violation(self.state(x))
+        return self.evaluate(x).violation(_is_checked_at_points)
 
     def violation_at(self, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
         """As `violation`, at other normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
         motion = self.motion(x)
         known = self.state(x)
-        at = self.grid.t_norm_at(x[self._lengths])
+        at = self.grid.t_norm_at(self._h(x))
         place = np.clip(np.searchsorted(at, t_norm), 0, len(at) - 1)
-        near = (
-            known.q[place]
-            + known.qdot[place] * ((t_norm - at[place]) * motion.t_end)[:, None]
+        ahead = ((t_norm - at[place]) * motion.t_end)[:, None]
+        near = known.q[place] + known.qdot[place] * ahead
+        evaluation = self.evaluator.evaluate(
+            *motion.at(t_norm * motion.t_end), near=near
         )
-        return self._violation(
-            self.joint_map.state(*motion.at(t_norm * motion.t_end), near=near)
-        )
-
-    def _violation(self, state: JointState) -> np.ndarray:
-        own = [
-            limit
-            for limit in self.limits
-            if limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean
-        ]
-        return np.concatenate(
-            [limit.violation(limit.values(state)) for limit in own], axis=1
-        )
+        return evaluation.violation(_is_checked_at_points)
 
     def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
         """Ratios, (K, c), to the limits that a longer time relieves; see `Limit.ratio`.
 
-        Raises UnreachableError as `state` does.
+        Raises UnreachableError as `evaluate` does.
         """
         scaling = [limit for limit in self.limits if limit.longer_time == "relieves"]
-        ratios = [limit.ratio(self._held(limit, x)) for limit in scaling]
-        return np.concatenate(
-            [np.broadcast_to(own, (len(self.t_norm), own.shape[1])) for own in ratios],
-            axis=1,
+        ratios = [limit.ratio(self._limit_values(limit, x)) for limit in scaling]
+        count = len(self.t_norm)
+        return np.hstack(
+            [np.broadcast_to(own, (count, own.shape[1])) for own in ratios]
         )
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `state` does."""
+        """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""
         self.evaluations["jacobians"] += 1
-        entries = [
-            part.ravel()
-            for batch in batches(self.limits)
-            for part in self._of_rows(batch, x)
-        ]
-        return np.concatenate(
-            [*entries, self._progress.weight, np.ones(len(self.grid.lower))]
-        )
+        evaluation = self.evaluate(x)
+        is_mean = self.evaluator.is_mean
+        slopes = self._chain_rule(evaluation.slopes, x)
+        entries = [slopes[:, ~is_mean].ravel()]
+        if is_mean.any():
+            weights = self.grid.mean_weights(self._h(x))
+            of_means = self._sum_up(slopes[:, is_mean], weights)
+            values = evaluation.values[:, is_mean]
+            of_means[:, self._layout.lengths] += values.T @ self.grid.mean_slopes.T
+            entries.append(of_means.ravel())
+        of_total = np.ones(len(self.grid.lower))
+        return np.concatenate([*entries, self._layout.progress.weight, of_total])
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
-        """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `state` does.
+        """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `evaluate` does.
 
         Parameters
         ----------
@@ -387,95 +386,55 @@ class Phase:
             Of its terms with respect to the joints, one term a point: (K, 1, n).
         x : (v,) ndarray
         """
-        return self._summed(
-            list(self._chained([partials], x)), np.ones(len(self.t_norm))
-        )[0]
+        slopes = self._chain_rule(self.evaluate(x).chain(partials), x)
+        return self._sum_up(slopes, np.ones(len(self.t_norm)))[0]
 
-    def _of_rows(self, batch: Sequence[Limit], x: np.ndarray) -> list[np.ndarray]:
-        """Entries of the rows of limits that are differentiated together."""
-        state = self.state(x)
-        slopes = list(self._chained([limit.partials(state) for limit in batch], x))
-        if not batch[0].guarantee.is_mean:
-            return slopes
-        entries = self._summed(slopes, self.grid.mean_weights(x[self._lengths]))
-        values = np.concatenate([limit.values(state) for limit in batch], axis=1)
-        entries[:, self._lengths] += values.T @ self.grid.mean_slopes.T
-        return [entries]
-
-    def _summed(self, slopes: Sequence[np.ndarray], weights: np.ndarray) -> np.ndarray:
-        """Add up what `_chained` gives over the collocation points, with weights (K,): (c, v)."""
-        points = [
-            np.arange(len(self.t_norm)),
-            *(place.point for place in self._places),
-            self.grid.point,
-        ]
-        of_curves = [
-            place.variable + part.start
-            for place, part in zip(self._places, self.slices, strict=True)
-        ]
-        variables = [
-            np.zeros_like(points[0]),
-            *of_curves,
-            self.grid.variable + self._lengths.start,
-        ]
-        terms = np.concatenate(slopes) * weights[np.concatenate(points)][:, None]
+    def _sum_up(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Add up slopes, (z, c), over the collocation points, with weights (K,): (c, v)."""
+        terms = slopes * weights[self._layout.point][:, None]
+        variable = self._layout.variable
         return np.array(
-            [
-                np.bincount(np.concatenate(variables), term, self.variables)
-                for term in terms.T
-            ]
+            [np.bincount(variable, term, self.variables) for term in terms.T]
         )
 
-    def _chained(
-        self, functions: Sequence[Partials], x: np.ndarray
-    ) -> Iterator[np.ndarray]:
-        """Differentiate functions of the joint motion by T, each curve's variables and h, (places, c) all together."""
-        state = self.state(x)
-        each = [chain(partials, state) for partials in functions]
-        orders = max(
-            len(parts) for parts in each
-        )  # up to the derivative of the curves that any function asks for
-        padded = (
-            (*parts, *[np.zeros_like(parts[0])] * (orders - len(parts)))
-            for parts in each
-        )
-        by = [np.concatenate(parts, axis=1) for parts in zip(*padded, strict=True)]
-        slopes = per_second(
-            self.grid.slopes(x[self._lengths], self._control_points(x))[:orders], x[0]
-        )
-        drifts = zip(by, self._drifts(x), strict=False)
-        yield np.asarray(
-            sum(np.einsum("kcj,kj->kc", part, drift) for part, drift in drifts)
-        )
-        for j, (places, basis) in enumerate(
-            zip(self._places, self._bases(x), strict=True)
-        ):
+    def _chain_rule(self, by: Sequence[np.ndarray], x: np.ndarray) -> np.ndarray:
+        """Turn slopes by y, ydot, ..., (K, c, 1 + r) each, into slopes by T, each curve's variables and h, (z, c)."""
+        orders = len(by)
+        pairs = zip(by, self._by_duration(x), strict=False)
+        of_time = sum(np.einsum("kcj,kj->kc", slope, own) for slope, own in pairs)
+        of_curves = []
+        bases = zip(self._layout.patterns, self._bases(x), strict=True)
+        for j, (pattern, basis) in enumerate(bases):
             values = per_second(basis[:orders], x[0])
             parts = (
-                part[places.point, :, j] * own[:, None]
-                for part, own in zip(by, values, strict=True)
+                slope[pattern.point, :, j] * own[:, None]
+                for slope, own in zip(by, values, strict=True)
             )
-            yield sum(parts, start=np.zeros(()))
-        yield (
-            np.concatenate(by, axis=2)[self.grid.point] @ np.hstack(slopes)[:, :, None]
-        )[:, :, 0]
+            of_curves.append(sum(parts, start=np.zeros(())))
+        by_h = self.grid.slopes(self._h(x), self._control_points(x))[:orders]
+        together = np.concatenate(by, axis=2)[self.grid.point]
+        of_lengths = together @ np.hstack(per_second(by_h, x[0]))[:, :, None]
+        return np.concatenate([of_time, *of_curves, of_lengths[:, :, 0]])
 
-    def _drifts(self, x: np.ndarray) -> list[np.ndarray]:
-        """Differentiate the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
+    def _by_duration(self, x: np.ndarray) -> list[np.ndarray]:
+        """Slopes of the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
         state = self.state(x)
         rates = np.array([spline.rate for spline in self.splines])
-        moving = per_second(self.grid.basis(x[self._lengths]).curves(rates), x[0])
-        orders = enumerate(
-            zip(moving, (state.y, state.ydot, state.yddot, state.ydddot), strict=True)
-        )
-        return [rate - order / x[0] * part for order, (rate, part) in orders]
+        moving = per_second(self.grid.basis(self._h(x)).curves(rates), x[0])
+        curves = (state.y, state.ydot, state.yddot, state.ydddot)
+        pairs = zip(moving, curves, strict=True)
+        return [rate - i / x[0] * part for i, (rate, part) in enumerate(pairs)]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
-        """Basis functions of every curve's free variables, (3, z) each; computed anew where the grid's change."""
-        basis = self.grid.basis(x[self._lengths])
+        """Basis functions of every curve's free variables, (4, z) each; computed anew where the grid's change."""
+        basis = self.grid.basis(self._h(x))
         if self._entries is None or self._entries[0] is not basis:
-            self._entries = (
-                basis,
-                [places.entries(basis.values) for places in self._places],
-            )
+            patterns = self._layout.patterns
+            own = [pattern.entries(basis.values) for pattern in patterns]
+            self._entries = (basis, own)
         return self._entries[1]
+
+
+def _is_checked_at_points(limit: Limit) -> bool:
+    """Tell whether a violation of the limit counts at single points."""
+    return limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean

@@ -5,11 +5,7 @@
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
 Rows are those of the phases, one phase after the other, then those of the links. Most motions have one phase and no
-links. See `phase` for what a phase is.
-
-What a program minimises: a sum over its phases.
-
-Where phases join: the end of one is the start of another, and both rest there.
+links; see `phase`. The objective is a sum over the phases. Where a link joins two phases, both rest.
 """
 
 from __future__ import annotations
@@ -55,11 +51,11 @@ class EndTime:
     longest: float = np.inf
 
     def value(self, _phase: Phase, x: np.ndarray) -> float:
-        """See `Objective`."""
+        """Duration of a phase, s."""
         return float(x[0])
 
     def gradient(self, _phase: Phase, x: np.ndarray) -> np.ndarray:
-        """See `Objective`."""
+        """1 for the duration, which is the first variable, else 0."""
         unit = np.zeros(len(x))
         unit[0] = 1.0
         return unit
@@ -81,12 +77,12 @@ class LeastAcceleration:
     longest: np.ndarray
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
-        """See `Objective`; raises UnreachableError as `Phase.state` does."""
+        """Mean over a phase; raises UnreachableError as `Phase.evaluate` does."""
         squares = (phase.state(x).qddot * self.weights) ** 2
         return float(_shares(phase) @ squares.sum(axis=1))
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """See `Objective`; raises UnreachableError as `Phase.state` does."""
+        """Gradient of the mean, (v,); raises UnreachableError as `Phase.evaluate` does."""
         slopes = 2.0 * _shares(phase)[:, None] * self.weights**2 * phase.state(x).qddot
         return phase.gradient(Partials(qddot=slopes[:, None]), x)
 
@@ -124,12 +120,8 @@ class Link:
     def rows(self, states: Sequence[JointState]) -> np.ndarray:
         """Values of the rows, (j,), from the states of all phases at their collocation points."""
         joints = list(self.joints)
-        return np.asarray(
-            sum(
-                sign * states[phase].q[point, joints]
-                for phase, point, sign in self._sides
-            )
-        )
+        last = states[self.before].q[-1, joints]
+        return np.asarray(last - states[self.after].q[0, joints])
 
     def pattern(
         self, phases: Sequence[Phase], first: Sequence[int]
@@ -143,29 +135,24 @@ class Link:
         first : sequence of int
             Where the variables of each one begin.
         """
-        variables = [
-            _free(phases[phase], point)[1] + first[phase]
-            for phase, point, _ in self._sides
-        ]
-        rows = [np.repeat(np.arange(len(self.joints)), len(own)) for own in variables]
-        return np.concatenate(rows), np.concatenate(
-            [np.tile(own, len(self.joints)) for own in variables]
-        )
+        rows = []
+        columns = []
+        for phase, point, _ in self._sides:
+            _, variables = _free(phases[phase], point)
+            rows.append(np.repeat(np.arange(len(self.joints)), len(variables)))
+            columns.append(np.tile(variables + first[phase], len(self.joints)))
+        return np.concatenate(rows), np.concatenate(columns)
 
     def jacobian(
         self, phases: Sequence[Phase], states: Sequence[JointState]
     ) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,): the joint maps' gradients at the ends."""
-        joints = list(self.joints)
-        return np.concatenate(
-            [
-                sign
-                * states[phase]
-                .gradient[point][joints][:, _free(phases[phase], point)[0]]
-                .ravel()
-                for phase, point, sign in self._sides
-            ]
-        )
+        entries = []
+        for phase, point, sign in self._sides:
+            free, _ = _free(phases[phase], point)
+            slopes = states[phase].gradient[point][list(self.joints)]
+            entries.append(sign * slopes[:, free].ravel())
+        return np.concatenate(entries)
 
 
 def _free(phase: Phase, point: int) -> tuple[np.ndarray, np.ndarray]:
@@ -225,19 +212,16 @@ class Program(Summary):
         joined = np.zeros(sum(len(link.joints) for link in self.links))
         self.lower = np.concatenate([*(phase.lower for phase in self.phases), joined])
         self.upper = np.concatenate([*(phase.upper for phase in self.phases), joined])
-        pairs = zip(self.phases, first[:-1], strict=True)
         patterns = [
-            (phase.jacobian_rows, phase.jacobian_columns + a) for phase, a in pairs
+            (phase.jacobian_rows, phase.jacobian_columns + a)
+            for phase, a in zip(self.phases, self._durations, strict=True)
         ]
         patterns += [link.pattern(self.phases, first) for link in self.links]
-        heights = [
-            *(len(phase.lower) for phase in self.phases),
-            *(len(link.joints) for link in self.links),
-        ]
+        heights = [len(phase.lower) for phase in self.phases]
+        heights += [len(link.joints) for link in self.links]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
-        self.jacobian_rows = np.concatenate(
-            [rows + a for (rows, _), a in zip(patterns, self._first_rows, strict=True)]
-        )
+        pairs = zip(patterns, self._first_rows, strict=True)
+        self.jacobian_rows = np.concatenate([rows + a for (rows, _), a in pairs])
         self.jacobian_columns = np.concatenate([columns for _, columns in patterns])
 
     @property
@@ -257,10 +241,8 @@ class Program(Summary):
 
     def split(self, x: np.ndarray) -> list[tuple[Phase, np.ndarray]]:
         """Every phase, and its part of x."""
-        return [
-            (phase, x[part])
-            for phase, part in zip(self.phases, self._parts, strict=True)
-        ]
+        pairs = zip(self.phases, self._parts, strict=True)
+        return [(phase, x[part]) for phase, part in pairs]
 
     def end_time(self, x: np.ndarray) -> float:
         """End time t_E, s: the sum of the durations."""
@@ -284,7 +266,7 @@ class Program(Summary):
             [self.minimised.gradient(phase, part) for phase, part in self.split(x)]
         )
 
-    def minimising(self, objective: Objective) -> Program:
+    def with_objective(self, objective: Objective) -> Program:
         """Return the same program with another objective."""
         return Program(self.phases, self.links, objective)
 
@@ -317,17 +299,13 @@ class Program(Summary):
     @property
     def limits(self) -> tuple[Limit, ...]:
         """The limits of all phases, safeguards included, each once."""
-        return tuple(
-            {
-                id(limit): limit for phase in self.phases for limit in phase.limits
-            }.values()
-        )
+        each = {id(limit): limit for phase in self.phases for limit in phase.limits}
+        return tuple(each.values())
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it."""
-        pairs = zip(
-            self.phases, self._first_rows, strict=False
-        )  # the links' rows come behind
+        # The links' rows come behind.
+        pairs = zip(self.phases, self._first_rows, strict=False)
         return np.concatenate(
             [first + phase.rows_of(limit) for phase, first in pairs if phase.has(limit)]
         )
@@ -345,11 +323,10 @@ class Program(Summary):
         """Return the program with other phases for the present ones, all else as it is."""
         return Program(phases, self.links, self.minimised)
 
-    def with_grid(self, t_norm: Sequence[np.ndarray]) -> Program:
-        """Return the same program with other collocation points of every phase; see `Phase.resampled`."""
-        return self.with_phases(
-            phase.with_grid(own) for phase, own in zip(self.phases, t_norm, strict=True)
-        )
+    def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
+        """Return the same program with other collocation points of every phase; see `Phase.with_points`."""
+        pairs = zip(self.phases, t_norm, strict=True)
+        return self.with_phases(phase.with_points(own) for phase, own in pairs)
 
     def with_free_knots(self, shortest: float) -> Program:
         """Return the same program with interval lengths as variables; see `Phase.with_free_knots`."""
@@ -357,17 +334,15 @@ class Program(Summary):
             phase.with_free_knots(shortest) for phase in self.phases
         )
 
-    def frozen(self, x: np.ndarray) -> tuple[Program, np.ndarray]:
+    def fix_knots(self, x: np.ndarray) -> tuple[Program, np.ndarray]:
         """Return the program with its knots fixed where they are at x, and the same motion as its point x."""
-        other = self.with_phases(phase.frozen(part) for phase, part in self.split(x))
+        other = self.with_phases(phase.fix_knots(part) for phase, part in self.split(x))
         return other, other.variables_from(self.motions(x))
 
-    def up_to(self, order: int) -> Program:
+    def without_orders_above(self, order: int) -> Program:
         """Return the same program without limits that ask for a higher derivative; x keeps its meaning."""
         return self.with_phases(
-            phase.with_limits(
-                tuple(limit for limit in phase.limits if limit.order <= order)
-            )
+            phase.with_limits([limit for limit in phase.limits if limit.order <= order])
             for phase in self.phases
         )
 
@@ -380,7 +355,7 @@ class Program(Summary):
         other = limit.relax(bound, amount)
         return self.with_phases(
             phase.with_limits(
-                tuple(other if each is limit else each for each in phase.limits)
+                [other if each is limit else each for each in phase.limits]
             )
             for phase in self.phases
         )
@@ -388,18 +363,20 @@ class Program(Summary):
     @property
     def safeguard_bounds(self) -> tuple[float, ...]:
         """Least values of the safeguards in force: branch margins."""
-        own = (limit for limit in self.limits if limit.role is Role.SAFEGUARD)
+        own = filter(_is_safeguard, self.limits)
         return tuple(float(bound) for limit in own for bound in limit.lower)
 
     def safeguard_slack(self, x: np.ndarray) -> float:
-        """Smallest distance of a safeguard from its bound; infinite where there is none.
+        """Smallest distance of a safeguard from its bound; infinite without safeguards.
 
         Raises UnreachableError as `states` does.
         """
-        slacks = [
-            (limit.values(phase.state(part)) - limit.lower).min()
+        violations = [
+            phase.evaluate(part).violation(_is_safeguard)
             for phase, part in self.split(x)
-            for limit in phase.limits
-            if limit.role is Role.SAFEGUARD
         ]
-        return float(min(slacks, default=np.inf))
+        return -float(max(own.max(initial=-np.inf) for own in violations))
+
+
+def _is_safeguard(limit: Limit) -> bool:
+    return limit.role is Role.SAFEGUARD

@@ -24,7 +24,7 @@ from brachis.kinematics import JointState
 from brachis.optimise.backends import SolverReport
 from brachis.optimise.bspline import spread
 from brachis.optimise.improve import Solve, SolvedProgram
-from brachis.optimise.phase import Phase
+from brachis.optimise.phase import Phase, bisect
 from brachis.optimise.program import Program
 from brachis.robot import Friction
 
@@ -32,7 +32,6 @@ _LEVELS = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
 """Velocities, in widths of the friction, that are looked for: at 7 all but 2e-6 of it is there."""
 _NEAR_REVERSALS = 10.0
 """A velocity that turns within so many widths of zero is looked at as well."""
-_BISECTIONS = 40
 
 
 def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.ndarray:
@@ -54,63 +53,46 @@ def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.nd
     rubbing = np.flatnonzero(friction.coulomb > 0.0)
     if not len(rubbing):
         return np.empty(0)
-    speed = state.qdot[:, rubbing] / friction.v_eps[rubbing]
     h = np.diff(times)[:, None]
+    speed = state.qdot[:, rubbing] / friction.v_eps[rubbing]
     gain = state.qddot[:, rubbing] / friction.v_eps[rubbing]
-    cubic = np.array(
-        [
-            speed[:-1],
-            speed[:-1] + h * gain[:-1] / 3.0,
-            speed[1:] - h * gain[1:] / 3.0,
-            speed[1:],
-        ]
+    second = speed[:-1] + h * gain[:-1] / 3.0
+    third = speed[1:] - h * gain[1:] / 3.0
+    cubic = np.array([speed[:-1], second, third, speed[1:]])
+    is_near = (cubic.min(axis=0) < _NEAR_REVERSALS) & (
+        cubic.max(axis=0) > -_NEAR_REVERSALS
     )
-    step, joint = np.nonzero(
-        (cubic.min(axis=0) < _NEAR_REVERSALS) & (cubic.max(axis=0) > -_NEAR_REVERSALS)
-    )
+    step, joint = np.nonzero(is_near)
     cubic = cubic[:, step, joint]
-    first = cubic[0, :, None] - _LEVELS
-    last = cubic[-1, :, None] - _LEVELS
-    which, level = np.nonzero(first * last < 0.0)
-    crossing = _place(cubic[:, which] - _LEVELS[level])
+    crosses = (cubic[0, :, None] - _LEVELS) * (cubic[-1, :, None] - _LEVELS) < 0.0
+    which, level = np.nonzero(crosses)
+    crossing = _root(cubic[:, which] - _LEVELS[level])
     slopes = np.diff(cubic, axis=0)
-    turns = np.flatnonzero(
-        (slopes[0] * slopes[-1] < 0.0) & (np.abs(cubic).min(axis=0) < _NEAR_REVERSALS)
-    )
-    which = np.append(which, turns)
-    u = np.append(crossing, _place(slopes[:, turns]))
-    return np.unique(times[step[which]] + u * h[step[which], 0])
+    is_low = np.abs(cubic).min(axis=0) < _NEAR_REVERSALS
+    turns = np.flatnonzero((slopes[0] * slopes[-1] < 0.0) & is_low)
+    u = np.append(crossing, _root(slopes[:, turns]))
+    steps = step[np.append(which, turns)]
+    return np.unique(times[steps] + u * h[steps, 0])
 
 
-def _place(c: np.ndarray) -> np.ndarray:
-    """Place in [0, 1] at which polynomials in Bernstein form, (m + 1, F), whose ends differ in sign are zero."""
-    low = np.zeros(c.shape[1])
-    high = np.ones(c.shape[1])
-    for _ in range(_BISECTIONS if c.size else 0):
-        middle = 0.5 * (low + high)
+def _root(c: np.ndarray) -> np.ndarray:
+    """Find where polynomials in Bernstein form on [0, 1], (m + 1, F), whose ends differ in sign are zero, (F,)."""
+
+    def is_before(u: np.ndarray) -> np.ndarray:
         value = c
         while len(value) > 1:  # de Casteljau
-            value = value[:-1] * (1.0 - middle) + value[1:] * middle
-        same = value[0] * c[0] > 0.0
-        low = np.where(same, middle, low)
-        high = np.where(same, high, middle)
-    return np.asarray(0.5 * (low + high))
+            value = value[:-1] * (1.0 - u) + value[1:] * u
+        return value[0] * c[0] > 0.0
+
+    return bisect(is_before, np.ones(c.shape[1]))
 
 
 _NEAR = 0.005
 """A violation may hide between grid points where the motion comes so near a limit, as a part of it."""
-_COARSE = 20.0
-"""Violations of so many times the goal are held down at the grid's points first."""
-_FINE, _ZOOMS = 9, 2
-"""Points of every finer grid around a peak, and how many such grids follow each other."""
-_PIECE_POINTS = 9
-_CLOSEST = 1e-5
-"""Collocation points are at least so far apart, in normalised time."""
 _SAME_TIME = 1e-9
+"""Normalised times that differ by less are the same knot or grid point, seen from its two sides."""
 _EVERYWHERE = slice(5, None, 10)
 """Of the dense grid's times: one more between neighbouring collocation points."""
-_JUST_BEFORE = 1e-7
-"""How long before a knot what jumps there is looked at, in normalised time."""
 _BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
 """Points around an abrupt change, in steps of the dense grid."""
 
@@ -120,7 +102,7 @@ def dense_grid(phase: Phase, density: int) -> np.ndarray:
     breaks = phase.breaks
     behind = np.searchsorted(phase.t_norm, breaks + _SAME_TIME)
     grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
-    return np.union1d(grid, phase.jumps - _JUST_BEFORE)
+    return np.union1d(grid, phase.jumps - 1e-7)  # just before what jumps there
 
 
 def violations(
@@ -130,67 +112,53 @@ def violations(
 
     Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
     """
-    found = [_of_phase(phase, part, goal) for phase, part in dense.split(x)]
-    return max(largest for largest, _ in found), [places for _, places in found]
+    found = [_check_phase(phase, part, goal) for phase, part in dense.split(x)]
+    return max(largest for largest, _ in found), [missing for _, missing in found]
 
 
-def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
+def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
     """Largest violation of a phase, and where points are missing."""
     t_norm = dense.t_norm
     try:
         table = dense.violation(x)
         of_means = dense.violation_of_means(x)
-        centres = _suspects(t_norm, table, dense.knots, goal - _NEAR)
-        heights = table.max(axis=1)[
-            np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)
-        ]
-        if (
-            table.max() > _COARSE * goal
-        ):  # the grid's own peaks will do until they are nearly held down
-            missing = _around(centres[heights > goal], t_norm)
-            return max(float(table.max()), of_means), np.union1d(
-                missing, _beside_breaks(dense, x, missing)
-            )
-        reach = _spacing(t_norm, centres)
-        for _ in range(_ZOOMS):
-            if not len(centres):
-                break
-            centres, heights = _zoomed(dense, x, centres, reach)
-            kept = heights > goal - 0.1 * _NEAR
-            centres = centres[kept]
-            heights = heights[kept]
-            reach = reach[kept] * 2.0 / (_FINE - 1)
-        places = np.unique(
-            np.concatenate(
-                [
-                    _within_pieces(dense, x),
-                    _within_friction(dense, x),
-                    _at_breaks(dense, x),
-                ]
-            )
-        )
-        worst = dense.violation_at(x, places).max(axis=1) if len(places) else places
+        largest = max(float(table.max()), of_means)
+        peaks = _suspects(t_norm, table, dense.knots, goal - _NEAR)
+        if table.max() > 20.0 * goal:
+            # The grid's own peaks will do until they are nearly held down.
+            at = np.searchsorted(t_norm, peaks - _SAME_TIME).clip(max=len(t_norm) - 1)
+            missing = _around(peaks[table.max(axis=1)[at] > goal], t_norm)
+        else:
+            peaks, heights = _zoom(dense, x, peaks, goal)
+            places = _special_times(dense, x)
+            worst = np.empty(0)
+            if len(places):
+                worst = dense.violation_at(x, places).max(axis=1)
+            largest = max(largest, np.append(heights, worst).max(initial=-np.inf))
+            high = _around(peaks[heights > goal], t_norm)
+            missing = np.union1d(high, places[worst > goal])
+            if of_means > goal:  # too few points everywhere
+                missing = np.union1d(missing, t_norm[_EVERYWHERE])
+        return largest, np.union1d(missing, _beside_breaks(dense, x, missing))
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
-    largest = max(
-        table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf), of_means
-    )
-    missing = np.union1d(_around(centres[heights > goal], t_norm), places[worst > goal])
-    missing = np.union1d(missing, _beside_breaks(dense, x, missing))
-    # A mean that is wrong has too few points everywhere.
-    return float(largest), np.union1d(
-        missing, t_norm[_EVERYWHERE]
-    ) if of_means > goal else missing
 
 
-def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """Spread points t_norm over every piece of a path of several: a blend of millimetres lies between grid points."""
-    path = dense.joint_map.path
+def _special_times(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """List t_norm between grid points that are looked at in any case.
+
+    They are spread over every piece of a path of several, for a blend of millimetres lies between grid points; stand
+    where a joint with Coulomb friction reverses, or nearly so; and where a limit changes abruptly.
+    """
     motion = dense.motion(x)
-    breaks = np.empty(0) if path is None else path.breaks
-    if len(breaks) <= 2:
-        return np.empty(0)
-    return motion.times_of(spread(breaks, _PIECE_POINTS - 1)) / motion.t_end
+    path = dense.joint_map.path
+    pieces = np.empty(0)
+    if path is not None and len(path.breaks) > 2:
+        pieces = motion.times_of(spread(path.breaks, 8))
+    friction = dense.joint_map.robot.friction
+    reversing = reversals(friction, dense.t_norm * motion.t_end, dense.state(x))
+    times = np.concatenate([pieces, reversing])
+    return np.union1d(times / motion.t_end, _at_breaks(dense, x))
 
 
 def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
@@ -206,26 +174,21 @@ def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarr
     The time of a change moves with every solve: single points would follow it for many rounds.
     """
     at = _at_breaks(dense, x)
-    steps = _spacing(dense.t_norm, at)
     if not (len(at) and len(missing)):
         return np.empty(0)
+    steps = _spacing(dense.t_norm, at)
     near = np.abs(at[:, None] - missing).min(axis=1) <= _BESIDE[-1] * steps
     return np.clip(at[near, None] + steps[near, None] * _BESIDE, 0.0, 1.0).ravel()
-
-
-def _within_friction(dense: Phase, x: np.ndarray) -> np.ndarray:
-    """List t_norm at which a joint with Coulomb friction reverses, or nearly so: peaks as narrow as the friction."""
-    t_end = dense.motion(x).t_end
-    friction = dense.joint_map.robot.friction
-    return reversals(friction, dense.t_norm * t_end, dense.state(x)) / t_end
 
 
 def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Find the distance between grid times around each of `times`; at a knot the larger one of its two sides."""
     gaps = np.diff(t_norm)
-    before = np.clip(np.searchsorted(t_norm, times - _SAME_TIME) - 1, 0, len(gaps) - 1)
-    behind = np.clip(np.searchsorted(t_norm, times + _SAME_TIME) - 1, 0, len(gaps) - 1)
-    return np.maximum(gaps[before], gaps[behind])
+    sides = [
+        np.searchsorted(t_norm, times + by) - 1 for by in (-_SAME_TIME, _SAME_TIME)
+    ]
+    before, behind = gaps[np.clip(sides, 0, len(gaps) - 1)]
+    return np.maximum(before, behind)
 
 
 def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
@@ -237,18 +200,11 @@ def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
 def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List the middle of every stretch of the dense grid on which the branch has no answer."""
     motion = dense.motion(x)
-    lost = ~np.all(
-        np.isfinite(
-            dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])
-        ),
-        axis=1,
-    )
-    edges = np.flatnonzero(
-        np.diff(np.concatenate([[False], lost, [False]]).astype(int))
-    )
-    if not len(
-        edges
-    ):  # reachable, but singular or too far apart to count turns: more points everywhere
+    postures = dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])
+    is_lost = ~np.isfinite(postures).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.pad(is_lost, 1).astype(int)))
+    if not len(edges):
+        # Reachable, but singular or too far apart to count turns: more points everywhere.
         return dense.t_norm[_EVERYWHERE]
     return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
 
@@ -263,51 +219,52 @@ def _suspects(
     """
     padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
     bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
-    peaks = (
-        (table + 0.5 * bend > near + _NEAR)
-        & (table > near)
-        & (table >= padded[:-2])
-        & (table >= padded[2:])
-    )
+    is_peak = (table >= padded[:-2]) & (table >= padded[2:])
+    is_near = (table + 0.5 * bend > near + _NEAR) & (table > near)
+    peaks = t_norm[(is_peak & is_near).any(axis=1)]
     at_knots = np.searchsorted(t_norm, np.unique(knots) - _SAME_TIME)
     close = t_norm[at_knots[(table[at_knots] > near).any(axis=1)]]
     half = 0.5 * _spacing(t_norm, close)
-    return np.unique(
-        np.clip(
-            np.concatenate([t_norm[peaks.any(axis=1)], close - half, close + half]),
-            0.0,
-            1.0,
-        )
-    )
+    times = np.concatenate([peaks, close - half, close + half])
+    return np.unique(np.clip(times, 0.0, 1.0))
 
 
-def _zoomed(
-    dense: Phase, x: np.ndarray, centres: np.ndarray, reach: np.ndarray
+def _zoom(
+    dense: Phase, x: np.ndarray, centres: np.ndarray, goal: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Look on a fine grid within `reach` of every centre: the places of the largest violation, and its size there."""
-    fine = np.clip(
-        centres[:, None] + reach[:, None] * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0
-    )
-    order = np.argsort(fine.ravel(), kind="stable")
-    worst = np.empty(fine.size)
-    worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
-    best = np.argmax(worst.reshape(fine.shape), axis=1)
-    chosen = np.arange(len(centres)), best
-    return fine[chosen], worst.reshape(fine.shape)[chosen]
+    """Find true peaks near the centres on ever finer grids: their normalised times, and the violations there."""
+    heights: np.ndarray = np.empty(len(centres))
+    reach = _spacing(dense.t_norm, centres)
+    steps = np.linspace(-1.0, 1.0, 9)
+    for _ in range(2 if len(centres) else 0):
+        fine = np.clip(centres[:, None] + reach[:, None] * steps, 0.0, 1.0)
+        order = np.argsort(fine.ravel(), kind="stable")
+        worst = np.empty(fine.size)
+        worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
+        best = np.argmax(worst.reshape(fine.shape), axis=1)
+        chosen = np.arange(len(centres)) * len(steps) + best
+        is_high = worst[chosen] > goal - 0.1 * _NEAR
+        centres = fine.ravel()[chosen][is_high]
+        heights = worst[chosen][is_high]
+        reach = 0.25 * reach[is_high]
+        if not len(centres):
+            break
+    return centres, heights
 
 
-def merged(phase: Phase, extra: np.ndarray) -> np.ndarray:
+def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
     """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
     t_norm = phase.t_norm
-    jumps = phase.jumps
-    sides = [np.searchsorted(jumps, times, side="right") for times in (extra, t_norm)]
-    apart = np.where(
-        sides[0][:, None] == sides[1], np.abs(extra[:, None] - t_norm), np.inf
-    )
-    return np.union1d(t_norm, extra[apart.min(axis=1) > _CLOSEST])
+    sides = [
+        np.searchsorted(phase.jumps, times, side="right") for times in (extra, t_norm)
+    ]
+    is_same_side = sides[0][:, None] == sides[1]
+    gaps = np.where(is_same_side, np.abs(extra[:, None] - t_norm), np.inf)
+    return np.union1d(t_norm, extra[gaps.min(axis=1) > 1e-5])
 
 
 _LONGEST = 0.01
+"""Fraction by which a motion may get slower where nothing else makes the limits hold."""
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 
@@ -360,7 +317,7 @@ def refine(
     """
     if not first.status.usable:
         return SolvedProgram(program, (first,), violation=np.inf)
-    dense = program.with_grid(
+    dense = program.with_points(
         [dense_grid(phase, options.density) for phase in program.phases]
     )
     goal = options.tolerance * _GOAL
@@ -376,7 +333,9 @@ def refine(
                 program, tuple(reports), violation=remaining, time_scaled=factor
             )
         pairs = zip(program.phases, missing, strict=True)
-        finer = program.with_grid([merged(phase, extra) for phase, extra in pairs])
+        finer = program.with_points(
+            [merge_points(phase, extra) for phase, extra in pairs]
+        )
         is_same = finer.collocation_points == program.collocation_points
         if is_same or options.deadline.passed:
             break

@@ -8,7 +8,7 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.boundary import Boundary
 from brachis.optimise.bspline import clamped_knots, spread
-from brachis.optimise.grid import FixedGrid, Grid
+from brachis.optimise.grid import FixedGrid
 from brachis.optimise.mesh import COARSE_INTERVALS
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
@@ -32,15 +32,13 @@ def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Pro
     Program
     """
     spline = problem.task.spline
-    grid = FixedGrid(
-        clamped_knots(spline.degree, breaks),
-        spline.degree,
-        spread(breaks, spline.points_per_interval),
-    )
+    knots = clamped_knots(spline.degree, breaks)
+    t_norm = spread(breaks, spline.points_per_interval)
+    grid = FixedGrid(knots, spline.degree, t_norm)
     return Program([phase_in(problem, joint_map, grid)])
 
 
-def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
+def phase_in(problem: Problem, joint_map: JointMap, grid: FixedGrid) -> Phase:
     """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid.
 
     Raises
@@ -53,31 +51,22 @@ def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
 
 def _boundary(problem: Problem, joint_map: JointMap) -> Boundary:
     """Write the task's boundary conditions in the coordinates of a joint map."""
-    task = problem.task
-    given = problem.task.boundary
-    free = np.full(problem.robot.n, np.nan)
-    start, end = (
-        free if posture is None else posture for posture in (problem.start, problem.end)
-    )
-    values = joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end)
-    if not given.periodic:
-        first, last = (_rates(rate, len(values[0])) for rate in problem.end_rates)
-        return Boundary(*values, task.spline.vanishing, first, last)
-    if isinstance(joint_map, ChartMap) and not joint_map.rows.closes:
+    is_periodic = problem.task.boundary.periodic
+    if is_periodic and isinstance(joint_map, ChartMap) and not joint_map.rows.closes:
         raise UnreachableError(
-            "the chart's measure of self-motion is another one at the path's end"
+            "chart coordinates at start and end differ, so the motion cannot be periodic in them"
         )
-    return Boundary(*values, task.spline.vanishing, periodic=True)
-
-
-def _rates(rate: float, count: int) -> np.ndarray | None:
-    """Rates of the curves at an end with a given ds/dt; None at rest."""
-    return np.append(rate, np.full(count - 1, np.nan)) if rate else None
+    free = np.full(problem.robot.n, np.nan)
+    start = joint_map.coordinates(0.0, free if problem.start is None else problem.start)
+    end = joint_map.coordinates(1.0, free if problem.end is None else problem.end)
+    derivatives = problem.task.spline.vanishing
+    unknown = np.full(len(start) - 1, np.nan)
+    first, last = (np.append(ds, unknown) if ds else None for ds in problem.end_rates)
+    return Boundary(start, end, derivatives, first, last, is_periodic)
 
 
 def breaks_of(task: Task) -> np.ndarray:
     """Return the ends of the task's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
-    intervals = (
-        COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
-    )
-    return np.linspace(0.0, 1.0, intervals + 1)
+    intervals = task.spline.intervals
+    count = COARSE_INTERVALS if intervals == "auto" else intervals
+    return np.linspace(0.0, 1.0, count + 1)

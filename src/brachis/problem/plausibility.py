@@ -1,23 +1,22 @@
 """Implausible figures of a task or a robot: unusually large ones look like another unit.
 
-`USUAL` is the table of the largest usual figures; those of joint limits are in `plausible_limits`.
+`USUAL` is the table of the largest usual figures, `USUAL_LIMITS` that of joint limits.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import PathError, write_apart
-from brachis.problem.plausible_limits import FASTEST, limit_figures
 from brachis.robot import Robot, TaskMap
-from brachis.robot.joints import UNITS
+from brachis.robot.joints import TURN, UNITS
+from brachis.robot.limits import STATED
 from brachis.robot.plausibility import Figure, Remark, link_lengths, reach, remarks
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
@@ -27,82 +26,78 @@ from brachis.task.limit_models import SpeedTable
 if TYPE_CHECKING:
     from brachis.path import Path
 
-_TURN = 2.0 * math.pi
-_STATIONS = 401
-_THOUSAND = 1000.0
 _OR_NULL = ", or null for no limit"
 _OF_SIZE = " for an arm of this size"
 _OF_MASS = " for this mass"
-
-
-@dataclass(frozen=True)
-class UsualFigure:
-    """What is usual of one figure.
-
-    Attributes
-    ----------
-    message : str
-        What a larger figure looks like.
-    largest : float
-        Largest usual figure in `unit`, or its ratio to the robot's own measure.
-    unit : str
-    aside : str
-        What is said behind what is usual.
-    """
-
-    message: str
-    largest: float
-    unit: str
-    aside: str = ""
-
-    def at(self, where: str, value: float, scale: float = 1.0) -> Figure:
-        """Compare a value with `scale` times the largest one."""
-        usual = self.largest * scale
-        return Figure(where, self.message, value, usual, self.unit, self.aside)
-
-
 USUAL = {
     # Delta robots move at 10 m/s, and accelerate with 15 g.
-    "tool_limits.speed": UsualFigure(
-        "the limit looks like mm/s", 50.0, "m/s", _OR_NULL
+    "tool_limits.speed": ("the limit looks like mm/s", 50.0, "m/s", _OR_NULL),
+    "tool_limits.process_speed": ("the limit looks like mm/s", 50.0, "m/s", _OR_NULL),
+    "tool_limits.acceleration": (
+        "the limit looks like mm/s^2",
+        300.0,
+        "m/s^2",
+        _OR_NULL,
     ),
-    "tool_limits.process_speed": UsualFigure(
-        "the limit looks like mm/s", 50.0, "m/s", _OR_NULL
+    "tool_limits.angular_speed": (
+        "the limit looks like degrees per second",
+        60.0,
+        "rad/s",
+        _OR_NULL,
     ),
-    "tool_limits.acceleration": UsualFigure(
-        "the limit looks like mm/s^2", 300.0, "m/s^2", _OR_NULL
-    ),
-    "tool_limits.angular_speed": UsualFigure(
-        "the limit looks like degrees per second", 60.0, "rad/s", _OR_NULL
-    ),
-    "path_start": UsualFigure("yaw looks like degrees", 1.0, "rad"),  # turns
-    "path": UsualFigure("the turn of yaw looks like degrees", 2.0, "rad"),  # turns
-    "link": UsualFigure("the distance from the joint before looks like mm", 20.0, "m"),
-    "robot.tool_offset.xyz": UsualFigure(  # times the arm's length
-        "the distance looks like mm", 2.0, "m", _OF_SIZE
-    ),
-    "robot.mounting.xyz": UsualFigure("the distance looks like mm", 200.0, "m"),
-    "robot.gravity": UsualFigure("the acceleration looks like mm/s^2", 100.0, "m/s^2"),
+    "path_start": ("yaw looks like degrees", TURN, "rad", ""),
+    "path": ("the turn of yaw looks like degrees", 2.0 * TURN, "rad", ""),
+    "link": ("the distance from the joint before looks like mm", 20.0, "m", ""),
+    # Times the arm's length.
+    "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
+    "robot.mounting.xyz": ("the distance looks like mm", 200.0, "m", ""),
+    "robot.gravity": ("the acceleration looks like mm/s^2", 100.0, "m/s^2", ""),
     # The strongest arms of 1 m reach carry 130 kg, and more with the square of the reach.
-    "robot.payload.mass": UsualFigure("the mass looks like g", 150.0, "kg", _OF_SIZE),
-    "robot.payload.com": UsualFigure(  # times the arm's length
-        "the distance from the tool frame looks like mm", 1.0, "m", _OF_SIZE
+    "robot.payload.mass": ("the mass looks like g", 150.0, "kg", _OF_SIZE),
+    # Times the arm's length.
+    "robot.payload.com": (
+        "the distance from the tool frame looks like mm",
+        1.0,
+        "m",
+        _OF_SIZE,
     ),
-    "robot.payload.inertia": UsualFigure(  # times mass and length squared
-        "the inertia looks like kg mm^2", 1.0, "kg m^2", _OF_MASS
+    # Times mass and length squared.
+    "robot.payload.inertia": (
+        "the inertia looks like kg mm^2",
+        1.0,
+        "kg m^2",
+        _OF_MASS,
     ),
     # A body of the heaviest arms weighs 150 kg for each square metre of their reach.
-    "body mass": UsualFigure("the mass looks like g", 1e3, "kg", _OF_SIZE),
-    "body inertia": UsualFigure(  # times the mass: bodies 10 m wide
-        "the inertia looks like kg mm^2", 100.0, "kg m^2", _OF_MASS
-    ),
+    "body mass": ("the mass looks like g", 1e3, "kg", _OF_SIZE),
+    # Times the mass: bodies 10 m wide.
+    "body inertia": ("the inertia looks like kg mm^2", 100.0, "kg m^2", _OF_MASS),
 }
-"""The largest usual figures, by the key of the task or the part of the robot."""
+"""By key of the task or part of the robot: what a larger figure looks like, the largest usual one, its unit, for what.
+
+Some of the largest figures are ratios to the robot's own measure.
+"""
+
+
+def _figure(key: str, value: float, scale: float = 1.0, where: str = "") -> Figure:
+    """Compare a value with `scale` times the largest usual one."""
+    message, largest, unit, aside = USUAL[key]
+    return Figure(where or key, message, value, largest * scale, unit, aside)
 
 
 def of_task(task: Task) -> tuple[Remark, ...]:
     """Look at speeds and accelerations of the tool, and at the points that the path was fitted to."""
-    return (*remarks(_tool(task)), *_angles(task), *_points(task))
+    of_points = [
+        Remark(
+            f"path: {fit.source}",
+            fit.doubt,
+            f"{fit.length:.4g} m",
+            "a path within the robot's reach",
+        )
+        for fit in task.fits
+        if fit.doubt
+    ]
+    return (*remarks(_tool(task)), *_angles(task), *of_points)
 
 
 def of_places(
@@ -123,59 +118,46 @@ def of_places(
     path_start : sequence of float, ToolPose or None
         As in the task.
     """
-    return tuple(remarks(_places(task_map, path, start, end, path_start)))
-
-
-def _places(
-    task_map: TaskMap,
-    path: Path,
-    start: np.ndarray | None,
-    end: np.ndarray | None,
-    path_start: Sequence[float] | ToolPose | None,
-) -> Iterator[Figure]:
-    robot = task_map.robot
-    along = (
-        path.sample(np.linspace(0.0, 1.0, _STATIONS)).target
-        if isinstance(task_map, JointSpace)
-        else None
-    )
-    ranged = np.isfinite(robot.limits.position_lower) & np.isfinite(
-        robot.limits.position_upper
-    )
-    for key, postures in (
-        ("start.joints", start),
-        ("path", along),
-        ("end.joints", end),
-    ):
-        if postures is None:
-            continue
-        columns = zip(
-            robot.joint_names,
-            robot.revolute,
-            postures.reshape(-1, robot.n).T,
-            ranged,
-            strict=True,
-        )
-        for name, turns, values, within in columns:
-            if turns:
-                # Along a path a joint without a range may wind up five times.
-                turns_allowed = 2.0 if within else (1.0 if along is None else 5.0)
-                value = float(values[np.argmax(np.abs(values))])
-                shown = f"{value:.6g}"
-                yield Figure(
-                    f"{key}.{name}",
-                    "the position looks like degrees",
-                    abs(value),
-                    turns_allowed * _TURN + 1e-3,
-                    "rad",
-                    f"; {shown} degrees are {math.radians(value):.6g} rad",
-                    shown,
-                )
+    along = path.sample(np.linspace(0.0, 1.0, 401)).target
+    of_joints = isinstance(task_map, JointSpace)
+    postures = {"start.joints": start, "path": along, "end.joints": end}
+    if not of_joints:
+        del postures["path"]
+    figures = [
+        figure
+        for key, given in postures.items()
+        if given is not None
+        for figure in _positions(task_map.robot, key, given, may_wind=of_joints)
+    ]
     if YAW in task_map.rows:
-        yaw = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target[:, -1]
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
-        yield USUAL["path_start"].at("path_start", begins, _TURN)
-        yield USUAL["path"].at("path", float(np.ptp(yaw)), _TURN)
+        turn = float(np.ptp(along[:, -1]))
+        figures += [_figure("path_start", begins), _figure("path", turn)]
+    return tuple(remarks(figures))
+
+
+def _positions(
+    robot: Robot, key: str, postures: np.ndarray, *, may_wind: bool
+) -> Iterator[Figure]:
+    """Look at the largest angle of every joint in postures, (n,) or (K, n)."""
+    limits = robot.limits
+    is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
+    for i in np.flatnonzero(robot.revolute):
+        values = postures.reshape(-1, robot.n)[:, i]
+        value = float(values[np.argmax(np.abs(values))])
+        # Along a path a joint without a range may wind up five times.
+        turns = 5.0 if may_wind else 1.0
+        usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
+        shown = f"{value:.6g}"
+        yield Figure(
+            f"{key}.{robot.joint_names[i]}",
+            "the position looks like degrees",
+            abs(value),
+            usual,
+            "rad",
+            f"; {shown} degrees are {math.radians(value):.6g} rad",
+            shown,
+        )
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
@@ -183,14 +165,8 @@ def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
     if t_end > 1.01 * least:
         return ()
     message = "the end time is the least that the planner knows, so that no limit holds the motion back"
-    return (
-        Remark(
-            "t_end",
-            message,
-            f"{t_end:.6g} s",
-            "more; see the units of limits, lengths and masses",
-        ),
-    )
+    usual = "more; see the units of limits, lengths and masses"
+    return (Remark("t_end", message, f"{t_end:.6g} s", usual),)
 
 
 def _tool(task: Task) -> Iterator[Figure]:
@@ -198,17 +174,18 @@ def _tool(task: Task) -> Iterator[Figure]:
     limits = task.tool_limits
     speed = limits.speed
     values = {
-        "tool_limits.speed": speed.speed if isinstance(speed, SpeedTable) else [speed],
-        "tool_limits.process_speed": [part.speed for part in limits.process_speed],
-        "tool_limits.acceleration": [limits.acceleration],
-        "tool_limits.angular_speed": [limits.angular_speed],
+        "speed": speed.speed if isinstance(speed, SpeedTable) else [speed],
+        "process_speed": [part.speed for part in limits.process_speed],
+        "acceleration": [limits.acceleration],
+        "angular_speed": [limits.angular_speed],
     }
     for key, given in values.items():
-        yield USUAL[key].at(key, _largest(given))
+        yield _figure(f"tool_limits.{key}", _largest(given))
     meant = "degrees per second" if task.task_space == "joints" else "mm/s"
-    usual = UsualFigure(f"the speed looks like {meant}", 50.0, task.speed_unit)
-    yield usual.at("boundary.start_speed", _largest([task.boundary.start_speed]))
-    yield usual.at("boundary.end_speed", _largest([task.boundary.end_speed]))
+    message = f"the speed looks like {meant}"
+    for key in ("start_speed", "end_speed"):
+        value = _largest([getattr(task.boundary, key)])
+        yield Figure(f"boundary.{key}", message, value, 50.0, task.speed_unit)
 
 
 def _largest(values: Iterable[float | None]) -> float:
@@ -227,8 +204,8 @@ def _angles(task: Task) -> Iterator[Remark]:
     }
     path = [segment.model_dump(exclude={"bspline", "spline"}) for segment in task.path]
     for key, degrees in _in_degrees("", {"robot": robot, "path": path}):
-        eighths = round(degrees / (0.125 * _TURN))
-        if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * _TURN * eighths) < 2e-3:
+        eighths = round(degrees / (0.125 * TURN))
+        if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * TURN * eighths) < 2e-3:
             usual = f"{math.degrees(degrees):.4g} deg for that angle"
             yield Remark(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
 
@@ -245,63 +222,42 @@ def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
         yield key, content
 
 
-def _points(task: Task) -> Iterator[Remark]:
-    for fit in task.fits:
-        if fit.doubt:
-            yield Remark(
-                f"path: {fit.source}",
-                fit.doubt,
-                f"{fit.length:.4g} m",
-                "a path within the robot's reach",
-            )
-
-
 def of_robot(robot: Robot) -> tuple[Remark, ...]:
     """Look at limits, friction, lengths, masses, payload and mounting of a robot."""
     bare = robot.with_payload(None) if robot.settings.payload else robot
     figures = (
-        look(one)
-        for look, one in ((limit_figures, bare), (_lengths, robot), (_masses, bare))
+        *_magnitudes(bare),
+        *_ranges(bare),
+        *_curves(bare),
+        *_lengths(robot),
+        *_masses(bare),
+        *_payload(robot, bare),
     )
-    of_payload = _payload(robot, bare)
-    return (
-        *_scales(robot),
-        *_friction(robot),
-        *remarks(itertools.chain(*figures, of_payload)),
-    )
+    return (*_scales(robot), *_friction(robot), *remarks(figures))
 
 
 def _scales(robot: Robot) -> Iterator[Remark]:
+    message = "the factor raises limits far beyond what was stated"
+    usual = "0.1 to 1; a percentage is divided by 100"
     for kind, factor in robot.settings.limits.scale.model_dump().items():
         if factor > 10.0:
-            message = "the factor raises limits far beyond what was stated"
-            yield Remark(
-                f"robot.limits.scale.{kind}",
-                message,
-                f"{factor:g}",
-                "0.1 to 1; a percentage is divided by 100",
-            )
+            yield Remark(f"robot.limits.scale.{kind}", message, f"{factor:g}", usual)
 
 
 def _friction(robot: Robot) -> Iterator[Remark]:
     """Look at damping of the URDF, which is often there to calm a simulation."""
+    message = "the damping of the URDF takes more than the largest torque at the largest speed"
     for i, damping in enumerate(robot.stated.friction["viscous"]):
         fastest = robot.limits.velocity[i]
         torque = robot.limits.torque[i]
-        slow = (
-            np.isfinite([fastest, torque]).all()
-            and fastest <= FASTEST[robot.position_units[i]]
-        )
-        if slow and damping == robot.friction.viscous[i] and damping * fastest > torque:
-            unit = UNITS["viscous"][robot.position_units[i]]
-            message = "the damping of the URDF takes more than the largest torque at the largest speed"
+        position_unit = robot.position_units[i]
+        is_kept = damping == robot.friction.viscous[i]
+        is_slow = np.isfinite(torque) and fastest <= _FASTEST[position_unit]
+        if is_kept and is_slow and damping * fastest > torque:
+            unit = UNITS["viscous"][position_unit]
             usual = f"below {torque / fastest:.3g} {unit}; viscous: null leaves it out"
-            yield Remark(
-                f"robot.friction.viscous.{robot.joint_names[i]}",
-                message,
-                f"{damping:.6g} {unit}",
-                usual,
-            )
+            where = f"robot.friction.viscous.{robot.joint_names[i]}"
+            yield Remark(where, message, f"{damping:.6g} {unit}", usual)
 
 
 def _lengths(robot: Robot) -> Iterator[Figure]:
@@ -309,15 +265,12 @@ def _lengths(robot: Robot) -> Iterator[Figure]:
     *links, last = link_lengths(robot)
     settings = robot.settings
     offset = math.hypot(*settings.tool_offset.xyz)
-    for name, length in zip(robot.joint_names[1:], links, strict=True):
-        yield USUAL["link"].at(f"URDF origin of {name}", length)
-    yield USUAL["link"].at(f"URDF origin of {robot.tool_frame}", last - offset)
-    for key, value, scale in (
-        ("robot.tool_offset.xyz", offset, max(1.0, sum(links))),
-        ("robot.mounting.xyz", math.hypot(*settings.mounting.xyz), 1.0),
-        ("robot.gravity", math.hypot(*settings.gravity), 1.0),
-    ):
-        yield USUAL[key].at(key, value, scale)
+    names = (*robot.joint_names[1:], robot.tool_frame)
+    for name, length in zip(names, (*links, last - offset), strict=True):
+        yield _figure("link", length, where=f"URDF origin of {name}")
+    yield _figure("robot.tool_offset.xyz", offset, max(1.0, sum(links)))
+    yield _figure("robot.mounting.xyz", math.hypot(*settings.mounting.xyz))
+    yield _figure("robot.gravity", math.hypot(*settings.gravity))
 
 
 def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
@@ -326,28 +279,170 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:
     if payload is None:
         return
     size = max(1.0, sum(link_lengths(robot)) if robot.revolute.any() else reach(robot))
-    usual = USUAL["robot.payload.mass"]
     # The strongest arms carry as much as they weigh.
-    moved = sum(inertia.mass for inertia in list(bare.model.inertias)[1:])
-    heaviest = min(usual.largest * size**2, 3.0 * moved or math.inf)
+    moved = sum(body.mass for body in list(bare.model.inertias)[1:])
+    heaviest = (3.0 * moved or math.inf) / USUAL["robot.payload.mass"][1]
     inertia = payload.inertia
     moment = max(inertia.ixx, inertia.iyy, inertia.izz) if inertia else 0.0
-    for key, value, scale in (
-        ("robot.payload.mass", payload.mass, heaviest / usual.largest),
-        ("robot.payload.com", math.hypot(*payload.com), size),
-        ("robot.payload.inertia", moment, payload.mass * size**2),
-    ):
-        yield USUAL[key].at(key, value, scale)
+    yield _figure("robot.payload.mass", payload.mass, min(size**2, heaviest))
+    yield _figure("robot.payload.com", math.hypot(*payload.com), size)
+    yield _figure("robot.payload.inertia", moment, payload.mass * size**2)
 
 
 def _masses(robot: Robot) -> Iterator[Figure]:
-    bodies = list(robot.model.inertias)[1:]
     size = max(1.0, reach(robot))
+    bodies = list(robot.model.inertias)[1:]
     for name, body in zip(robot.joint_names, bodies, strict=True):
         where = f"URDF inertials that joint {name} moves"
         moment = float(np.linalg.eigvalsh(body.inertia)[-1])
-        yield USUAL["body mass"].at(where, body.mass, size**2)
-        yield USUAL["body inertia"].at(where, moment, body.mass)
+        yield _figure("body mass", body.mass, size**2, where)
+        yield _figure("body inertia", moment, body.mass, where)
+
+
+_FASTEST = {"rad": 60.0, "m": 50.0}
+"""The quickest axes of small SCARA and delta robots turn at 50 rad/s; rails move at 10 m/s. In degrees and mm: more."""
+
+
+def _usual_torque(robot: Robot, joint: int) -> float:
+    """Return a hundred times what the URDF states; arms hold a tenth to five times their own weight at full reach."""
+    stated = _from_urdf(robot, "torque", joint)
+    largest = 100.0 * stated if stated and stated != 1.0 else math.inf
+    mass = sum(body.mass for body in list(robot.model.inertias)[1:])
+    weight = mass * 9.81 * sum(link_lengths(robot))
+    if robot.revolute[joint] and weight > 0.0:
+        largest = min(largest, 50.0 * weight)
+    return largest
+
+
+def _usual_velocity(robot: Robot, joint: int, times: float = 10.0) -> float:
+    """Return so many times what the URDF states, or as many rad/s or m/s."""
+    stated = _from_urdf(robot, "velocity", joint)
+    largest = _FASTEST[robot.position_units[joint]]
+    # URDFs state 1 for a limit that nobody knows.
+    if stated and stated != 1.0:
+        largest = min(largest, max(times * stated, times))
+    return largest
+
+
+def _usual_acceleration(robot: Robot, joint: int) -> float:
+    """Return more than the 200 rad/s^2 of small wrists, and the 150 m/s^2 of delta robots."""
+    return 500.0 if robot.revolute[joint] else 300.0
+
+
+@dataclass(frozen=True)
+class UsualLimit:
+    """What is usual of the limits of one kind.
+
+    Attributes
+    ----------
+    looks : dict of str to str
+        What unit larger ones look like, by the unit of the joint's position.
+    largest : callable
+        Largest usual limit of a joint of a robot.
+    is_torque : bool
+    """
+
+    looks: dict[str, str]
+    largest: Callable[[Robot, int], float]
+    is_torque: bool = False
+
+
+_TORQUE = UsualLimit({"rad": "mNm", "m": "mN"}, _usual_torque, is_torque=True)
+USUAL_LIMITS = {
+    "torque": _TORQUE,
+    "rms_torque": _TORQUE,
+    "velocity": UsualLimit(
+        {"rad": "degrees per second", "m": "mm per second"}, _usual_velocity
+    ),
+    "acceleration": UsualLimit(
+        {"rad": "degrees per second^2", "m": "mm/s^2"}, _usual_acceleration
+    ),
+}
+"""By kind of limit."""
+
+
+def _from_urdf(robot: Robot, kind: str, joint: int) -> float | None:
+    """Return the URDF's limit of a joint; None where it states nothing."""
+    found: float | None = getattr(robot.stated_limits[joint], STATED[kind])
+    return found
+
+
+def _magnitudes(robot: Robot) -> Iterator[Figure]:
+    """Look at limits of a robot without payload, as they were before scale and speed override."""
+    for kind, usual in USUAL_LIMITS.items():
+        scale = getattr(robot.settings.limits.scale, kind)
+        values = np.abs(robot.limits.both_ways(kind)).max(axis=0) / scale
+        if kind == "velocity":
+            values = values / robot.settings.speed_override
+        for i, (name, unit) in enumerate(
+            zip(robot.joint_names, robot.position_units, strict=True)
+        ):
+            value = float(values[i])
+            largest = usual.largest(robot, i)
+            is_replaced = kind == "torque" and robot.limits.torque_speed[i]
+            is_known = usual.is_torque and value == _from_urdf(robot, "torque", i)
+            # A power of ten is written for "no limit"; of torques one that no figure in mNm can be.
+            stands_for_none = _is_power_of_ten(value) and not (
+                usual.is_torque and not is_known and value <= 1e3 * largest
+            )
+            if 0.0 < value < math.inf and not is_replaced and not stands_for_none:
+                words = kind.replace("_", " ")
+                message = f"the {words} limit looks like {usual.looks[unit]}"
+                where = f"robot.limits.{kind}.{name}"
+                yield Figure(where, message, value, largest, UNITS[kind][unit])
+
+
+def _is_power_of_ten(value: float) -> bool:
+    return 0.0 < value < math.inf and round(math.log10(value), 9).is_integer()
+
+
+def _ranges(robot: Robot) -> Iterator[Figure]:
+    """Look at position ranges: joints with cables make a dozen turns at most."""
+    lowest = robot.limits.position_lower
+    highest = robot.limits.position_upper
+    for i, unit in enumerate(robot.position_units):
+        # In degrees, few ranges are narrower than 120; few rails are longer than 30 m.
+        usual = 120.0 if unit == "rad" else 50.0
+        known = robot.stated_limits[i]
+        if known.lower is not None and known.upper is not None:
+            width = known.upper - known.lower
+            least = 2.0 * TURN if unit == "rad" else 5.0
+            usual = min(usual, max(5.0 * width, least)) if width > 0.0 else usual
+        lower = float(lowest[i])
+        upper = float(highest[i])
+        # An end beyond this is written for "no limit": in degrees, ranges end at 720.
+        if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
+            yield Figure(
+                f"robot.limits.position.{robot.joint_names[i]}",
+                f"the position range looks like {'degrees' if unit == 'rad' else 'mm'}",
+                upper - lower,
+                usual,
+                unit,
+                " wide, or open (null)",
+                f"[{lower:.6g}, {upper:.6g}]",
+            )
+
+
+def _curves(robot: Robot) -> Iterator[Figure]:
+    """Look at the torques and the speeds of torque-speed curves."""
+    scale = robot.settings.limits.scale.torque
+    for i, curve in enumerate(robot.limits.torque_speed):
+        if not curve:
+            continue
+        unit = robot.position_units[i]
+        key = f"robot.limits.torque_speed.{robot.joint_names[i]}"
+        meant = {"rad": "rpm", "m": "mm per second"}[unit]
+        message = f"the last speed of the curve looks like {meant}"
+        # Without load motors turn at up to twice the rated speed; rpm are 9.5 times rad/s.
+        usual = _usual_velocity(robot, i, times=5.0)
+        shown_unit = UNITS["velocity"][unit]
+        aside = "; at the joint, behind its gear"
+        yield Figure(key, message, curve[-1][0], usual, shown_unit, aside)
+        message = f"the torque of the curve looks like {_TORQUE.looks[unit]}"
+        torque = curve[0][1] / scale
+        yield Figure(
+            key, message, torque, _usual_torque(robot, i), UNITS["torque"][unit]
+        )
 
 
 def check_within_reach(task_map: TaskMap, path: Path) -> None:
@@ -359,25 +454,25 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
     """
     if not task_map.axes:  # of joints
         return
-    s = np.linspace(0.0, 1.0, _STATIONS)
+    s = np.linspace(0.0, 1.0, 401)
     robot = task_map.robot
     axes = list(task_map.axes)
     base = np.array(robot.model.jointPlacements[1].translation)[axes]
     away = np.linalg.norm(path.sample(s).target[:, : len(axes)] - base, axis=1)
     far = reach(robot)
-    if not away.max() > far * (1.0 + 1e-3):
+    furthest = float(away.max())
+    if not furthest > far * (1.0 + 1e-3):
         return
     beyond = s[away > far]
-    furthest = float(away.max())
     found, most = write_apart(furthest, far)
-    # A path that is only a little too long is no more than three times as far.
-    looks = furthest / _THOUSAND < 3.0 * far < furthest
+    # A path that is only a little too long is less than three times as far.
+    looks_like_mm = furthest / 1000.0 < 3.0 * far < furthest
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on",
         s_interval=(float(beyond[0]), float(beyond[-1])),
         found=f"{found} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
         allowed=f"at most {most} m, which is all links and slides in one line",
-        hint=f"The path looks like mm: divided by 1000 it is {furthest / _THOUSAND:.3g} m away"
-        if looks
+        hint=f"The path looks like mm: divided by 1000 it is {furthest / 1000.0:.3g} m away"
+        if looks_like_mm
         else "Shorten or move the path, or the robot's mounting",
     )

@@ -38,8 +38,7 @@ from brachis.kinematics import (
 )
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends import SolverReport, SolveStatus, solver_named
-from brachis.optimise.candidate import Candidate, InitialGuess
-from brachis.optimise.completion import refine_and_verify
+from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
 from brachis.optimise.guess import fit_curves, shortest_time
 from brachis.optimise.improve import (
     Change,
@@ -249,7 +248,7 @@ def solve_without_third_order_limits(
     reports : tuple of SolverReport
         Of the solve without them.
     """
-    easier = program.up_to(2)
+    easier = program.without_orders_above(2)
     if len(easier.limits) == len(program.limits):
         return x, ()
     report = solve(easier.with_margin(margin), x)

@@ -133,7 +133,7 @@ def _find_faster(
 ) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
-    (phase,) = refined.program.up_to(_HIGHEST).phases
+    (phase,) = refined.program.without_orders_above(_HIGHEST).phases
     (motion,) = refined.program.motions(refined.x)
     best: Reference | None = None
     for degree, count in _meshes(phase.intervals, _fine(phase, intervals)):
@@ -184,7 +184,7 @@ def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
     if degree == _PARABOLAS:
         t_norm = np.union1d(t_norm, np.arange(1, intervals) / intervals - _BESIDE)
     grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, t_norm)
-    return phase.over(grid, dataclasses.replace(phase.boundary, derivatives=1))
+    return phase.with_grid(grid, dataclasses.replace(phase.boundary, derivatives=1))
 
 
 def _plan_on_mesh(

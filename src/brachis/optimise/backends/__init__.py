@@ -1,11 +1,11 @@
 """Solver backends behind one protocol: one per file, listed in `TABLE`, imported when used."""
 
+from brachis.optimise.backends.child_process import Solver
 from brachis.optimise.backends.monitor import residual
 from brachis.optimise.backends.protocol import (
     FEASIBLE,
     Problem,
     Progress,
-    Solver,
     SolverOptions,
     SolverReport,
     SolveStatus,

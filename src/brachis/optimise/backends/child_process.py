@@ -1,22 +1,20 @@
-"""Solves that may not come back in time run in a process of their own, which can be ended.
+"""A solver: a backend, run only with numbers that it can be trusted with, one solve at a time, and large ones apart.
 
-A backend hears of the time between its iterations and evaluations. An active-set method may spend minutes within a
-single quadratic subproblem of thousands of variables, where nothing of ours is called.
-
-A lock for backends that threads of one process must not run at the same time.
+A backend sees the time between its iterations and evaluations. An active-set method may spend minutes within a single
+quadratic subproblem of thousands of variables, where nothing of ours is called. Such solves run in a process of their
+own, which can be ended.
 """
 
 from __future__ import annotations
 
-import functools
-import importlib
-import inspect
 import multiprocessing
 import signal
 import sys
 import threading
 import time
 import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -24,78 +22,122 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis.common import interrupts
-from brachis.optimise.backends.monitor import ended
+from brachis.optimise.backends.monitor import (
+    SolveMonitor,
+    is_usable,
+    objective_at,
+    residual,
+)
 from brachis.optimise.backends.protocol import (
     Problem,
     Progress,
-    Solve,
     SolverOptions,
     SolverReport,
     SolveStatus,
 )
 
 ENTRIES = 1_000_000
-"""Variables times rows above which a solve runs apart: an iteration takes Uno 0.2 s there, 18 s at nine times that."""
-SHORT = 10.0
-"""Seconds of a time limit below which smaller problems, too, are solved apart: one iteration may take all of them."""
+"""Variables times rows above which a solve runs apart: an iteration takes Uno 0.2 s there, 18 s at nine times that.
+
+Below a time limit of 10 s smaller problems, too, are solved apart: one iteration may take all of it.
+"""
 _GRACE = 0.25
-"""Seconds after its time limit at which a process is ended; a backend that hears of the limit answers before."""
-_METHOD = "fork" if sys.platform.startswith("linux") else "spawn"
-"""How processes are made: a fork has the problem at once, yet elsewhere the system's libraries do not bear it."""
+"""Seconds after its time limit at which a process is ended; a backend that sees the limit answers before."""
+Run = Callable[[SolveMonitor, np.ndarray], SolverReport]
+"""What a backend does: ``run(monitor, x)`` solves the monitor's problem from x, and returns ``monitor.report(...)``."""
+solve_lock = threading.RLock()
+"""Uno's BQPD and IPOPT's MUMPS keep their state in memory that all threads share: two solves at once crash."""
 
 
-def apart_if_large(solve: Solve) -> Solve:
-    """Let large problems be solved in a process that is ended soon after the time limit (decorator).
+@dataclass(frozen=True)
+class Solver:
+    """A backend that can be called safely.
 
-    Such a report has the start as its `x`, and says `TIME_LIMIT`.
+    Attributes
+    ----------
+    name : str
+    run : callable
+        ``run(monitor, x)`` solves the monitor's problem from x; see `SolveMonitor`.
     """
 
-    @functools.wraps(solve)
-    def solved(
+    name: str
+    run: Run
+
+    def solve(
+        self,
         problem: Problem,
         x: np.ndarray,
         options: SolverOptions,
         progress: Progress | None,
     ) -> SolverReport:
-        # A daemonic process may have none of its own; the backend's limit then holds between its iterations alone.
-        entries_allowed = ENTRIES * min(1.0, (options.time_limit / SHORT) ** 2)
-        if (
-            len(x) * len(problem.lower) <= entries_allowed
-            or multiprocessing.current_process().daemon
-        ):
-            return solve(problem, x, options, progress)
-        name = solve.__module__.rpartition(".")[2]
-        return _solve_apart(solve.__module__, name, problem, x, options, progress)
+        """Solve `problem` from the start `x`.
 
-    return solved
+        A large problem that is not solved in time has the start as its `x`, and the status `TIME_LIMIT`.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            The user interrupted; passed on once the backend has returned.
+        """
+        bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
+        status = SolveStatus.EVALUATION_ERROR
+        refusal = ""
+        if options.time_limit <= 0.0:
+            status = SolveStatus.TIME_LIMIT
+            refusal = "no time was left"
+        elif not is_usable(x) or any(np.isnan(bound).any() for bound in bounds):
+            refusal = "the start or a bound is not a finite number"
+        if refusal:
+            return _report_start(self.name, problem, x, status, refusal)
+        with solve_lock:
+            most = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
+            # A daemonic process may have no children; the limit then holds between iterations alone.
+            alone = multiprocessing.current_process().daemon
+            if len(x) * len(problem.lower) > most and not alone:
+                return subprocess_solve(self, problem, x, options, progress)
+            return self.run(SolveMonitor(problem, options, progress), x)
 
 
-def _solve_apart(
-    module: str,
-    name: str,
+def _report_start(
+    solver: str,
+    problem: Problem,
+    x: np.ndarray,
+    status: SolveStatus,
+    message: str,
+    wall_time: float = 0.0,
+) -> SolverReport:
+    """Report a solve that gave no answer: the start `x`, (v,), stays."""
+    values = (objective_at(problem, x), residual(problem, x))
+    none = np.zeros(len(problem.lower))
+    return SolverReport(solver, status, x, *values, none, 0, wall_time, message)
+
+
+def subprocess_solve(
+    solver: Solver,
     problem: Problem,
     x: np.ndarray,
     options: SolverOptions,
     progress: Progress | None,
 ) -> SolverReport:
-    """Start the process, pass on what it says, and end it."""
+    """Start a process that solves, pass on its progress, and end it."""
     began = time.monotonic()
-    context: Any = multiprocessing.get_context(_METHOD)
+    until = began + options.time_limit
+    # A fork has the problem at once; beyond Linux the system's libraries do not bear it.
+    method = "fork" if sys.platform.startswith("linux") else "spawn"
+    context: Any = multiprocessing.get_context(method)
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(
-        target=_work, args=(sender, module, problem, x, options), daemon=True
+        target=_work, args=(sender, solver.run, problem, x, options), daemon=True
     )
     try:
-        with (
-            interrupts.block_in_children(),
-            warnings.catch_warnings(),
-        ):  # the fork touches nothing that threads may hold
+        # The fork touches nothing that threads may hold.
+        with interrupts.block_in_children(), warnings.catch_warnings():
             warnings.filterwarnings(
                 "ignore", message=".*multi-threaded", category=DeprecationWarning
             )
             process.start()
         sender.close()
-        answer = _heard(receiver, began + options.time_limit + _GRACE, progress)
+        answer = _receive(receiver, until + _GRACE, progress)
     finally:
         if process.pid is not None:
             process.kill()
@@ -106,34 +148,34 @@ def _solve_apart(
         raise answer
     if isinstance(answer, SolverReport):
         return answer
-    late = time.monotonic() > began + options.time_limit
-    status, message = (
-        (SolveStatus.TIME_LIMIT, "ended: it did not come back in time")
-        if late
-        else (SolveStatus.FAILED, "crashed")
-    )
-    return ended(name, problem, x, status, message, time.monotonic() - began)
+    now = time.monotonic()
+    status = SolveStatus.FAILED
+    message = "crashed"
+    if now > until:
+        status = SolveStatus.TIME_LIMIT
+        message = "ended: it did not come back in time"
+    return _report_start(solver.name, problem, x, status, message, now - began)
 
 
-def _heard(
+def _receive(
     receiver: Connection, until: float, progress: Progress | None
 ) -> SolverReport | Exception | None:
     """Pass on the progress until the answer comes; None where none comes in time, or at all."""
     while receiver.poll(max(until - time.monotonic(), 0.0)):
         try:
-            said = receiver.recv()
+            message = receiver.recv()
         except EOFError:
             return None
-        if isinstance(said, SolverReport | Exception):
-            return said
+        if isinstance(message, SolverReport | Exception):
+            return message
         if progress is not None:
-            progress(*said)
+            progress(*message)
     return None
 
 
 def _work(
     sender: Connection,
-    module: str,
+    run: Run,
     problem: Problem,
     x: np.ndarray,
     options: SolverOptions,
@@ -144,33 +186,12 @@ def _work(
     """
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_REAL, options.time_limit + _GRACE)
-    solve = inspect.unwrap(importlib.import_module(module).solve)
 
     def progress(iteration: int, objective: float) -> None:
         sender.send((iteration, objective))
 
     try:
         with ThreadpoolController().limit(limits=1, user_api="blas"):
-            sender.send(solve(problem, x, options, progress))
+            sender.send(run(SolveMonitor(problem, options, progress), x))
     except Exception as error:  # noqa: BLE001  (raised where the solve was asked for)
         sender.send(error)
-
-
-_LOCK = threading.RLock()
-"""Uno's BQPD and IPOPT's MUMPS keep their state in memory that all threads share: two solves at once crash."""
-
-
-def one_at_a_time(solve: Solve) -> Solve:
-    """Let a solve wait until no other thread is in one (decorator)."""
-
-    @functools.wraps(solve)
-    def waiting(
-        problem: Problem,
-        x: np.ndarray,
-        options: SolverOptions,
-        progress: Progress | None,
-    ) -> SolverReport:
-        with _LOCK:
-            return solve(problem, x, options, progress)
-
-    return waiting

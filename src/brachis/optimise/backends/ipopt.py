@@ -5,21 +5,15 @@ The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/I
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.optimise.backends.child_process import apart_if_large, one_at_a_time
-from brachis.optimise.backends.monitor import Watch, from_finite_numbers, objective_at
-from brachis.optimise.backends.protocol import (
-    Problem,
-    Progress,
-    SolverOptions,
-    SolverReport,
-    SolveStatus,
-)
+from brachis.optimise.backends.monitor import SolveMonitor, objective_at
+from brachis.optimise.backends.protocol import SolverReport, SolveStatus
 
-name = "ipopt"
-
+NAME = "ipopt"
 _STATUS = {
     0: SolveStatus.OPTIMAL,
     1: SolveStatus.ACCEPTABLE,
@@ -30,60 +24,49 @@ _STATUS = {
     -5: SolveStatus.TIME_LIMIT,
     -13: SolveStatus.EVALUATION_ERROR,
 }
-_INFINITY = 2e19  # IPOPT takes bounds beyond 1e19 for none
 
 
-@from_finite_numbers
-@one_at_a_time
-@apart_if_large
-def solve(
-    problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None
-) -> SolverReport:
-    """See `brachis.optimise.backends.protocol.Solver`."""
+def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
+    """Solve the monitor's problem from `x`."""
     import ipyopt
 
-    watch = Watch(problem, options, progress)
+    problem = monitor.problem
+    options = monitor.options
 
-    def objective(point: np.ndarray) -> float:
-        return objective_at(problem, point, np.nan)
+    def or_nan(
+        function: Callable[[np.ndarray], np.ndarray],
+    ) -> Callable[[np.ndarray, np.ndarray], None]:
+        def write(point: np.ndarray, out: np.ndarray) -> None:
+            try:
+                out[:] = function(point)
+            except UnreachableError:
+                out[:] = np.nan  # IPOPT shortens the step
 
-    def objective_gradient(point: np.ndarray, out: np.ndarray) -> None:
-        try:
-            out[:] = watch.gradient(point)
-        except UnreachableError:
-            out[:] = np.nan
-
-    def rows(point: np.ndarray, out: np.ndarray) -> None:
-        try:
-            out[:] = watch.rows(point)
-        except UnreachableError:
-            out[:] = np.nan  # IPOPT shortens the step
-
-    def jacobian(point: np.ndarray, out: np.ndarray) -> None:
-        try:
-            out[:] = watch.jacobian(point)
-        except UnreachableError:
-            out[:] = np.nan
+        return write
 
     def intermediate(
         _mode: int, _iteration: int, objective: float, infeasibility: float, *_: float
     ) -> bool:
-        stop = watch.between_iterations(objective)
-        return not (watch.has_settled(objective, infeasibility) or stop)
+        stop = monitor.between_iterations(objective)
+        return not (monitor.has_settled(objective, infeasibility) or stop)
 
+    def clip(bounds: np.ndarray) -> np.ndarray:
+        return np.clip(bounds, -2e19, 2e19)  # IPOPT takes 1e19 for infinity
+
+    nothing = np.array([], dtype=int)
     backend = ipyopt.Problem(
         len(x),
-        np.clip(problem.x_lower, -_INFINITY, _INFINITY),
-        np.clip(problem.x_upper, -_INFINITY, _INFINITY),
+        clip(problem.x_lower),
+        clip(problem.x_upper),
         len(problem.lower),
-        np.clip(problem.lower, -_INFINITY, _INFINITY),
-        np.clip(problem.upper, -_INFINITY, _INFINITY),
+        clip(problem.lower),
+        clip(problem.upper),
         (problem.jacobian_rows, problem.jacobian_columns),
-        (np.array([], dtype=int), np.array([], dtype=int)),
-        objective,
-        objective_gradient,
-        rows,
-        jacobian,
+        (nothing, nothing),
+        lambda point: objective_at(problem, point, np.nan),
+        or_nan(monitor.gradient),
+        or_nan(monitor.rows),
+        or_nan(monitor.jacobian),
         intermediate_callback=intermediate,
         ipopt_options={
             "print_level": 0,
@@ -97,9 +80,8 @@ def solve(
         },
     )
     multipliers = np.zeros(len(problem.lower))
-    with watch:
+    with monitor:
         answer, _, code = backend.solve(x.copy(), mult_g=multipliers)
     status = _STATUS.get(int(code), SolveStatus.FAILED)
-    return watch.report(
-        name, status, np.array(answer), -multipliers, f"return code {code}"
-    )
+    message = f"return code {code}"
+    return monitor.report(NAME, status, np.array(answer), -multipliers, message)

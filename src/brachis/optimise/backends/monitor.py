@@ -1,8 +1,7 @@
-"""The seam between a problem and a backend: counting, interruption, deadline and the judgement of the answer."""
+"""What stands between a problem and a backend: it counts, interrupts, keeps the time, and judges the answer."""
 
 from __future__ import annotations
 
-import functools
 import signal
 import threading
 import time
@@ -16,26 +15,25 @@ from brachis.errors import UnreachableError
 from brachis.optimise.backends.protocol import (
     Problem,
     Progress,
-    Solve,
     SolverOptions,
     SolverReport,
     SolveStatus,
 )
 
-_EVALUATIONS = 10
-"""Evaluations for each iteration allowed, on average: a solver that needs more cannot leave a point out of reach."""
 _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
-_FEASIBLE = 10.0
-"""An answer counts as feasible up to this many times the solver's tolerance."""
 
 
-class Watch:
+Function = Callable[[np.ndarray], float | np.ndarray]
+"""Of the variables of a problem."""
+
+
+class SolveMonitor:
     """Watches one solve.
 
     A backend written in another language must not see a KeyboardInterrupt, which Python would raise at the first line
-    of any callback. Used as a context manager around the backend, the watch turns SIGINT into a flag; the backend is
-    told to stop, and `report` raises the interrupt.
+    of any callback. Used as a context manager around the backend, it turns SIGINT into a flag; the backend then
+    has to stop, and `report` raises the interrupt.
 
     Parameters
     ----------
@@ -56,6 +54,7 @@ class Watch:
         self._evaluations = 0
         self.stagnated = False
         self._feasible: list[float] = []
+        self._feasible_below = 10.0 * options.tolerance
         self._progress = progress
         self._handler: Any = None
         self._during: Any = None
@@ -67,9 +66,8 @@ class Watch:
         if threading.current_thread() is threading.main_thread():
             self._during = signal.SIG_IGN if ignored else self._keep_interrupt
             self._handler = signal.signal(signal.SIGINT, self._during)
-            if (
-                isinstance(self._handler, SigintHandler) and self._handler.pending
-            ):  # it went unheard until now
+            remembers = isinstance(self._handler, SigintHandler)
+            if remembers and self._handler.pending:  # nobody has looked until now
                 self.interrupt = KeyboardInterrupt()
         return self
 
@@ -106,20 +104,20 @@ class Watch:
         """
         self._feasible = (
             [*self._feasible, objective]
-            if infeasibility <= _FEASIBLE * self.options.tolerance
+            if infeasibility <= self._feasible_below
             else []
         )
         recent = self._feasible[-self.options.patience :]
-        spread = max(recent, default=0.0) - min(recent, default=0.0)
-        self.stagnated = len(
-            recent
-        ) == self.options.patience and spread <= self.options.progress * abs(objective)
+        is_long = len(recent) == self.options.patience
+        least = self.options.progress * abs(objective)
+        self.stagnated = is_long and max(recent) - min(recent) <= least
         return self.stagnated
 
     def must_stop(self) -> bool:
         """Tell whether the user has interrupted or the time is over."""
         self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
-        self.exhausted = self._evaluations > _EVALUATIONS * self.options.max_iterations
+        # A solver that needs more cannot leave a point out of reach.
+        self.exhausted = self._evaluations > 10 * self.options.max_iterations
         return self.timed_out or self.exhausted or self.interrupt is not None
 
     def objective(self, x: np.ndarray) -> float:
@@ -138,32 +136,25 @@ class Watch:
         """Jacobian entries at x; raises as `rows` does."""
         return self._evaluate(self.problem.jacobian, x)
 
-    def _evaluate(
-        self, function: Callable[[np.ndarray], Any], x: np.ndarray
-    ) -> np.ndarray:
-        if (
-            self._handler is not None
-        ):  # a backend may have put a handler of its own in place since
+    def _evaluate(self, function: Function, x: np.ndarray) -> np.ndarray:
+        if self._handler is not None:
+            # A backend may have put a handler of its own in place since.
             signal.signal(signal.SIGINT, self._during)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
         self._evaluations += 1
         return self._finite(function, x)
 
-    def _finite(
-        self, function: Callable[[np.ndarray], Any], x: np.ndarray
-    ) -> np.ndarray:
-        if not _usable(x):
+    def _finite(self, function: Function, x: np.ndarray) -> np.ndarray:
+        if not is_usable(x):
             raise UnreachableError("the solver asked for a point that is not finite")
         try:
-            with np.errstate(
-                over="ignore", invalid="ignore"
-            ):  # what comes of it is looked at
+            with np.errstate(over="ignore", invalid="ignore"):  # checked below
                 values = np.asarray(function(np.array(x)))
         except KeyboardInterrupt as interrupt:
             self.interrupt = interrupt
             raise UnreachableError("the solve has to stop") from interrupt
-        if not _usable(values):
+        if not is_usable(values):
             raise UnreachableError("a value or a slope is not a finite number there")
         return values
 
@@ -187,7 +178,7 @@ class Watch:
         violation = residual(self.problem, x)
         if self.stagnated and not status.usable:
             status = SolveStatus.STAGNATED
-        feasible = violation <= _FEASIBLE * self.options.tolerance
+        feasible = violation <= self._feasible_below
         if status.usable and not feasible:
             status = SolveStatus.INFEASIBLE
         elif self.timed_out and not status.usable:
@@ -196,90 +187,14 @@ class Watch:
             status = SolveStatus.ITERATION_LIMIT
         elif violation == np.inf:
             status = SolveStatus.EVALUATION_ERROR
-        return SolverReport(
-            solver=solver,
-            status=status,
-            x=x,
-            objective=objective_at(self.problem, x),
-            violation=violation,
-            multipliers=np.zeros(len(self.problem.lower))
-            if multipliers is None
-            else multipliers,
-            iterations=self.iterations,
-            wall_time=self.elapsed,
-            message=message,
-        )
+        if multipliers is None:
+            multipliers = np.zeros(len(self.problem.lower))
+        objective = objective_at(self.problem, x)
+        known = (x, objective, violation, multipliers, self.iterations, self.elapsed)
+        return SolverReport(solver, status, *known, message)
 
 
-def ended(
-    solver: str,
-    problem: Problem,
-    x: np.ndarray,
-    status: SolveStatus,
-    message: str,
-    wall_time: float = 0.0,
-) -> SolverReport:
-    """Report of a solve that gave no answer: the start `x`, (v,), stays.
-
-    Parameters
-    ----------
-    solver : str
-    problem : Problem
-    x : (v,) ndarray
-    status : SolveStatus
-    message : str
-    wall_time : float, optional
-        s.
-
-    Returns
-    -------
-    SolverReport
-    """
-    none = np.zeros(len(problem.lower))
-    return SolverReport(
-        solver,
-        status,
-        x,
-        objective_at(problem, x),
-        residual(problem, x),
-        none,
-        iterations=0,
-        wall_time=wall_time,
-        message=message,
-    )
-
-
-def from_finite_numbers(solve: Solve) -> Solve:
-    """Refuse a start or bounds that are not numbers, which a backend could not be trusted with (decorator).
-
-    Where no time is left no solve is begun.
-    """
-
-    @functools.wraps(solve)
-    def checked(
-        problem: Problem,
-        x: np.ndarray,
-        options: SolverOptions,
-        progress: Progress | None,
-    ) -> SolverReport:
-        bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
-        name = solve.__module__.rpartition(".")[2]
-        if options.time_limit <= 0.0:
-            return ended(name, problem, x, SolveStatus.TIME_LIMIT, "no time was left")
-        if _usable(x) and not any(np.isnan(bound).any() for bound in bounds):
-            return solve(problem, x, options, progress)
-        return ended(
-            name,
-            problem,
-            x,
-            SolveStatus.EVALUATION_ERROR,
-            "the start or a bound is not a finite number",
-        )
-
-    return checked
-
-
-def _usable(values: np.ndarray) -> bool:
+def is_usable(values: np.ndarray) -> bool:
     """Tell whether all values are finite, and not so large that products of them are not; NaN is neither."""
     return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
 
@@ -301,11 +216,7 @@ def residual(problem: Problem, x: np.ndarray) -> float:
             rows = problem.rows(x)
     except UnreachableError:
         return np.inf
-    gaps = (
-        problem.lower - rows,
-        rows - problem.upper,
-        problem.x_lower - x,
-        x - problem.x_upper,
-    )
-    worst = float(np.max([gap.max(initial=0.0) for gap in gaps]))
+    of_rows = np.maximum(problem.lower - rows, rows - problem.upper)
+    of_bounds = np.maximum(problem.x_lower - x, x - problem.x_upper)
+    worst = float(np.concatenate([of_rows, of_bounds]).max(initial=0.0))
     return np.inf if np.isnan(worst) else worst

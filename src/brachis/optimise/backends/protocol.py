@@ -1,4 +1,4 @@
-"""What a solver backend is: problem in, report out."""
+"""What a solver gets and gives: problem and options in, report out."""
 
 from __future__ import annotations
 
@@ -136,29 +136,3 @@ class SolverReport(Summary):
 
 Progress = Callable[[int, float], None]
 """Called between iterations with the iteration's number and the objective in seconds; may raise KeyboardInterrupt."""
-
-
-Solve = Callable[[Problem, np.ndarray, SolverOptions, Progress | None], SolverReport]
-"""What a backend does; see `Solver`."""
-
-
-class Solver(Protocol):
-    """A backend."""
-
-    name: str
-
-    def solve(
-        self,
-        problem: Problem,
-        x: np.ndarray,
-        options: SolverOptions,
-        progress: Progress | None,
-    ) -> SolverReport:
-        """Solve `problem` from the start `x`.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            The user interrupted; passed on once the backend has returned.
-        """
-        ...

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from brachis.errors import UnknownNameError
 from brachis.optimise.backends import ipopt, slsqp, uno
-from brachis.optimise.backends.protocol import Solver
+from brachis.optimise.backends.child_process import Solver
 
-TABLE: dict[str, Solver] = {backend.name: backend for backend in (uno, ipopt, slsqp)}
-AUTO_ORDER = ("uno", "ipopt", "slsqp")
+TABLE = {
+    backend.NAME: Solver(backend.NAME, backend.run) for backend in (uno, ipopt, slsqp)
+}
+AUTO_ORDER = tuple(TABLE)
 """The order in which ``auto`` tries them."""
 CURVED_ORDER = ("slsqp", "uno", "ipopt")
-"""That order where a mean over the motion is held: its optimum is no vertex, and a full Hessian approximation pays."""
+"""That order where a mean over the motion is held: its optimum is inside an edge, and a full Hessian pays."""
 NAMES = ("auto", *TABLE)
 
 

@@ -6,108 +6,91 @@ import numpy as np
 from scipy import sparse
 
 from brachis.errors import UnreachableError
-from brachis.optimise.backends.child_process import apart_if_large
-from brachis.optimise.backends.monitor import Watch, from_finite_numbers, objective_at
-from brachis.optimise.backends.protocol import (
-    Problem,
-    Progress,
-    SolverOptions,
-    SolverReport,
-    SolveStatus,
-)
+from brachis.optimise.backends.monitor import SolveMonitor, objective_at
+from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
 
-name = "slsqp"
-
+NAME = "slsqp"
 _STATUS = {
     0: SolveStatus.OPTIMAL,
     4: SolveStatus.INFEASIBLE,
     8: SolveStatus.ACCEPTABLE,
     9: SolveStatus.ITERATION_LIMIT,
 }
-_UNREACHABLE_ROWS = -1e3
-"""SLSQP cannot back off from NaN; a violation far above any real one makes its line search shorten the step."""
-
-_FLAT = 1e-3
-"""SLSQP ends where the objective changes by less than this part of the tolerance: around an optimum that is no vertex
-it changes by the square of what is left of the gradient."""
-_ACTIVE = 1e-5
-_STATIONARY = 1e-3
 
 
 class _StopSolveError(Exception):
     """Leaves SciPy's loop when the solve has to stop."""
 
 
-@from_finite_numbers
-@apart_if_large
-def solve(
-    problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None
-) -> SolverReport:
-    """See `brachis.optimise.backends.protocol.Solver`."""
+def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
+    """Solve the monitor's problem from `x`."""
     from scipy.optimize import Bounds, minimize
 
-    watch = Watch(problem, options, progress)
+    problem = monitor.problem
+    options = monitor.options
     below = np.isfinite(problem.lower)
     above = np.isfinite(problem.upper)
-    shape = (len(problem.lower), len(x))
     last = x.copy()
 
     def rows(point: np.ndarray) -> np.ndarray:
         try:
-            values = watch.rows(point)
+            values = monitor.rows(point)
         except UnreachableError:
-            if watch.must_stop():
+            if monitor.must_stop():
                 raise _StopSolveError from None
-            return np.full(below.sum() + above.sum(), _UNREACHABLE_ROWS)
-        return np.concatenate(
-            [(values - problem.lower)[below], (problem.upper - values)[above]]
-        )
+            # SLSQP cannot back off from NaN; a violation far above any real one makes it shorten the step.
+            return np.full(below.sum() + above.sum(), -1e3)
+        gaps = [(values - problem.lower)[below], (problem.upper - values)[above]]
+        return np.concatenate(gaps)
 
     def jacobian(point: np.ndarray) -> np.ndarray:
-        entries = watch.jacobian(point)
-        dense = sparse.coo_array(
-            (entries, (problem.jacobian_rows, problem.jacobian_columns)), shape=shape
-        ).toarray()
+        dense = _dense(problem, monitor.jacobian(point))
         return np.concatenate([dense[below], -dense[above]])
 
     def objective(point: np.ndarray) -> float:
-        return objective_at(
-            problem, point, objective_at(problem, last)
-        )  # the rows say how bad an unreachable point is
+        # The rows say how bad an unreachable point is.
+        return objective_at(problem, point, objective_at(problem, last))
 
     def callback(point: np.ndarray) -> None:
         last[:] = point
-        if watch.between_iterations(objective(point)):
+        if monitor.between_iterations(objective(point)):
             raise _StopSolveError
 
     try:
-        with watch:
-            watch.rows(
-                x
-            )  # from a start that cannot be evaluated there is nothing to back off to
+        with monitor:
+            # From a start that cannot be evaluated there is nothing to back off to.
+            monitor.rows(x)
             result = minimize(  # type: ignore[call-overload]  # the stubs know neither Bounds nor this callback
                 objective,
                 x,
                 method="SLSQP",
-                jac=watch.gradient,
+                jac=monitor.gradient,
                 bounds=Bounds(problem.x_lower, problem.x_upper),
                 constraints=[{"type": "ineq", "fun": rows, "jac": jacobian}],
                 callback=callback,
+                # SLSQP ends where the objective changes by less than ftol. Around an optimum inside an edge it changes
+                # by the square of what is left of the gradient.
                 options={
                     "maxiter": options.max_iterations,
-                    "ftol": _FLAT * options.tolerance,
+                    "ftol": 1e-3 * options.tolerance,
                 },
             )
     except (_StopSolveError, UnreachableError):
-        status = (
-            SolveStatus.TIME_LIMIT if watch.timed_out else SolveStatus.EVALUATION_ERROR
-        )
-        return watch.report(name, status, last, None, "stopped")
+        # Where the time is up, the report says so.
+        status = SolveStatus.EVALUATION_ERROR
+        return monitor.report(NAME, status, last, None, "stopped")
     status = _STATUS.get(int(result.status), SolveStatus.FAILED)
     answer = np.array(result.x)
     if status is SolveStatus.OPTIMAL and not _is_stationary(problem, answer):
         status = SolveStatus.ACCEPTABLE
-    return watch.report(name, status, answer, None, str(result.message))
+    return monitor.report(NAME, status, answer, None, str(result.message))
+
+
+def _dense(problem: Problem, entries: np.ndarray) -> np.ndarray:
+    """Jacobian as a matrix, (c, v)."""
+    pattern = (problem.jacobian_rows, problem.jacobian_columns)
+    shape = (len(problem.lower), len(problem.x_lower))
+    return np.asarray(sparse.coo_array((entries, pattern), shape=shape).toarray())
 
 
 def _is_stationary(problem: Problem, x: np.ndarray) -> bool:
@@ -118,23 +101,15 @@ def _is_stationary(problem: Problem, x: np.ndarray) -> bool:
     from scipy.optimize import nnls
 
     try:
-        rows = problem.rows(x)
-        entries = problem.jacobian(x)
+        values = np.concatenate([problem.rows(x), x])
+        slopes = np.vstack([_dense(problem, problem.jacobian(x)), np.eye(len(x))])
     except UnreachableError:
         return False
-    shape = (len(rows), len(x))
-    dense = sparse.coo_array(
-        (entries, (problem.jacobian_rows, problem.jacobian_columns)), shape=shape
-    ).toarray()
-    slopes = np.vstack([dense, np.eye(len(x))])
-    values = np.concatenate([rows, x])
-    lower = np.concatenate([problem.lower, problem.x_lower])
-    upper = np.concatenate([problem.upper, problem.x_upper])
-    pushing = np.vstack(
-        [slopes[values <= lower + _ACTIVE], -slopes[values >= upper - _ACTIVE]]
-    )
+    at_lower = values <= np.concatenate([problem.lower, problem.x_lower]) + 1e-5
+    at_upper = values >= np.concatenate([problem.upper, problem.x_upper]) - 1e-5
+    pushing = np.vstack([slopes[at_lower], -slopes[at_upper]])
     gradient = problem.gradient(x)
-    _, distance = (
-        nnls(pushing.T, gradient) if len(pushing) else (None, np.linalg.norm(gradient))
-    )
-    return bool(distance <= _STATIONARY * np.linalg.norm(gradient))
+    distance = np.linalg.norm(gradient)
+    if len(pushing):
+        _, distance = nnls(pushing.T, gradient)
+    return bool(distance <= 1e-3 * np.linalg.norm(gradient))

@@ -11,26 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from brachis.optimise.backends.child_process import apart_if_large, one_at_a_time
-from brachis.optimise.backends.monitor import Watch, from_finite_numbers, objective_at
-from brachis.optimise.backends.protocol import (
-    Problem,
-    Progress,
-    SolverOptions,
-    SolverReport,
-    SolveStatus,
-)
+from brachis.optimise.backends.monitor import SolveMonitor, objective_at
+from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
 
-name = "uno"
+NAME = "uno"
 
 _RESTARTS = ((1.0, False), (1.0, True), (0.2, True))
 """First trust region radius, and whether the variables are scaled: at first, and after a stall or a breakdown.
 
 Uno's own radius of 10 stalls on 1 of 8 random lines. Scaled variables are slower by a tenth where nothing fails.
 """
-_STALL_ITERATIONS = 7
-_STALL_PROGRESS = 1e-3
-_STALL_STATIONARITY = 0.1
 _STATUS = {
     "FEASIBLE_KKT_POINT": SolveStatus.OPTIMAL,
     "FEASIBLE_FJ_POINT": SolveStatus.ACCEPTABLE,
@@ -45,27 +35,21 @@ _STOPPED = {
 }
 
 
-@from_finite_numbers
-@one_at_a_time
-@apart_if_large
-def solve(
-    problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None
-) -> SolverReport:
-    """See `brachis.optimise.backends.protocol.Solver`."""
-    with Watch(problem, options, progress) as watch:
+def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
+    """Solve the monitor's problem from `x`."""
+    with monitor:
         for radius, scaled in _RESTARTS:
-            units = _units(problem, x) if scaled else np.ones(len(x))
-            stall = _Stall(watch, units)
-            result = _run(watch, x, units, radius, stall)
+            units = _units(monitor.problem, x) if scaled else np.ones(len(x))
+            stall = _Stall(monitor, units)
+            result = _run(monitor, x, units, radius, stall)
             x = units * np.array(result.primal_solution)
             ending = result.optimization_status.name
             found = result.solution_status.name
             if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
-                watch.interrupt = KeyboardInterrupt()
-            broken_down = (
-                ending == "ALGORITHMIC_ERROR" or found == "FEASIBLE_SMALL_STEP"
-            )
-            if not (stall.seen or broken_down) or watch.must_stop():
+                monitor.interrupt = KeyboardInterrupt()
+            small = found == "FEASIBLE_SMALL_STEP"
+            has_failed = stall.seen or small or ending == "ALGORITHMIC_ERROR"
+            if not has_failed or monitor.must_stop():
                 break
     status = _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
     if stall.seen:
@@ -73,9 +57,8 @@ def solve(
     elif ending == "USER_TERMINATION":
         status = SolveStatus.ITERATION_LIMIT
     message = f"{ending.lower()}, {found.lower()}"
-    return watch.report(
-        name, status, x, np.array(result.constraint_dual_solution), message
-    )
+    multipliers = np.array(result.constraint_dual_solution)
+    return monitor.report(NAME, status, x, multipliers, message)
 
 
 def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
@@ -96,65 +79,64 @@ class _Stall:
     nothing. A new approximation, scaled variables and a smaller trust region cure it.
     """
 
-    def __init__(self, watch: Watch, units: np.ndarray) -> None:
-        self._watch = watch
+    def __init__(self, monitor: SolveMonitor, units: np.ndarray) -> None:
+        self._monitor = monitor
         self._units = units
         self._objectives: list[float] = []
         self.seen = False
 
-    def __call__(self, point: np.ndarray, *rest: object) -> bool:
+    def __call__(self, point: np.ndarray, *rest: Any) -> bool:
         *_, objective_multiplier, infeasibility, stationarity, _complementarity = rest
-        settled = stationarity <= _STALL_STATIONARITY and objective_multiplier != 0.0  # type: ignore[operator]
-        problem = self._watch.problem
+        monitor = self._monitor
+        restores = objective_multiplier == 0.0
+        is_near = stationarity <= 0.1 and not restores
         # In restoration Uno appends elastic variables.
-        objective = objective_at(problem, self._units * point[: len(self._units)])
+        own = self._units * point[: len(self._units)]
+        objective = objective_at(monitor.problem, own)
         self._objectives.append(objective)
-        stop = (
-            self._watch.between_iterations(objective)
-            or self._watch.iterations >= self._watch.options.max_iterations
-        )
-        counts = settled or (
-            self._watch.options.anywhere and objective_multiplier != 0.0
-        )
-        missed = infeasibility if counts else np.inf
-        is_done = self._watch.has_settled(objective, missed)  # type: ignore[arg-type]
-        stop = is_done or stop
-        recent = self._objectives[-_STALL_ITERATIONS:]
-        self.seen = (
-            not stop
-            and len(recent) == _STALL_ITERATIONS
-            and max(recent) - min(recent) < _STALL_PROGRESS * abs(objective)
-            and infeasibility < _STALL_PROGRESS  # type: ignore[operator]
-            and not settled
-        )
+        stop = monitor.between_iterations(objective)
+        stop = stop or monitor.iterations >= monitor.options.max_iterations
+        counts = is_near or (monitor.options.anywhere and not restores)
+        is_done = monitor.has_settled(objective, infeasibility if counts else np.inf)
+        stop = stop or is_done
+        recent = self._objectives[-7:]
+        creeps = len(recent) == 7 and max(recent) - min(recent) < 1e-3 * abs(objective)
+        self.seen = creeps and infeasibility < 1e-3 and not is_near and not stop
         return stop or self.seen
 
 
 def _run(
-    watch: Watch, x: np.ndarray, units: np.ndarray, radius: float, terminate: _Stall
+    monitor: SolveMonitor,
+    x: np.ndarray,
+    units: np.ndarray,
+    radius: float,
+    terminate: _Stall,
 ) -> Any:
     """One call of Uno, which is untyped; its variables are x in units."""
     import unopy
 
-    problem = watch.problem
-    options = watch.options
-    bounds = (problem.x_lower / units).tolist(), (problem.x_upper / units).tolist()
+    problem = monitor.problem
+    options = monitor.options
     model = unopy.Model(
-        unopy.PROBLEM_NONLINEAR, len(x), *bounds, unopy.ZERO_BASED_INDEXING
+        unopy.PROBLEM_NONLINEAR,
+        len(x),
+        (problem.x_lower / units).tolist(),
+        (problem.x_upper / units).tolist(),
+        unopy.ZERO_BASED_INDEXING,
     )
     entry_units = units[problem.jacobian_columns]
 
     def objective(point: np.ndarray) -> float:
-        return watch.objective(units * point)
+        return monitor.objective(units * point)
 
     def objective_gradient(point: np.ndarray, out: np.ndarray) -> None:
-        out[:] = units * watch.gradient(units * point)
+        out[:] = units * monitor.gradient(units * point)
 
     def rows(point: np.ndarray, out: np.ndarray) -> None:
-        out[:] = watch.rows(units * point)
+        out[:] = monitor.rows(units * point)
 
     def jacobian(point: np.ndarray, out: np.ndarray) -> None:
-        out[:] = entry_units * watch.jacobian(units * point)
+        out[:] = entry_units * monitor.jacobian(units * point)
 
     model.set_objective(unopy.MINIMIZE, objective, objective_gradient)
     model.set_constraints(

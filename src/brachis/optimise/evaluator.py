@@ -1,0 +1,143 @@
+"""The evaluator: curves y(t) in, joint motion, limits and their slopes out.
+
+A limit with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
+d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from the joint map. One that asks for the
+jerk has likewise slopes by ydddot (see `joint_map`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from brachis.kinematics import JointMap, JointState
+from brachis.limits import Limit, Partials
+
+
+class Evaluator:
+    """All that an optimisation asks of a robot along curves y(t).
+
+    A phase has one, and it alone asks joint map and limits for values and slopes: for the rows of the program, their
+    Jacobian, and the checks between collocation points. So a compiled evaluator can take the place of this one. It
+    needs `limits`, `is_mean`, and `evaluate` with an answer that has what `Evaluation` has.
+
+    Parameters
+    ----------
+    joint_map : JointMap
+    limits : sequence of Limit
+
+    Attributes
+    ----------
+    joint_map, limits
+        As given.
+    is_mean : (c,) bool ndarray
+        Which of the limits' values are held as means over the motion.
+    """
+
+    def __init__(self, joint_map: JointMap, limits: Sequence[Limit]) -> None:
+        self.joint_map = joint_map
+        self.limits = tuple(limits)
+        counts = [len(limit.lower) for limit in self.limits]
+        means = [limit.guarantee.is_mean for limit in self.limits]
+        self.is_mean = np.repeat(np.array(means, dtype=bool), counts)
+
+    def evaluate(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        ydddot: np.ndarray,
+        *,
+        t: np.ndarray | None = None,
+        near: np.ndarray | None = None,
+    ) -> Evaluation:
+        """Evaluate joint motion and limits at K times.
+
+        Parameters
+        ----------
+        y, ydot, yddot, ydddot : (K, 1 + r) ndarray
+            The curves and their time derivatives.
+        t : (K,) ndarray, optional
+            The times, ascending from the start on, s; by them turns are counted.
+        near : (K, n) ndarray, optional
+            Postures known to be near, which decide about turns; the times may then be any.
+
+        Raises
+        ------
+        UnreachableError
+            There is no posture at one of the times.
+        """
+        motion = self.joint_map.state(y, ydot, yddot, ydddot, t=t, near=near)
+        return Evaluation(self.limits, motion)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Joint motion and limits at K times; values and slopes are computed when they are asked for, and once.
+
+    Attributes
+    ----------
+    limits : tuple of Limit
+        With c values in all.
+    motion : JointState
+        q, qdot, qddot, qdddot, (K, n), and the gradient dq/dy.
+    """
+
+    limits: tuple[Limit, ...]
+    motion: JointState
+
+    @cached_property
+    def by_limit(self) -> tuple[np.ndarray, ...]:
+        """Values of every limit, (K, its own c)."""
+        return tuple(limit.values(self.motion) for limit in self.limits)
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """Values of all limits, (K, c)."""
+        return np.concatenate(self.by_limit, axis=1)
+
+    @cached_property
+    def slopes(self) -> tuple[np.ndarray, ...]:
+        """Slopes of `values` by y, ydot, yddot and, where a limit asks for the jerk, ydddot, (K, c, 1 + r) each."""
+        parts = [self.chain(limit.partials(self.motion)) for limit in self.limits]
+        orders = max(len(part) for part in parts)
+        padded = [
+            (*part, *[np.zeros_like(part[0])] * (orders - len(part))) for part in parts
+        ]
+        return tuple(np.concatenate(own, axis=1) for own in zip(*padded, strict=True))
+
+    def chain(self, partials: Partials) -> tuple[np.ndarray, ...]:
+        """Differentiate functions with given partials by y, ydot, yddot and, if they ask for it, ydddot."""
+        motion = self.motion
+        exact = motion.derivatives
+        gradient = motion.gradient
+        given = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
+        shape = next(part.shape[:2] for part in given if part is not None)
+        by_y = by_ydot = by_yddot = np.zeros((*shape, motion.y.shape[1]))
+        if partials.q is not None:
+            by_y = by_y + partials.q @ gradient
+        if partials.s is not None:
+            by_y = by_y.copy()
+            by_y[:, :, 0] += partials.s
+        if partials.qdot is not None:
+            by_y = by_y + partials.qdot @ exact.qdot_y
+            by_ydot = by_ydot + partials.qdot @ gradient
+        if partials.qddot is not None:
+            by_y = by_y + partials.qddot @ exact.qddot_y
+            by_ydot = by_ydot + partials.qddot @ exact.qddot_ydot
+            by_yddot = by_yddot + partials.qddot @ gradient
+        if partials.qdddot is None:
+            return by_y, by_ydot, by_yddot
+        by_y = by_y + partials.qdddot @ motion.qdddot_y
+        by_ydot = by_ydot + 3.0 * partials.qdddot @ exact.qddot_y
+        by_yddot = by_yddot + 3.0 * partials.qdddot @ exact.qdot_y
+        return by_y, by_ydot, by_yddot, partials.qdddot @ gradient
+
+    def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
+        """How far the limits that count are violated, (K, their c); negative inside."""
+        pairs = zip(self.limits, self.by_limit, strict=True)
+        own = [limit.violation(values) for limit, values in pairs if counts(limit)]
+        return np.concatenate([np.empty((len(self.motion.y), 0)), *own], axis=1)
