@@ -29,7 +29,7 @@ from brachis.problem.feasibility import in_figures, load_remedies
 from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
 from brachis.search.phase_plane import (
-    fastest,
+    PhasePlane,
     interpolate,
     postures_along,
     spread_stations,
@@ -216,11 +216,12 @@ def _explain_in_phase_plane(start: InitialGuess) -> Failure | None:
     if q is None or problem.task.boundary.periodic:
         return None
     stations = spread_stations(problem.limits)
-    if fastest(problem.limits, _S, q, rates, stations) is not None:
+    if PhasePlane(problem.limits, _S, q, stations).fastest(rates) is not None:
         return None
-    rate = fastest(_others(problem), _S, q, rates, stations)
+    others = PhasePlane(_others(problem), _S, q, stations)
+    rate = others.fastest(rates)
     if rate is None:
-        return _explain_end_speed(problem, q, stations)
+        return _explain_end_speed(problem, others)
     q_ds = np.gradient(q, _S, axis=0, edge_order=2)
     places = interpolate(stations, _S, q)
     qdot = interpolate(stations, _S, q_ds) * rate[:, None]
@@ -232,14 +233,11 @@ def _explain_in_phase_plane(start: InitialGuess) -> Failure | None:
     )
 
 
-def _explain_end_speed(
-    problem: Problem, q: np.ndarray, stations: np.ndarray
-) -> Failure | None:
+def _explain_end_speed(problem: Problem, plane: PhasePlane) -> Failure | None:
     """Tell at which end the path cannot be passed as fast as asked for; the other is at rest, or slower likewise."""
 
     def is_possible(rates: np.ndarray) -> bool:
-        ends = (float(rates[0]), float(rates[1]))
-        return fastest(_others(problem), _S, q, ends, stations) is not None
+        return plane.fastest((float(rates[0]), float(rates[1]))) is not None
 
     if not is_possible(np.zeros(2)):
         return None

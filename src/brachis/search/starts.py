@@ -29,7 +29,7 @@ from brachis.search.failure import Failure
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.phase_plane import interpolate, least_time, least_times
+from brachis.search.phase_plane import PhasePlane, interpolate, least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.processes import ignore
 from brachis.search.screening import screen
@@ -378,7 +378,7 @@ def joint_space_start(problem: Problem) -> InitialGuess:
     """
     s = np.linspace(0.0, 1.0, 401)
     q = problem.path.sample(s).target
-    times = least_times(problem.limits, s, q, problem.end_rates)
+    times = PhasePlane(problem.limits, s, q).times(problem.end_rates)
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
         is_needed = times is None or limit.longer_time != "relieves"

@@ -39,7 +39,7 @@ from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.phase import Motion, Phase
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.search.phase_plane import fastest
+from brachis.search.phase_plane import PhasePlane
 from brachis.trajectory import Trajectory
 
 INTERVALS = 100
@@ -311,7 +311,7 @@ def knot_cost(
     s = np.linspace(0.0, 1.0, 1001)
     q = trajectory.position(_times_at(trajectory, s))
     first, last = np.abs(trajectory.path_spline.derivative()([0.0, trajectory.t_end]))
-    rate = fastest(limits, s, q, (first, last), s)
+    rate = PhasePlane(limits, s, q).fastest((first, last))
     if rate is None:
         return None
     steps = 2.0 * np.diff(s) / (rate[1:] + rate[:-1])
