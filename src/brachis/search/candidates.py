@@ -63,6 +63,13 @@ SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
 
+def solvers_of(problem: Problem) -> list[str]:
+    """Names of the solvers for a problem, the one that is tried first at the front."""
+    curved = any(limit.guarantee.is_mean for limit in problem.limits)
+    found = solver_named(problem.task.solver.name, curved=curved)
+    return [solver.name for solver in found]
+
+
 def solve_candidate(
     start: InitialGuess, deadline: Deadline, listener: Listener
 ) -> Candidate:

@@ -133,6 +133,18 @@ def _near_start(problem: Problem, joint: int) -> float:
     return float(axis @ (wanted - there) / max(axis @ axis, 1e-12))
 
 
+def solve_all(
+    decomposition: Decomposition, targets: np.ndarray, q_r: np.ndarray
+) -> np.ndarray:
+    """Postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r); NaN out of reach."""
+    n = decomposition.problem.robot.n
+    answers = decomposition.match.solver.solve(targets, q_r)
+    q = np.empty((*answers.shape[:3], n))
+    q[..., list(decomposition.redundant)] = q_r[:, None, None]
+    q[..., complement(n, decomposition.redundant)] = answers
+    return q
+
+
 class ClosedFormLattice(Lattice):
     """Lattice of a choice of redundant joints.
 
@@ -149,7 +161,6 @@ class ClosedFormLattice(Lattice):
         problem = decomposition.problem
         self.decomposition = decomposition
         self._redundant = list(decomposition.redundant)
-        self._rest = complement(problem.robot.n, decomposition.redundant)
         turning = problem.robot.revolute.copy()
         turning[self._redundant] = False
         super().__init__(problem, turning, **options)
@@ -176,22 +187,14 @@ class ClosedFormLattice(Lattice):
         """Make nodes all over the ranges of the redundant joints."""
         cells = self._cells.everywhere(4 * self._nodes, rng)
         branches = np.array(self.decomposition.branches)
-        answers = self._solve(cells, 0)[:, branches]
-        cell, branch, alternative = np.nonzero(np.isfinite(answers).all(axis=3))
-        q = self._postures(cells[cell], answers[cell, branch, alternative])
-        return Layer.start(q, branches[branch])
+        q = self._postures(cells, 0)[:, branches]
+        exists = np.isfinite(q).all(axis=3)
+        return Layer.start(q[exists], branches[np.nonzero(exists)[1]])
 
-    def _solve(self, cells: np.ndarray, station: int) -> np.ndarray:
-        """Non-redundant joints of all branches, (C, B, A, m)."""
-        target = np.repeat(self._targets[station][None], len(cells), axis=0)
-        return self._solver.solve(target, self._cells.positions(cells))
-
-    def _postures(self, cells: np.ndarray, answers: np.ndarray) -> np.ndarray:
-        """Postures, (K, n), of cells, (K, r), with non-redundant joints, (K, m)."""
-        q = np.empty((len(cells), self._robot.n))
-        q[:, self._redundant] = self._cells.positions(cells)
-        q[:, self._rest] = answers
-        return q
+    def _postures(self, cells: np.ndarray, station: int) -> np.ndarray:
+        """Postures, (C, B, A, n), of cells, (C, r), on all branches."""
+        targets = np.repeat(self._targets[station][None], len(cells), axis=0)
+        return solve_all(self.decomposition, targets, self._cells.positions(cells))
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
         """List edges to the cells around; at the very end to the given end's, too."""
@@ -206,20 +209,20 @@ class ClosedFormLattice(Lattice):
             parent = np.append(parent, nodes)
             around = np.vstack([around, aim])
         cells, where = unique(around)
-        answers = self._solve(cells, station)
+        postures = self._postures(cells, station)
         several = self._solver.alternatives
         alternative = np.tile(np.arange(several), len(parent))
         parent = np.repeat(parent, several)
         where = np.repeat(where, several)
         branch = before.branch[parent]
-        q = self._postures(cells[where], answers[where, branch, alternative])
+        q = postures[where, branch, alternative]
         step = self._step(before.q[parent], q)
         turns = np.nan_to_num(np.round((before.q[parent] + step - q) / TURN))
         return Edges(
             parent,
             step,
             np.column_stack([where, branch, alternative, turns[:, self._counts_turns]]),
-            np.isfinite(answers).all(axis=3).any(axis=(1, 2))[where],
+            np.isfinite(postures).all(axis=3).any(axis=(1, 2))[where],
             np.ones(len(parent), dtype=bool),
         )
 

@@ -31,6 +31,7 @@ from brachis.search.failure import Failure
 from brachis.search.phase_plane import (
     PhasePlane,
     interpolate,
+    least_speeds,
     postures_along,
     spread_stations,
 )
@@ -179,7 +180,7 @@ def explain_speed(
     starts = [
         each.start for each in candidates if each.start is not None and each.solver
     ]
-    if not starts or not _least_speeds(starts[0].problem):
+    if not starts or not least_speeds(starts[0].problem.limits):
         return None
     start = min(starts, key=lambda start: start.estimate)
     problem = dataclasses.replace(start.problem, limits=tuple(_others(start.problem)))
@@ -197,11 +198,6 @@ def explain_speed(
     return _explain_shortfall(start, moments, "in the fastest motion without it", q)
 
 
-def _least_speeds(problem: Problem) -> list[Limit]:
-    """Limits that ask for a least speed."""
-    return [limit for limit in problem.limits if limit.longer_time == "violates"]
-
-
 def _others(problem: Problem) -> list[Limit]:
     """Limits that do not ask for a least speed."""
     return [limit for limit in problem.limits if limit.longer_time != "violates"]
@@ -211,7 +207,7 @@ def _explain_in_phase_plane(start: InitialGuess) -> Failure | None:
     """Tell which speed no motion along the guess's joint path has; None if all are possible, or none is asked for."""
     problem = start.problem
     rates = problem.end_rates
-    is_asked = any(rates) or bool(_least_speeds(problem))
+    is_asked = any(rates) or bool(least_speeds(problem.limits))
     q = postures_along(start, _S) if is_asked else None
     if q is None or problem.task.boundary.periodic:
         return None
@@ -285,7 +281,7 @@ def _explain_shortfall(
     """
     problem = start.problem
     worst = 0.0
-    for each in _least_speeds(problem):
+    for each in least_speeds(problem.limits):
         parts = _parts_of(each, motion.s)
         everything = each.values(motion)
         shortfall = np.where(

@@ -178,6 +178,11 @@ def interpolate(places: np.ndarray, s: np.ndarray, values: np.ndarray) -> np.nda
     return np.column_stack([np.interp(places, s, column) for column in values.T])
 
 
+def least_speeds(limits: Sequence[Limit]) -> list[Limit]:
+    """Limits that ask for a least speed."""
+    return [limit for limit in limits if limit.longer_time == "violates"]
+
+
 def initial_knots(start: InitialGuess) -> np.ndarray:
     """Choose the ends of the knot intervals in normalised time, (N + 1,), for a plan from a guess."""
     breaks = breaks_of(start.problem.task)
@@ -254,10 +259,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
 
 def _least_speed_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and their times, (S,), s; None if no limit asks for a least speed."""
-    has_least_speed = any(
-        limit.longer_time == "violates" for limit in start.problem.limits
-    )
-    return _phase_plane_guess(start) if has_least_speed else None
+    return _phase_plane_guess(start) if least_speeds(start.problem.limits) else None
 
 
 def _moving_ends_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
@@ -305,7 +307,7 @@ def spread_stations(limits: Sequence[Limit]) -> np.ndarray:
     """Spread stations evenly, and ever closer towards places at which a least speed sets in or ends."""
     even = np.linspace(0.0, 1.0, _STATIONS)
     steps = even[1] * 0.5 ** np.arange(12)
-    breaks = [limit.breaks for limit in limits if limit.longer_time == "violates"]
+    breaks = [limit.breaks for limit in least_speeds(limits)]
     near = np.concatenate([np.empty(0), *breaks])[:, None] + np.r_[-steps, 0.0, steps]
     places = np.union1d(even, np.clip(near, 0.0, 1.0))
     return places[np.append(np.diff(places) > 0.5 * steps[-1], True)]

@@ -44,7 +44,7 @@ from brachis.search.processes import each, ignore, processes
 from brachis.search.schedule import Batch, batches
 from brachis.trajectory import Trajectory
 
-NOT_TRIED = "not tried: the time was up"
+NOT_TRIED = "not tried: the search ended"
 """Status of a candidate for which there was no time."""
 SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""

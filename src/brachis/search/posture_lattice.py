@@ -21,8 +21,8 @@ import numpy as np
 
 from brachis.kinematics import Newton, moving_most, null_spaces, solved_each
 from brachis.problem.problem import Decomposition, Problem
-from brachis.robot.joints import TURN, complement
-from brachis.search.closed_form_lattice import Cells, cell_sizes
+from brachis.robot.joints import TURN
+from brachis.search.closed_form_lattice import Cells, cell_sizes, solve_all
 from brachis.search.joint_path import JointPath, distinct, sampling_box
 from brachis.search.lattice import (
     LARGEST_STEP,
@@ -68,11 +68,10 @@ def start_postures(
     seeds : (K,) int ndarray
         Which of the decompositions gave it; -1 for random ones.
     """
-    n = problem.robot.n
     target = problem.path.sample(np.zeros(1)).target
     if not decompositions:
         low, high = sampling_box(problem.robot)
-        drawn = rng.uniform(low, high, (count, n))
+        drawn = rng.uniform(low, high, (count, len(low)))
         q = newton.nearest(np.repeat(target, count, axis=0), drawn)
         q = q[np.isfinite(q).all(axis=1)]
         return q, np.full(len(q), -1)
@@ -80,11 +79,7 @@ def start_postures(
     for decomposition in decompositions:
         cells = Cells.of(decomposition, cells_per_turn, None)
         q_r = cells.positions(cells.everywhere(count, rng))
-        solver = decomposition.match.solver
-        answers = solver.solve(np.repeat(target, len(q_r), axis=0), q_r)
-        q = np.empty((*answers.shape[:3], n))
-        q[..., list(decomposition.redundant)] = q_r[:, None, None]
-        q[..., complement(n, decomposition.redundant)] = answers
+        q = solve_all(decomposition, np.repeat(target, len(q_r), axis=0), q_r)
         found.append(q[np.isfinite(q).all(axis=3)])
     seeds = np.repeat(np.arange(len(found)), [len(q) for q in found])
     return np.concatenate(found), seeds

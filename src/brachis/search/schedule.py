@@ -15,10 +15,10 @@ from functools import partial
 
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.optimise.backends import solver_named
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
+from brachis.search.candidates import solvers_of
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import DeadEnd
@@ -78,13 +78,6 @@ class Batch:
             start.with_solver(solver) for solver in solvers for start in starts
         )
         return cls(combined, refined, fallback, lattices)
-
-
-def solvers_of(problem: Problem) -> list[str]:
-    """Names of the solvers for a problem, the one that is tried first at the front."""
-    curved = any(limit.guarantee.is_mean for limit in problem.limits)
-    found = solver_named(problem.task.solver.name, curved=curved)
-    return [solver.name for solver in found]
 
 
 def batches(

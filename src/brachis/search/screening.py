@@ -21,7 +21,7 @@ from brachis.optimise.backends import SolverOptions, solver_named
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
-from brachis.search.candidates import solve_in_chart
+from brachis.search.candidates import solve_in_chart, solvers_of
 from brachis.search.phase_plane import initial_guess
 from brachis.search.processes import each, processes
 
@@ -92,8 +92,7 @@ def _solve_quickly(
         task=task.model_copy(update={"spline": spline}),
         limits=tuple(limit for limit in start.problem.limits if limit.order <= _DEGREE),
     )
-    curved = any(limit.guarantee.is_mean for limit in start.problem.limits)
-    backend = solver_named(task.solver.name, curved=curved)[0]
+    (backend,) = solver_named(solvers_of(start.problem)[0])
     # An answer that nearly holds the limits will do, and so will one that hardly gets any faster.
     options = SolverOptions(1e-3, 25, np.inf, progress=5e-3, patience=3)
     session = SolverSession(backend, options, deadline, acceptable=1e-2)
