@@ -208,7 +208,7 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
         "task_space": "pose",
     }
     given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
-    dead_ends = {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})}
+    dead_ends = {"panda_joint4": DeadEnd(0.4, "the branch ends")}
     failure = explain_no_motion(
         given, decompositions_of(given), [], dead_ends, Deadline.after(10.0)
     )

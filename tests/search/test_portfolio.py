@@ -223,7 +223,7 @@ class NoPosture:
         pass
 
     def joint_paths(self, _most: int) -> DeadEnd:
-        return DeadEnd(0.5, {"nothing": 1})
+        return DeadEnd(0.5, "nothing")
 
 
 def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(

@@ -307,7 +307,7 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     end = PostureLattice(given, decompositions_of(given), density=0.2).joint_paths(4)
     assert isinstance(end, DeadEnd)
     assert 1.8 / 2.1 < end.s < 1.0
-    assert "the range of joint 'j1' ends" in end.causes
+    assert "the range of joint 'j1' ends" in end.cause
 
 
 @pytest.mark.parametrize(
@@ -397,7 +397,7 @@ def test_where_it_ends_and_why(make, reason):
     end = lengthened(make())
     assert isinstance(end, DeadEnd)
     assert 0.0 < end.s <= 1.0
-    assert reason in " ".join(end.causes)
+    assert reason in end.cause
 
 
 def test_the_same_seed_gives_the_same_joint_paths():

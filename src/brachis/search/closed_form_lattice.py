@@ -226,19 +226,14 @@ class ClosedFormLattice(Lattice):
             np.ones(len(parent), dtype=bool),
         )
 
-    def _keep(
-        self, layer: Layer, choose: Callable[[Layer], Layer]
-    ) -> Layer | dict[str, int]:
+    def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
         """Choose among the nodes clear of the branch boundary that can be held."""
         clear = np.ones(len(layer.branch), dtype=bool)
         for branch in np.unique(layer.branch):
             own = layer.branch == branch
             margins = self._solver.branch_margins(layer.q[own], int(branch))
             clear[own] = margins.min(axis=1, initial=np.inf) >= self._clear
-        kept = super()._keep(layer[clear], choose)
-        if isinstance(kept, Layer) or clear.all():
-            return kept
-        return kept | {OTHER_BRANCH: int((~clear).sum())}
+        return super()._keep(layer[clear], choose) or OTHER_BRANCH
 
     def _thin(self, layer: Layer) -> Layer:
         """Keep a bounded number of nodes with several redundant joints."""

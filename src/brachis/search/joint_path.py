@@ -54,14 +54,14 @@ class DeadEnd:
     ----------
     s : float
         Path coordinate of the first station that no node reaches.
-    causes : dict of str to int
-        Why, and how many edges say so; the cause of those that came nearest to being possible first.
+    cause : str
+        Why: of all edges that are impossible, the cause of those that came nearest to being possible.
     backwards : bool
         Whether the lattice begins at the given end posture.
     """
 
     s: float
-    causes: dict[str, int]
+    cause: str
     backwards: bool = False
 
     @property
@@ -70,13 +70,13 @@ class DeadEnd:
         return (0.0, self.s) if self.backwards else (self.s, 1.0)
 
     def __str__(self) -> str:
-        """Return the place and its first cause, in words."""
+        """Return the place and the cause, in words."""
         place = (
             f"back from the end posture, at s = {self.s:.3g}"
             if self.backwards
             else f"from s = {self.s:.3g} on"
         )
-        return f"{place} {next(iter(self.causes))}"
+        return f"{place} {self.cause}"
 
 
 def distinct(joint_paths: Sequence[JointPath], most: int) -> list[int]:
@@ -149,32 +149,7 @@ def sampling_box(
     return low, high
 
 
-def causes_of(
-    robot: Robot,
-    anywhere: np.ndarray,
-    found: np.ndarray,
-    inside: np.ndarray,
-    near: np.ndarray,
-) -> dict[str, int]:
-    """Count why edges, (E,), are impossible, those first that came nearest to being possible.
-
-    `anywhere` tells whether there is an answer in any branch, `found` in the edge's own; `inside`, (E, n), which joints
-    stay within their ranges.
-    """
-    counts = {
-        OTHER_BRANCH: anywhere & ~found,
-        JUMPS: found & ~near,
-        NO_ANSWER: ~anywhere,
-    }
-    others = {cause: int(those.sum()) for cause, those in counts.items() if those.any()}
-    return beyond_ranges(robot, inside[found & near]) | others
-
-
-def beyond_ranges(robot: Robot, inside: np.ndarray) -> dict[str, int]:
-    """Name the joint that most often leaves its range in K postures, and count these; `inside` is (K, n) bool."""
-    outside = int((~inside.all(axis=1)).sum())
-    if not outside:
-        return {}
-    return {
-        f"the range of joint {robot.joint_names[int(np.argmin(inside.sum(axis=0)))]!r} ends": outside
-    }
+def leaving_range(robot: Robot, inside: np.ndarray) -> str:
+    """Name the joint that most often leaves its range in K postures; `inside` is (K, n) bool."""
+    joint = robot.joint_names[int(np.argmin(inside.sum(axis=0)))]
+    return f"the range of joint {joint!r} ends"

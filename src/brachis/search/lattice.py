@@ -38,11 +38,11 @@ from brachis.robot.joints import TURN
 from brachis.search.joint_path import (
     JUMPS,
     NO_ANSWER,
+    OTHER_BRANCH,
     DeadEnd,
     JointPath,
-    beyond_ranges,
-    causes_of,
     distinct,
+    leaving_range,
     weights_near,
 )
 
@@ -266,7 +266,7 @@ class Lattice(ABC):
             ends = ends[self._at_end(layers[-1])[ends]]
         ends = ends[length[ends] <= 4.0 * length[ends[:1]] + _SLACK]
         if not len(ends):
-            return DeadEnd(1.0, {JUMPS: 1})
+            return DeadEnd(1.0, JUMPS)
         last = layers[-1][ends]
         q = self._trace(layers, ends) + TURN * self._turn_of(last)[:, None]
         found = [
@@ -275,28 +275,28 @@ class Lattice(ABC):
         ]
         return self._choose(found, last, most)
 
-    def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
-        """Make the nodes with which joint paths begin, or count what refuses them."""
+    def _first_layer(self, rng: np.random.Generator) -> Layer | str:
+        """Make the nodes with which joint paths begin, or tell what refuses them."""
         if self._origin is not None:
             branch = np.array([self._given_branch])
             return Layer.start(self._origin[None].astype(float), branch)
         layer = self._start_nodes(rng)
         if not len(layer.q):
-            return {NO_ANSWER: 1}
+            return NO_ANSWER
         inside = self._inside(layer.q, layer.q)
         within = np.flatnonzero(inside.all(axis=1))
         if not len(within):
-            return beyond_ranges(self._robot, inside)
+            return leaving_range(self._robot, inside)
         return self._keep(layer[within], self._choose_starts)
 
     def _next(
         self, before: Layer, station: int, rng: np.random.Generator
-    ) -> Layer | dict[str, int]:
-        """Join the nodes of a layer to the next station, or count why none can be."""
+    ) -> Layer | str:
+        """Join the nodes of a layer to the next station, or tell why none can be."""
         edges = self._edges(before, station, rng)
         parent = edges.parent
         if not len(parent):
-            return {NO_ANSWER: len(before.q)}
+            return NO_ANSWER
         q = before.q[parent] + edges.step
         low = np.minimum(before.low[parent], q)
         high = np.maximum(before.high[parent], q)
@@ -306,7 +306,12 @@ class Lattice(ABC):
             near = edges.allowed & np.all(np.abs(edges.step) <= LARGEST_STEP, axis=1)
         good = exists & inside.all(axis=1) & near
         if not good.any():
-            return causes_of(self._robot, edges.elsewhere, exists, inside, near)
+            # The cause of those that came nearest to being possible.
+            if (exists & near).any():
+                return leaving_range(self._robot, inside[exists & near])
+            if (edges.elsewhere & ~exists).any():
+                return OTHER_BRANCH
+            return JUMPS if exists.any() else NO_ANSWER
         parent = parent[good]
         steps = self._lengths(before.q, edges.step[good], parent)
         length = before.length[parent] + steps
@@ -314,21 +319,18 @@ class Lattice(ABC):
         layer = Layer(branch, q[good], low[good], high[good], length, parent)
         return self._keep(layer[shortest(length, edges.key[good])], self._thin)
 
-    def _keep(
-        self, layer: Layer, choose: Callable[[Layer], Layer]
-    ) -> Layer | dict[str, int]:
-        """Choose among the nodes that can be held against gravity, or count what refuses them."""
+    def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
+        """Choose among the nodes that can be held against gravity, or tell what refuses them."""
         still = Moments.at_rest(layer.q)
         held = np.ones(len(layer.q), dtype=bool)
-        refused: dict[str, int] = {}
+        cause = ""
         for limit in self.problem.limits:
             if limit.at_rest == "posture":
                 allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)
-                if not allowed.all():
-                    cause = f"the {limit.name} limit {limit.refusal}"
-                    refused[cause] = int((~allowed).sum())
                 held &= allowed
-        return choose(layer[held]) if held.any() else refused
+                if not (cause or allowed.all()):
+                    cause = f"the {limit.name} limit {limit.refusal}"
+        return choose(layer[held]) if held.any() else cause
 
     def _choose_some(self, layer: Layer, most: int, cost: np.ndarray) -> np.ndarray:
         """Choose `most` nodes: half of least `cost`, (K,), the others far from each other."""

@@ -271,7 +271,7 @@ def chart_starts(
         if guess is not None:
             guesses.append(guess)
     if not guesses:
-        return [] if deadline.passed else DeadEnd(0.0, {NO_CHART: len(named)})
+        return [] if deadline.passed else DeadEnd(0.0, NO_CHART)
     guesses.sort(key=lambda guess: guess.estimate)
     refuse_hopeless(guesses)
     # Joint paths whose estimated time is three times the least one are hopeless.
