@@ -55,9 +55,7 @@ def has_course(robot: Robot, task: dict[str, object]) -> bool:
     except BrachisError:
         return False
     return any(
-        not isinstance(
-            lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0), DeadEnd
-        )
+        not isinstance(lattice_starts(decomposition, SEARCH_LEVELS["fast"][0]), DeadEnd)
         for decomposition in found
     )
 

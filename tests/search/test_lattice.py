@@ -165,7 +165,7 @@ def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
     given = problem(scara(**options), **changes)
     ends = [
-        lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0)
+        lattice_starts(decomposition, SEARCH_LEVELS["fast"][0])
         for decomposition in decompositions_of(given)
     ]
     assert all(isinstance(end, DeadEnd) for end in ends)

@@ -161,7 +161,6 @@ class Options(TypedDict, total=False):
     cells_per_turn: int
     density: float
     nodes: int
-    seed: int
     deadline: Deadline
 
 
@@ -179,8 +178,6 @@ class Lattice(ABC):
         Factor on the number of stations.
     nodes : int, optional
         Nodes that a layer keeps with several redundant joints.
-    seed : int, optional
-        Of what is drawn at random with several redundant joints.
     deadline : Deadline, optional
         No layer is begun after it.
     """
@@ -193,7 +190,6 @@ class Lattice(ABC):
         self._robot = problem.robot
         self._cells_per_turn = options.get("cells_per_turn", 72)
         self._nodes = options.get("nodes", 120)
-        self._seed = options.get("seed", 0)
         self._deadline = options.get("deadline", NEVER)
         self._backwards = problem.start is None and problem.end is not None
         self._origin = problem.end if self._backwards else problem.start
@@ -246,7 +242,7 @@ class Lattice(ABC):
         list of JointPath or DeadEnd
             Distinct ones, the shortest first, or where the lattice ends; an empty list if the time was up.
         """
-        rng = np.random.default_rng(self._seed)
+        rng = np.random.default_rng(self.problem.task.search.seed)
         layers: list[Layer] = []
         numbers = range(len(self.s))
         for station in numbers[:: -1 if self._backwards else 1]:

@@ -219,7 +219,6 @@ def _guess_on_some_branches(
         _starts_of,
         decompositions,
         level,
-        search.seed,
         deadline,
         jobs=processes(search.jobs, deadline),
         listener=listener,
@@ -248,11 +247,10 @@ def _guess_on_some_branches(
 def _starts_of(
     decomposition: Decomposition,
     level: SearchLevel,
-    seed: int,
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess] | DeadEnd:
     if deadline.passed:
         return []
     listener(f"looking for joint paths on the lattice of {decomposition.name}")
-    return lattice_starts(decomposition, level, seed, deadline)
+    return lattice_starts(decomposition, level, deadline)

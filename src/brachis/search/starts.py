@@ -97,10 +97,7 @@ SEARCH_LEVELS = {
 
 
 def lattice_starts(
-    decomposition: Decomposition,
-    level: SearchLevel,
-    seed: int,
-    deadline: Deadline = NEVER,
+    decomposition: Decomposition, level: SearchLevel, deadline: Deadline = NEVER
 ) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
 
@@ -108,8 +105,6 @@ def lattice_starts(
     ----------
     decomposition : Decomposition
     level : SearchLevel
-    seed : int
-        Of what is drawn at random with several redundant joints.
     deadline : Deadline, optional
 
     Returns
@@ -124,7 +119,6 @@ def lattice_starts(
             cells_per_turn=finer * level.cells_per_turn,
             density=density,
             nodes=finer * level.nodes,
-            seed=seed,
             deadline=deadline,
         )
         found = lattice.joint_paths(most * len(decomposition.branches))
@@ -236,7 +230,6 @@ def chart_starts(
     PlanningError
         No motion along any joint path can hold a least speed, or a mean of a load.
     """
-    seed = problem.task.search.seed
     for finer in (1, 2):
         lattice = PostureLattice(
             problem,
@@ -245,7 +238,6 @@ def chart_starts(
             density=float(finer),
             nodes=finer * level.nodes // 2,
             only_minima=level.only_minima,
-            seed=seed,
             deadline=deadline,
         )
         found = lattice.joint_paths(SCREENED * level.in_charts)
@@ -260,7 +252,8 @@ def chart_starts(
         for number, each in enumerate(found, 1)
     ]
     if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:
-        more = perturb(found, 2 * level.in_charts - len(found), seed)
+        missing = 2 * level.in_charts - len(found)
+        more = perturb(found, missing, problem.task.search.seed)
         named += [(f"perturbed {number}", each) for number, each in enumerate(more, 1)]
     newton = Newton(problem.task_map)
     guesses = []
@@ -440,7 +433,7 @@ def first_map(
     found = (
         chart_starts(problem, decompositions, level)
         if first is None
-        else lattice_starts(first, level, problem.task.search.seed)
+        else lattice_starts(first, level)
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
