@@ -81,7 +81,6 @@ def test_closed_forms_are_left_for_the_last(
                 decompositions_of(problem),
                 NEVER,
                 lambda _text: None,
-                lambda *_dead_end: None,
             )
         )
         first = [

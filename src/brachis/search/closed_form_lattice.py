@@ -223,7 +223,6 @@ class ClosedFormLattice(Lattice):
             step,
             np.column_stack([where, branch, alternative, turns[:, self._counts_turns]]),
             np.isfinite(postures).all(axis=3).any(axis=(1, 2))[where],
-            np.ones(len(parent), dtype=bool),
         )
 
     def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:

@@ -116,17 +116,17 @@ class Edges:
         From the node to the posture, NaN for one that does not exist.
     key : (E, k) int ndarray
         Equal for edges to the same node.
-    elsewhere : (E,) bool ndarray
-        Whether there is a posture on any branch.
-    allowed : (E,) bool ndarray
-        Whether the step is one that a motion may make.
+    elsewhere : (E,) bool ndarray, optional
+        Whether there is a posture on any branch; by default there is.
+    allowed : (E,) bool ndarray, optional
+        Whether the step is one that a motion may make; by default it is.
     """
 
     parent: np.ndarray
     step: np.ndarray
     key: np.ndarray
-    elsewhere: np.ndarray
-    allowed: np.ndarray
+    elsewhere: np.ndarray | bool = True
+    allowed: np.ndarray | bool = True
 
 
 def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
@@ -264,7 +264,12 @@ class Lattice(ABC):
         if not len(ends):
             return DeadEnd(1.0, JUMPS)
         last = layers[-1][ends]
-        q = self._trace(layers, ends) + TURN * self._turn_of(last)[:, None]
+        traced = []
+        for layer in reversed(layers):
+            traced.append(layer.q[ends])
+            ends = layer.parent[ends]
+        in_order = np.array(traced if self._backwards else traced[::-1])
+        q = in_order.swapaxes(0, 1) + TURN * self._turn_of(last)[:, None]
         found = [
             JointPath(self.problem, self.s, own, float(last.length[i]), int(branch))
             for i, (own, branch) in enumerate(zip(q, last.branch, strict=True))
@@ -350,15 +355,6 @@ class Lattice(ABC):
     ) -> list[JointPath]:
         """Choose up to `most` of the joint paths found, which end at these nodes: some that differ."""
         return [found[i] for i in distinct(found, most)]
-
-    def _trace(self, layers: list[Layer], ends: np.ndarray) -> np.ndarray:
-        """Trace joint paths back from their ends, (E,): postures (E, S + 1, n)."""
-        nodes = ends
-        q = []
-        for layer in reversed(layers):
-            q.append(layer.q[nodes])
-            nodes = layer.parent[nodes]
-        return np.array(q if self._backwards else q[::-1]).swapaxes(0, 1)
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
         """Multiples of 2 pi, (E, n), that bring the joint paths to nodes into the ranges, in the middle if closed."""

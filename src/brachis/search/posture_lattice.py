@@ -191,7 +191,8 @@ class PostureLattice(Lattice):
 
     def _without_turns(self, q: np.ndarray) -> np.ndarray:
         """Postures, (K, n), with angles whose turns do not count in [0, 2 pi)."""
-        return np.where(self._modulo, np.remainder(q, TURN), q)
+        # Rounding may make a remainder a whole turn.
+        return np.where(self._modulo, np.remainder(q, TURN) % TURN, q)
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
         """List edges to the postures at the cells around the nodes, along self-motion."""
@@ -221,8 +222,7 @@ class PostureLattice(Lattice):
             parent,
             step,
             np.column_stack([before.branch[parent], self._key(q, _SAME)]),
-            np.ones(len(parent), dtype=bool),
-            small | (along >= 0.7 * np.linalg.norm(own, axis=1)),
+            allowed=small | (along >= 0.7 * np.linalg.norm(own, axis=1)),
         )
 
     def _near(
@@ -232,12 +232,8 @@ class PostureLattice(Lattice):
         from scipy.spatial import KDTree
 
         box = np.where(self._modulo, TURN, 0.0)
-        # Rounding may make a remainder a whole turn.
         one, other = (
-            KDTree(
-                np.where(self._modulo, self._without_turns(q) % TURN, q), boxsize=box
-            )
-            for q in (first, second)
+            KDTree(self._without_turns(q), boxsize=box) for q in (first, second)
         )
         pairs = one.sparse_distance_matrix(
             other, reach, p=np.inf, output_type="ndarray"
