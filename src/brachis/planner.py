@@ -268,7 +268,7 @@ def transcribe(
     Raises
     ------
     InputError
-        See `plan`.
+        As `plan` does.
 
     Examples
     --------
@@ -285,7 +285,7 @@ def transcribe(
 
 Outcome = Result | BrachisError
 OnProgress = Callable[[int, int, Outcome], None]
-"""Told after every plan: how many are done, of how many, and what came out."""
+"""Called after every plan with how many are done, of how many, and what came out."""
 
 
 def plan_many(

@@ -1,4 +1,4 @@
-"""Why there is no plan: the `Failure` that every explanation makes, and explanations of paths that cannot be followed.
+"""Why a plan failed: the `Failure` that every explanation makes, and explanations of paths that cannot be followed.
 
 What a decomposition reaches of a path is found by random postures at stations along it: is a station out of reach,
 beyond the joint ranges, on another branch, or too heavy to hold?
@@ -30,7 +30,7 @@ _NO_TIME = "There was no time to find out why: raise search.time_limit"
 
 @dataclass(frozen=True)
 class Failure:
-    """Why there is no plan.
+    """Why a plan failed.
 
     Attributes
     ----------

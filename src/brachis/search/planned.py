@@ -38,15 +38,15 @@ class PlannedMotion(Summary):
     warnings: tuple[Remark, ...] = ()
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
-        """Sample the trajectory every `dt` seconds; see `Trajectory.sample`."""
+        """Sample the trajectory every `dt` seconds, as `Trajectory.sample` does."""
         return self.trajectory.sample(dt, last=last)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the trajectory to an npz file, which `Trajectory.load` reads; see `Trajectory.save`."""
+        """Write the trajectory to an npz file, which `Trajectory.load` reads."""
         self.trajectory.save(path)
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
-        """Return a pandas table, a row every `dt` seconds; see `Trajectory.to_dataframe`."""
+        """Return a pandas table, a row every `dt` seconds."""
         return self.trajectory.to_dataframe(dt)
 
     def summary(self) -> Mapping[str, object]:
@@ -63,8 +63,8 @@ class PlannedMotion(Summary):
             "not_completed": "; ".join(self.not_completed),
             "warnings": "; ".join(remark.message for remark in self.warnings),
         }
-        told = {name: text for name, text in shown.items() if text}
-        return {**self.trajectory.summary(), **told}
+        filled = {name: text for name, text in shown.items() if text}
+        return {**self.trajectory.summary(), **filled}
 
     @property
     def t_end(self) -> float:

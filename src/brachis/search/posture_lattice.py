@@ -54,7 +54,7 @@ def start_postures(
     decompositions : sequence of Decomposition
         Their closed forms give the postures, on all branches.
     newton : Newton
-        Brings random postures to the beginning if there are no decompositions.
+        Brings random postures to the beginning without decompositions.
     cells_per_turn : int
         Spacing of a single redundant joint, as of `Cells`.
     count : int

@@ -41,7 +41,7 @@ def screen(
     starts : sequence of InitialGuess
         At least one.
     most : int
-        How many to keep; if there are no more than these, none is looked at.
+        How many to keep; if so few are given, all are kept without a solve.
     deadline : Deadline
     listener : callable
 

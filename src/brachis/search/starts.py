@@ -180,7 +180,7 @@ def numeric_starts(
     Parameters
     ----------
     decomposition : Decomposition
-        Without a given start posture there are no ways.
+        With a given start posture; without one the list is empty.
     most : int
     deadline : Deadline
 
@@ -339,7 +339,7 @@ def bring_onto_path(
     Raises
     ------
     UnreachableError
-        There are none, or they jump.
+        Such postures do not exist, or they jump.
     """
     if newton is not None:
         q = newton.nearest(problem.path.sample(s).target, q)
