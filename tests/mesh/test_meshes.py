@@ -18,7 +18,7 @@ from brachis.optimise.mesh import (
     coarsest,
     optimise_knots,
     refine_mesh,
-    solve_nested,
+    solve_by_levels,
 )
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.task import SplineSettings
@@ -222,7 +222,7 @@ def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
     program, _ = brachis.transcribe(robot(), task(intervals=intervals))
     coarse = coarsest(program).with_margin(0.05)
     report = solve(coarse, next(starting_points(coarse)))
-    solved = solve_nested(program, SolvedProgram(coarse, (report,)), solve)
+    solved = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
     nested = solved.program
     reports = solved.reports
     assert not solved.not_completed
@@ -245,7 +245,7 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
         return solve(tried, x) if tried.variables < 150 else failing(tried, x)
 
     first = SolvedProgram(coarse, (report,))
-    nested = solve_nested(program, first, small_ones_only)
+    nested = solve_by_levels(program, first, small_ones_only)
     reports = nested.reports
     assert nested.program.intervals == 50
     assert [later.status for later in reports][-2:] == [
@@ -282,7 +282,7 @@ def test_no_level_is_begun_after_the_deadline(solved):
     coarse = coarsest(target)
     first = SolvedProgram(coarse, (solve(coarse, next(starting_points(coarse))),))
     over = RefinementOptions(deadline=Deadline(0.0))
-    assert solve_nested(target, first, never, over.deadline).not_completed
+    assert solve_by_levels(target, first, never, over.deadline).not_completed
     for spline in (
         SplineSettings(knots="free", intervals=10),
         SplineSettings(intervals="auto"),

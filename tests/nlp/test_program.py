@@ -26,7 +26,7 @@ from brachis.optimise.mesh import (
     coarsest,
     optimise_knots,
     refine_mesh,
-    solve_nested,
+    solve_by_levels,
 )
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
@@ -174,7 +174,7 @@ def test_phases_are_solved_from_few_intervals():
     coarse = coarsest(program)
     assert [phase.intervals for phase in coarse.phases] == [15, 14]
     report = solve(coarse, first_point(coarse))
-    nested = solve_nested(program, SolvedProgram(coarse, (report,)), solve)
+    nested = solve_by_levels(program, SolvedProgram(coarse, (report,)), solve)
     assert not nested.not_completed
     assert [phase.intervals for phase in nested.program.phases] == [60, 14]
     assert nested.report.objective < report.objective

@@ -11,13 +11,13 @@ from brachis.errors import UnknownNameError, UnreachableError
 from brachis.optimise.backends import (
     AUTO_ORDER,
     NAMES,
+    TABLE,
     SolverOptions,
     SolveStatus,
     residual,
     solver_named,
 )
 from brachis.optimise.backends.monitor import SolveMonitor
-from brachis.optimise.backends.registry import TABLE
 from support.programs import bounded, corner, curved, disc, impossible
 
 OPTIONS = SolverOptions()

@@ -122,7 +122,7 @@ def _raise_degree(
     before = left[..., :p][..., ::-1]
     behind = right[..., :p]
     share = value / (before + behind)
-    return _add_shifted(before * share, behind * share)
+    return _add_neighbours(before * share, behind * share)
 
 
 def _slope(
@@ -130,10 +130,10 @@ def _slope(
 ) -> np.ndarray:
     """Differentiate functions of degree p, given `lower`, the same functions of degree p - 1."""
     share = p * lower / (left[..., :p][..., ::-1] + right[..., :p])
-    return _add_shifted(share, -share)
+    return _add_neighbours(share, -share)
 
 
-def _add_shifted(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _add_neighbours(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Add values, the first of them moved by one function."""
     zero = np.zeros_like(first[..., :1])
     moved = np.concatenate([zero, first], axis=-1)

@@ -68,7 +68,7 @@ class Evaluator:
         Raises
         ------
         UnreachableError
-            There is no posture at one of the times.
+            The joint map has no posture at one of the times.
         """
         motion = self.joint_map.state(y, ydot, yddot, ydddot, t=t, near=near)
         return Evaluation(self.limits, motion)
@@ -114,27 +114,23 @@ class Evaluation:
         motion = self.motion
         exact = motion.derivatives
         gradient = motion.gradient
-        given = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
-        shape = next(part.shape[:2] for part in given if part is not None)
-        by_y = by_ydot = by_yddot = np.zeros((*shape, motion.y.shape[1]))
-        if partials.q is not None:
-            by_y = by_y + partials.q @ gradient
+        terms = [
+            (partials.q, (gradient,)),
+            (partials.qdot, (exact.qdot_y, gradient)),
+            (partials.qddot, (exact.qddot_y, exact.qddot_ydot, gradient)),
+        ]
+        if partials.qdddot is not None:
+            thrice = (3.0 * exact.qddot_y, 3.0 * exact.qdot_y)
+            terms.append((partials.qdddot, (motion.qdddot_y, *thrice, gradient)))
+        shape = next(part.shape[:2] for part, _ in terms if part is not None)
+        slopes = [np.zeros((*shape, motion.y.shape[1])) for _ in terms]
         if partials.s is not None:
-            by_y = by_y.copy()
-            by_y[:, :, 0] += partials.s
-        if partials.qdot is not None:
-            by_y = by_y + partials.qdot @ exact.qdot_y
-            by_ydot = by_ydot + partials.qdot @ gradient
-        if partials.qddot is not None:
-            by_y = by_y + partials.qddot @ exact.qddot_y
-            by_ydot = by_ydot + partials.qddot @ exact.qddot_ydot
-            by_yddot = by_yddot + partials.qddot @ gradient
-        if partials.qdddot is None:
-            return by_y, by_ydot, by_yddot
-        by_y = by_y + partials.qdddot @ motion.qdddot_y
-        by_ydot = by_ydot + 3.0 * partials.qdddot @ exact.qddot_y
-        by_yddot = by_yddot + 3.0 * partials.qdddot @ exact.qdot_y
-        return by_y, by_ydot, by_yddot, partials.qdddot @ gradient
+            slopes[0][:, :, 0] = partials.s
+        for part, factors in terms:
+            if part is not None:
+                for i, factor in enumerate(factors):
+                    slopes[i] += part @ factor
+        return tuple(slopes)
 
     def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
         """How far the limits that count are violated, (K, their c); negative inside."""

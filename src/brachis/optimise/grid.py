@@ -89,7 +89,7 @@ def _weights(u: np.ndarray) -> np.ndarray:
 class FixedGrid:
     """Knots that are given, and collocation points.
 
-    A `FreeGrid` answers for interval lengths h, (v,), that are variables; here there are none, and h is empty.
+    A `FreeGrid` answers for interval lengths h, (v,), that are variables; here h is empty.
 
     Parameters
     ----------

@@ -104,8 +104,8 @@ def improve(
         The next change is tried after a gain of more than this fraction; by default after every motion. With None all
         changes are tried.
     judge : callable, optional
-        Number by which answers are compared, the less the better, and infinite for what is no motion; by default the
-        objective of a solve that ended well.
+        Number by which answers are compared, the less the better, infinite without a motion; by default the objective
+        of a solve that ended well.
     deadline : Deadline, optional
         No change is tried after it.
 
@@ -160,7 +160,7 @@ def attempt_once(solve: Solve, *, accept_early_end: bool = False) -> Attempt:
     def attempt(program: Program, x: np.ndarray) -> SolvedProgram:
         report = solve(program, x)
         if accept_early_end:
-            report = with_early_end_accepted(report, program.end_time(x))
+            report = judge_early_end(report, program.end_time(x))
         return SolvedProgram(program, (report,))
 
     return attempt
@@ -175,7 +175,7 @@ _EARLY = (
 """How a solve ends that is not done; a solver that breaks down at last may have come far."""
 
 
-def with_early_end_accepted(report: SolverReport, before: float) -> SolverReport:
+def judge_early_end(report: SolverReport, before: float) -> SolverReport:
     """Call a solve that ended early acceptable where its motion is feasible, and shorter than `before`, s."""
     is_better = report.feasible and report.objective < before
     if is_better and report.status in _EARLY:

@@ -1,6 +1,6 @@
 """The knots of a solved program: more of them, better ones, or free ones.
 
-- `solve_nested` reaches many given intervals from few. A cold solve with hundreds of
+- `solve_by_levels` reaches many given intervals from few. A cold solve with hundreds of
   variables takes seconds; from a coarse motion, inserted exactly, it takes a few
   iterations on every level.
 - `refine_mesh` halves the intervals that lose most. A time-optimal motion has 1 + r
@@ -26,7 +26,7 @@ from brachis.optimise.improve import (
     SolvedProgram,
     attempt_once,
     improve,
-    with_early_end_accepted,
+    judge_early_end,
     with_last,
 )
 from brachis.optimise.phase import Phase
@@ -43,7 +43,7 @@ def coarsest(program: Program) -> Program:
     return next(_levels(program))
 
 
-def solve_nested(
+def solve_by_levels(
     target: Program,
     coarse: SolvedProgram,
     solve: Solve,
@@ -267,7 +267,7 @@ def optimise_knots(
         moved = solve(free, x)
         fixed, start = free.fix_knots(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
-        report = with_early_end_accepted(solve(fixed, start), free.end_time(x))
+        report = judge_early_end(solve(fixed, start), free.end_time(x))
         refined = refine(fixed, report, solve, refinement)
         return replace(refined, reports=(moved, *refined.reports))
 
@@ -315,7 +315,7 @@ def adapt_mesh(
     refinement : RefinementOptions
         After its deadline no further round is begun.
     target : Program, optional
-        The program over all its knots, where the solved one is its coarsest (see `solve_nested`).
+        The program over all its knots, where the solved one is its coarsest (see `solve_by_levels`).
 
     Returns
     -------
@@ -326,7 +326,7 @@ def adapt_mesh(
         return solved
     nested = SolvedProgram(solved.program, (solved.report,))
     if target is not None:
-        nested = solve_nested(target, nested, solve, refinement.deadline)
+        nested = solve_by_levels(target, nested, solve, refinement.deadline)
     last = SolvedProgram(nested.program, (nested.report,))
     if spline.knots == "free":
         adapted = optimise_knots(last, solve, spline.shortest_interval, refinement)

@@ -93,14 +93,8 @@ class Motion(Summary):
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-
-        def is_before(t: np.ndarray) -> np.ndarray:
-            order = np.argsort(t, kind="stable")
-            before = np.empty(len(s), dtype=bool)
-            before[order] = self.at(t[order])[0][:, 0] < s[order]
-            return before
-
-        return bisect(is_before, np.full(len(s), self.t_end))
+        end = np.full(len(s), self.t_end)
+        return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
 
 
 class Phase:
@@ -130,6 +124,10 @@ class Phase:
         Of each curve.
     slices : tuple of slice
         The variables of each curve.
+    degree, knots, breaks, t_norm
+        Those of the grid.
+    intervals, variables : int
+        Numbers of knot intervals, N, and of variables, v.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -159,12 +157,19 @@ class Phase:
         layout = Layout.of(grid, self.splines, self.limits, has_path=has_path)
         self._layout = layout
         self.slices = layout.slices
+        self.degree = grid.degree
+        self.knots = grid.knots
+        self.breaks = grid.breaks
+        self.intervals = len(grid.breaks) - 1
+        self.t_norm = grid.t_norm
+        self.variables = len(layout.x_lower)
         self.x_lower = layout.x_lower
         self.x_upper = layout.x_upper
         self.lower = layout.lower
         self.upper = layout.upper
         self.jacobian_rows = layout.jacobian_rows
         self.jacobian_columns = layout.jacobian_columns
+        self._numbers = {id(limit): i for i, limit in enumerate(self.limits)}
         self._entries: tuple[LocalBasis, list[np.ndarray]] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
@@ -205,40 +210,10 @@ class Phase:
         return self.with_limits([*own, *build_branch_margins(self.joint_map, margin)])
 
     @property
-    def variables(self) -> int:
-        """Number of variables."""
-        return len(self.x_lower)
-
-    @property
-    def degree(self) -> int:
-        """Degree of the splines."""
-        return self.grid.degree
-
-    @property
-    def knots(self) -> np.ndarray:
-        """Clamped knot vector; see `FixedGrid`."""
-        return self.grid.knots
-
-    @property
-    def breaks(self) -> np.ndarray:
-        """Ends of the knot intervals in normalised time, (N + 1,)."""
-        return self.grid.breaks
-
-    @property
     def jumps(self) -> np.ndarray:
         """Knots, in normalised time, at which the highest derivative that a limit asks for jumps."""
         order = max((limit.order for limit in self.limits), default=0)
         return self.breaks[1:-1] if self.degree <= order else np.empty(0)
-
-    @property
-    def intervals(self) -> int:
-        """Number of knot intervals, N."""
-        return len(self.breaks) - 1
-
-    @property
-    def t_norm(self) -> np.ndarray:
-        """Collocation points in normalised time, (K,); see `FixedGrid`."""
-        return self.grid.t_norm
 
     def _h(self, x: np.ndarray) -> np.ndarray:
         """Interval lengths that are variables; empty where the knots are fixed."""
@@ -300,24 +275,20 @@ class Phase:
         totals = np.full(len(self.grid.total), self._h(x).sum())
         return np.concatenate([*values, self._layout.progress.values(x), totals])
 
-    def _number(self, limit: Limit) -> int:
-        """Place of a limit, the very object, among the phase's; raises ValueError where it has another one."""
-        return [id(each) for each in self.limits].index(id(limit))
-
     def _limit_values(self, limit: Limit, x: np.ndarray) -> np.ndarray:
         """Values of a limit that are rows, (K, c), or (1, c) where their means are."""
-        values = self.evaluate(x).by_limit[self._number(limit)]
+        values = self.evaluate(x).by_limit[self._numbers[id(limit)]]
         if limit.guarantee.is_mean:
             return np.asarray(self.grid.mean_weights(self._h(x))[None] @ values)
         return values
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
-        return any(each is limit for each in self.limits)
+        return id(limit) in self._numbers
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of one of the limits, (K, c), or (1, c) where its means are rows."""
-        return self._layout.limit_rows[self._number(limit)]
+        return self._layout.limit_rows[self._numbers[id(limit)]]
 
     def violation_of_means(self, x: np.ndarray) -> float:
         """How far the limits that hold over the whole motion are violated; -inf without such limits."""
@@ -354,12 +325,13 @@ class Phase:
 
         Raises UnreachableError as `evaluate` does.
         """
-        scaling = [limit for limit in self.limits if limit.longer_time == "relieves"]
-        ratios = [limit.ratio(self._limit_values(limit, x)) for limit in scaling]
-        count = len(self.t_norm)
-        return np.hstack(
-            [np.broadcast_to(own, (count, own.shape[1])) for own in ratios]
-        )
+        every = np.zeros((len(self.t_norm), 1))
+        ratios = [
+            limit.ratio(self._limit_values(limit, x)) + every
+            for limit in self.limits
+            if limit.longer_time == "relieves"
+        ]
+        return np.hstack(ratios)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""

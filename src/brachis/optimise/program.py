@@ -11,7 +11,7 @@ links; see `phase`. The objective is a sum over the phases. Where a link joins t
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -112,16 +112,20 @@ class Link:
     after: int
     joints: tuple[int, ...]
 
-    @property
-    def _sides(self) -> tuple[tuple[int, int, float], tuple[int, int, float]]:
-        """Phase, collocation point and sign."""
-        return (self.before, -1, 1.0), (self.after, 0, -1.0)
-
     def rows(self, states: Sequence[JointState]) -> np.ndarray:
         """Values of the rows, (j,), from the states of all phases at their collocation points."""
         joints = list(self.joints)
         last = states[self.before].q[-1, joints]
         return np.asarray(last - states[self.after].q[0, joints])
+
+    def _sides(
+        self, phases: Sequence[Phase]
+    ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
+        """Yield phase, collocation point, the curves whose value is free there, and the variables that these are."""
+        for number, point in ((self.before, -1), (self.after, 0)):
+            variables = phases[number].end_variables(point)
+            free = np.flatnonzero(variables >= 0)
+            yield number, point, free, variables[free]
 
     def pattern(
         self, phases: Sequence[Phase], first: Sequence[int]
@@ -135,31 +139,24 @@ class Link:
         first : sequence of int
             Where the variables of each one begin.
         """
+        count = len(self.joints)
         rows = []
         columns = []
-        for phase, point, _ in self._sides:
-            _, variables = _free(phases[phase], point)
-            rows.append(np.repeat(np.arange(len(self.joints)), len(variables)))
-            columns.append(np.tile(variables + first[phase], len(self.joints)))
+        for number, _, _, variables in self._sides(phases):
+            rows.append(np.repeat(np.arange(count), len(variables)))
+            columns.append(np.tile(variables + first[number], count))
         return np.concatenate(rows), np.concatenate(columns)
 
     def jacobian(
         self, phases: Sequence[Phase], states: Sequence[JointState]
     ) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,): the joint maps' gradients at the ends."""
-        entries = []
-        for phase, point, sign in self._sides:
-            free, _ = _free(phases[phase], point)
-            slopes = states[phase].gradient[point][list(self.joints)]
-            entries.append(sign * slopes[:, free].ravel())
-        return np.concatenate(entries)
-
-
-def _free(phase: Phase, point: int) -> tuple[np.ndarray, np.ndarray]:
-    """Find the curves whose value at an end is free, and the variables that it is."""
-    variables = phase.end_variables(point)
-    free = np.flatnonzero(variables >= 0)
-    return free, variables[free]
+        joints = list(self.joints)
+        last, first = (
+            states[number].gradient[point][joints][:, free].ravel()
+            for number, point, free, _ in self._sides(phases)
+        )
+        return np.concatenate([last, -first])
 
 
 class Program(Summary):

@@ -238,9 +238,7 @@ def _zoom(
     steps = np.linspace(-1.0, 1.0, 9)
     for _ in range(2 if len(centres) else 0):
         fine = np.clip(centres[:, None] + reach[:, None] * steps, 0.0, 1.0)
-        order = np.argsort(fine.ravel(), kind="stable")
-        worst = np.empty(fine.size)
-        worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
+        worst = dense.violation_at(x, fine.ravel()).max(axis=1)
         best = np.argmax(worst.reshape(fine.shape), axis=1)
         chosen = np.arange(len(centres)) * len(steps) + best
         is_high = worst[chosen] > goal - 0.1 * _NEAR

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -26,14 +25,8 @@ from brachis.robot.plausibility import position_hint
 from brachis.robot.task_map import JointSpace
 from brachis.task import SplineSettings
 
-_SAME_POSTURE = 1e-5
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
-_ROOM = 1.05
-"""Limits are raised to so many times what holding the arm takes."""
-_STATIONS = 401
-_TRIED = 20
-"""Postures by which it is told whether the arm lacks a direction everywhere."""
 
 
 def check_postures(
@@ -68,17 +61,18 @@ def check_postures(
     robot = task_map.robot
     for name, posture in (("start", start), ("end", end)):
         if posture is not None:
-            _check_range(robot, posture, name, tolerance)
+            _check_range(robot, posture[None], f"{name}.joints", tolerance)
             _check_at_rest(robot, limits, posture, name, tolerance)
             limits = [_widen(limit, posture[None], tolerance) for limit in limits]
     if end is not None:
         check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
     if isinstance(task_map, JointSpace):
-        along = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target
-        _check_range_along(robot, along, tolerance)
-        ranges = [limit for limit in limits if isinstance(limit, PositionLimit)]
+        along = path.sample(np.linspace(0.0, 1.0, 401)).target
+        _check_range(robot, along, "path", tolerance)
         limits = [
-            _widen(limit, along, tolerance) if limit in ranges else limit
+            _widen(limit, along, tolerance)
+            if isinstance(limit, PositionLimit)
+            else limit
             for limit in limits
         ]
     return tuple(limits)
@@ -90,72 +84,50 @@ def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
         return limit
     values = limit.values(Moments.at_rest(postures))
     excess = limit.violation(values).max(axis=0)
-    near = (excess > 0.0) & (excess <= tolerance)
-    if not near.any():
+    is_near = (excess > 0.0) & (excess <= tolerance)
+    if not is_near.any():
         return limit
     wider = copy.copy(limit)
-    wider.lower = np.where(
-        near, np.minimum(limit.lower, values.min(axis=0)), limit.lower
-    )
-    wider.upper = np.where(
-        near, np.maximum(limit.upper, values.max(axis=0)), limit.upper
-    )
+    least = np.minimum(limit.lower, values.min(axis=0))
+    most = np.maximum(limit.upper, values.max(axis=0))
+    wider.lower = np.where(is_near, least, limit.lower)
+    wider.upper = np.where(is_near, most, limit.upper)
     return wider
 
 
 def _check_range(
-    robot: Robot, posture: np.ndarray, name: str, tolerance: float
+    robot: Robot, postures: np.ndarray, where: str, tolerance: float
 ) -> None:
-    beyond = _beyond_range(robot, posture[None], tolerance)
-    if beyond is not None:
-        _, joint, facts = beyond
-        facts["hint"] = (
-            facts["hint"]
-            or f"Change the posture, or the range with robot.limits.position.{joint}"
-        )
-        raise StartError(
-            f"joint {joint!r} is out of its range", where=f"{name}.joints", **facts
-        )
-
-
-def _check_range_along(robot: Robot, along: np.ndarray, tolerance: float) -> None:
-    """Refuse a path of joints, postures (K, n), that leaves a joint's range."""
-    beyond = _beyond_range(robot, along, tolerance)
-    if beyond is not None:
-        station, joint, facts = beyond
-        facts["found"] = f"{facts['found']} at s = {station / (len(along) - 1):.3g}"
-        facts["hint"] = (
-            facts["hint"]
-            or f"Lead the path elsewhere, or raise robot.limits.position.{joint}"
-        )
-        raise PathError(f"joint {joint!r} is out of its range", where="path", **facts)
-
-
-def _beyond_range(
-    robot: Robot, postures: np.ndarray, tolerance: float
-) -> tuple[int, str, dict[str, Any]] | None:
-    """Find the first joint that is out of its range in postures, (K, n): where most, its name, and what is told."""
+    """Refuse a posture, or a path of joints, (K, n), that leaves a joint's range."""
     lower = robot.limits.position_lower
     upper = robot.limits.position_upper
-    beyond = np.maximum(
-        lower - postures, postures - upper
-    ) - tolerance * position_measure(lower, upper)
+    excess = np.maximum(lower - postures, postures - upper)
+    beyond = excess - tolerance * position_measure(lower, upper)
     joints = np.flatnonzero(beyond.max(axis=0) > 0.0)
     if not len(joints):
-        return None
+        return
     i = int(joints[0])
     k = int(np.argmax(beyond[:, i]))
-    value = float(postures[k, i])
+    name = robot.joint_names[i]
     unit = robot.position_units[i]
-    low = float(lower[i])
-    high = float(upper[i])
-    found, first, last = write_apart(value, low, high, digits=6)
-    facts: dict[str, Any] = {
-        "found": f"{found} {unit}",
-        "allowed": f"{first} {unit} to {last} {unit}",
-        "hint": position_hint(value, low, high, unit),
-    }
-    return k, robot.joint_names[i], facts
+    value = float(postures[k, i])
+    ends = (float(lower[i]), float(upper[i]))
+    found, first, last = write_apart(value, *ends, digits=6)
+    error: type[InputError] = StartError
+    place = ""
+    advice = "Change the posture, or the range with"
+    if where == "path":
+        error = PathError
+        place = f" at s = {k / (len(postures) - 1):.3g}"
+        advice = "Lead the path elsewhere, or raise"
+    hint = position_hint(value, *ends, unit)
+    raise error(
+        f"joint {name!r} is out of its range",
+        where=where,
+        found=f"{found} {unit}{place}",
+        allowed=f"{first} {unit} to {last} {unit}",
+        hint=hint or f"{advice} robot.limits.position.{name}",
+    )
 
 
 def beyond_at_rest(
@@ -178,30 +150,30 @@ def _check_at_rest(
         if limit.at_rest == "nothing":
             continue
         (values,), (beyond,) = beyond_at_rest(limit, posture[None], tolerance)
+        weak = [limit.labels[i] for i in np.flatnonzero(beyond > 0.0)]
+        if not weak:
+            continue
         worst = int(np.argmax(beyond))
-        if beyond[worst] > 0.0:
-            label = limit.labels[worst]
-            found, allowed = in_figures(limit, worst, float(values[worst]))
-            weak = [limit.labels[i] for i in np.flatnonzero(beyond > 0.0)]
-            remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
-            more = ""
-            if len(weak) > 1:
-                # No number for one of several joints is enough.
-                more = f"; too low as well: {', '.join(str(one.subject) for one in weak if one is not label)}"
-                remedies = [remedy for remedy in remedies if remedy.key != label.key]
-            keys = (
-                {one.key: None for one in weak if one.key}
-                if label.key not in {one.key for one in remedies}
-                else {}
-            )
-            error = StartError(
-                f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
-                where=f"{name}.joints",
-                found=f"{found} {label.unit} needed at rest{more}",
-                allowed=f"{allowed} {label.unit}",
-                hint=f"Choose another posture{', or raise ' + ', '.join(keys) if keys else ''}",
-            )
-            raise error.with_remedies(*remedies)
+        label = limit.labels[worst]
+        found, allowed = in_figures(limit, worst, float(values[worst]))
+        remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
+        others = ", ".join(str(one.subject) for one in weak if one is not label)
+        more = ""
+        if others:
+            # No number for one of several joints is enough.
+            more = f"; too low as well: {others}"
+            remedies = [remedy for remedy in remedies if remedy.key != label.key]
+        hint = "Choose another posture"
+        keys = dict.fromkeys(one.key for one in weak if one.key)
+        if keys and label.key not in {one.key for one in remedies}:
+            hint += f", or raise {', '.join(keys)}"
+        raise StartError(
+            f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
+            where=f"{name}.joints",
+            found=f"{found} {label.unit} needed at rest{more}",
+            allowed=f"{allowed} {label.unit}",
+            hint=hint,
+        ).with_remedies(*remedies)
 
 
 def load_remedies(
@@ -209,23 +181,19 @@ def load_remedies(
 ) -> list[Remedy]:
     """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload."""
     label = limit.labels[column]
-    figures = [
-        bound.figure
-        for bound in limit.bounds
-        if bound.column == column and bound.end is None
-    ]
     scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
-    found = [
-        Remedy(label.key, one / scale, _ROOM * ratio * one / scale, label.unit)
-        for one in figures
-        if label.key
-    ]
+    remedies = []
+    for bound in limit.bounds if label.key else ():
+        if bound.column == column and bound.end is None:
+            figure = bound.figure / scale
+            # 5 % more than holding the arm takes.
+            enough = 1.05 * ratio * figure
+            remedies.append(Remedy(label.key, figure, enough, label.unit))
     payload = robot.settings.payload
     if payload is not None and payload.mass:
-        found.append(
-            Remedy("robot.payload.mass", payload.mass, payload.mass / ratio, "kg")
-        )
-    return found
+        mass = payload.mass
+        remedies.append(Remedy("robot.payload.mass", mass, mass / ratio, "kg"))
+    return remedies
 
 
 def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
@@ -261,16 +229,13 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
         found, allowed = write_apart(abs(value) * first.figure, first.figure)
         return found, allowed
     level = limit.lower[column] if first.end == "lower" else limit.upper[column]
-    found, *figures = write_apart(
-        first.figure + (value - level) / first.per_unit,
-        *(bound.figure for bound in bounds),
-    )
-    ends = dict(zip((bound.end for bound in bounds), figures, strict=True))
-    words = {"lower": "at least ", "upper": "at most "} if len(ends) == 1 else {}
-    allowed = " to ".join(
-        f"{words.get(end, '')}{ends[end]}" for end in ("lower", "upper") if end in ends
-    )
-    return found, allowed
+    reached = first.figure + (value - level) / first.per_unit
+    found, *figures = write_apart(reached, *(bound.figure for bound in bounds))
+    ends = {bound.end: figure for bound, figure in zip(bounds, figures, strict=True)}
+    if len(ends) == 2:
+        return found, f"{ends['lower']} to {ends['upper']}"
+    word = "at least" if first.end == "lower" else "at most"
+    return found, f"{word} {figures[0]}"
 
 
 def check_regular(
@@ -283,10 +248,9 @@ def check_regular(
     StartError
     """
     for name, posture in (("start", start), ("end", end)):
-        if (
-            posture is not None
-            and _least_singular_values(task_map, posture[None])[0] < _REGULAR
-        ):
+        if posture is None:
+            continue
+        if _least_singular_values(task_map, posture[None])[0] < _REGULAR:
             raise StartError(
                 f"the {name} posture is singular",
                 where=f"{name}.joints",
@@ -298,7 +262,7 @@ def check_regular(
 
 def lacks_a_direction(task_map: TaskMap) -> bool:
     """Tell whether the arm can nowhere move its tool in all directions of the task space."""
-    postures = np.random.default_rng(0).uniform(-1.0, 1.0, (_TRIED, task_map.robot.n))
+    postures = np.random.default_rng(0).uniform(-1.0, 1.0, (20, task_map.robot.n))
     return bool(_least_singular_values(task_map, postures).max() < _REGULAR)
 
 
@@ -323,7 +287,7 @@ def branch_of(
     StartError
         The posture lies on no branch's inside, or on another than the `wanted` one.
     UnknownNameError
-        There is no branch of the wanted name.
+        The closed form has no branch of the wanted name.
     """
     branches = match.solver.branches
     if wanted != "auto" and wanted not in branches:
@@ -369,12 +333,11 @@ def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) 
     target = task_map.value(posture)
     answers = solver.solve(target[None], posture[None, redundant])[0]
     gap = difference(answers, posture[rest], robot.revolute[rest])
-    gaps = np.where(np.isfinite(gap).all(axis=2), np.abs(gap).max(axis=2), np.inf).min(
-        axis=1
-    )
+    exists = np.isfinite(gap).all(axis=2)
+    gaps = np.where(exists, np.abs(gap).max(axis=2), np.inf).min(axis=1)
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]
-    if gaps[branch] > _SAME_POSTURE or np.any(margins <= 0.0):
+    if gaps[branch] > 1e-5 or np.any(margins <= 0.0):
         raise StartError(
             f"the {name} posture is singular for redundant joints [{', '.join(match.redundant_joints)}]",
             where=f"{name}.joints",

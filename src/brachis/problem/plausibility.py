@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -340,19 +340,27 @@ class UsualLimit:
     largest : callable
         Largest usual limit of a joint of a robot.
     is_torque : bool
+    has_curves : bool
+        Whether a torque-speed curve takes the limit's place.
+    is_overridden : bool
+        Whether the speed override takes its share.
     """
 
     looks: dict[str, str]
     largest: Callable[[Robot, int], float]
     is_torque: bool = False
+    has_curves: bool = False
+    is_overridden: bool = False
 
 
 _TORQUE = UsualLimit({"rad": "mNm", "m": "mN"}, _usual_torque, is_torque=True)
 USUAL_LIMITS = {
-    "torque": _TORQUE,
+    "torque": replace(_TORQUE, has_curves=True),
     "rms_torque": _TORQUE,
     "velocity": UsualLimit(
-        {"rad": "degrees per second", "m": "mm per second"}, _usual_velocity
+        {"rad": "degrees per second", "m": "mm per second"},
+        _usual_velocity,
+        is_overridden=True,
     ),
     "acceleration": UsualLimit(
         {"rad": "degrees per second^2", "m": "mm/s^2"}, _usual_acceleration
@@ -372,14 +380,14 @@ def _magnitudes(robot: Robot) -> Iterator[Figure]:
     for kind, usual in USUAL_LIMITS.items():
         scale = getattr(robot.settings.limits.scale, kind)
         values = np.abs(robot.limits.both_ways(kind)).max(axis=0) / scale
-        if kind == "velocity":
+        if usual.is_overridden:
             values = values / robot.settings.speed_override
         for i, (name, unit) in enumerate(
             zip(robot.joint_names, robot.position_units, strict=True)
         ):
             value = float(values[i])
             largest = usual.largest(robot, i)
-            is_replaced = kind == "torque" and robot.limits.torque_speed[i]
+            is_replaced = usual.has_curves and robot.limits.torque_speed[i]
             is_known = usual.is_torque and value == _from_urdf(robot, "torque", i)
             # A power of ten is written for "no limit"; of torques one that no figure in mNm can be.
             stands_for_none = _is_power_of_ten(value) and not (

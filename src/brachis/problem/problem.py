@@ -27,9 +27,6 @@ from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace
 from brachis.task import Task
 
-_EXACT = 1e-12
-"""m or rad."""
-
 
 @dataclass(frozen=True, repr=False)
 class Problem(Summary):
@@ -79,32 +76,22 @@ class Problem(Summary):
             for a limit.
         """
         robot, task_map = bind(robot, task.task_space)
-        start = (
-            None
-            if task.start == "free"
-            else robot.posture(task.start.joints, "start.joints")
-        )
-        end = (
-            None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
+        start, end = (
+            None if given == "free" else robot.posture(given.joints, f"{key}.joints")
+            for key, given in (("start", task.start), ("end", task.end))
         )
         path = path_of(task_map, task)
         task = with_feed_rates(task, path)
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
-        approach = approach_of(
-            task,
-            robot,
-            task_map,
-            path,
-            end if start is None else start,
-            own=bool(further),
-        )
+        posture = end if start is None else start
+        own = bool(further)
+        approach = approach_of(task, robot, task_map, path, posture, own=own)
         limits = limits_of(robot, task, further, approach)
         check_smoothness(limits, task.spline)
-        limits = check_postures(
-            task_map, limits, start, end, path, task.refinement.tolerance
-        )
+        tolerance = task.refinement.tolerance
+        limits = check_postures(task_map, limits, start, end, path, tolerance)
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))
@@ -125,11 +112,10 @@ def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
     place = path.sample(np.ones(1)).target
     if isinstance(task_map, JointSpace):
         return np.asarray(place[0])
-    newton = Newton(task_map)
     miss = task_map.difference(place, task_map.values(posture[None]))
-    if task_map.robot.n < task_map.m or np.abs(miss).max() < _EXACT:
+    if task_map.robot.n < task_map.m or np.abs(miss).max() < 1e-12:
         return posture
-    (found,) = newton.nearest(place, posture[None])
+    (found,) = Newton(task_map).nearest(place, posture[None])
     return found if np.isfinite(found).all() else posture
 
 
@@ -200,7 +186,7 @@ def decompositions_of(
         A given posture is singular, or on another branch than the task's or the end posture's where a branch or named
         joints bind the motion to one.
     UnknownNameError
-        There is no such joint or branch.
+        The robot has no such joint, or the closed form no such branch.
     """
     task = problem.task
     robot = problem.robot
@@ -216,12 +202,9 @@ def decompositions_of(
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     asked = task.branch != "auto" or task.search.guesses != "lattice"
     if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
-        if (
-            len(found) <= 1
-        ):  # nothing to choose: the reasons of the only choice, or the wrong number of joints
-            return [
-                _decomposition(problem, ik.find(robot, task_map, (), families=families))
-            ]
+        if len(found) <= 1:
+            # Nothing to choose: the reasons of the only choice, or the wrong number of joints.
+            ik.find(robot, task_map, (), families=families)
         raise DecompositionError(
             "no choice of redundant joints has a closed form",
             redundant_joints=(),
@@ -248,32 +231,26 @@ def decompositions_of(
 def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
     """Add the free roll where it is the one redundant joint that is left out."""
     robot = task_map.robot
-    missing = robot.n - task_map.m - len(names)
-    return (
-        (*names, ROLL_JOINT)
-        if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names
-        else names
-    )
+    is_one_short = robot.n - task_map.m - len(names) == 1
+    if robot.rolls_freely and is_one_short and ROLL_JOINT not in names:
+        return (*names, ROLL_JOINT)
+    return names
 
 
 def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
     """Find the branches on which a motion may begin."""
-    robot = problem.robot
     task_map = problem.task_map
+    names = problem.robot.joint_names
+    redundant = tuple(names.index(name) for name in match.redundant_joints)
     wanted = problem.task.branch
-    redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
     labels = match.solver.branches
-    if problem.start is not None:
-        branch = branch_of(task_map, match, problem.start, wanted)
-        if problem.end is not None:
-            check_end_branch(task_map, match, problem.end, branch)
-        return Decomposition(problem, match, redundant, (branch,))
-    if problem.end is not None:
-        branch = branch_of(task_map, match, problem.end, wanted, name="end")
-        return Decomposition(problem, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, labels, where="branch")
-    allowed = tuple(
-        branch for branch, label in enumerate(labels) if wanted in ("auto", label)
-    )
-    return Decomposition(problem, match, redundant, allowed)
+    branches = tuple(i for i, label in enumerate(labels) if wanted in ("auto", label))
+    if problem.start is not None:
+        branches = (branch_of(task_map, match, problem.start, wanted),)
+        if problem.end is not None:
+            check_end_branch(task_map, match, problem.end, branches[0])
+    elif problem.end is not None:
+        branches = (branch_of(task_map, match, problem.end, wanted, name="end"),)
+    return Decomposition(problem, match, redundant, branches)

@@ -1,5 +1,7 @@
-"""Solver backends behind one protocol: one per file, listed in `TABLE`, imported when used."""
+"""Solver backends: a file for each, and a line in `TABLE`; libraries are imported when used."""
 
+from brachis.errors import UnknownNameError
+from brachis.optimise.backends import ipopt, slsqp, uno
 from brachis.optimise.backends.child_process import Solver
 from brachis.optimise.backends.monitor import residual
 from brachis.optimise.backends.protocol import (
@@ -10,7 +12,6 @@ from brachis.optimise.backends.protocol import (
     SolverReport,
     SolveStatus,
 )
-from brachis.optimise.backends.registry import AUTO_ORDER, NAMES, solver_named
 
 __all__ = [
     "AUTO_ORDER",
@@ -25,3 +26,31 @@ __all__ = [
     "residual",
     "solver_named",
 ]
+TABLE = {
+    backend.NAME: Solver(backend.NAME, backend.run) for backend in (uno, ipopt, slsqp)
+}
+AUTO_ORDER = tuple(TABLE)
+"""The order in which ``auto`` tries them."""
+CURVED_ORDER = ("slsqp", "uno", "ipopt")
+"""That order where a mean over the motion is held: its optimum is inside an edge, and a full Hessian pays."""
+NAMES = ("auto", *TABLE)
+
+
+def solver_named(name: str, *, curved: bool = False) -> tuple[Solver, ...]:
+    """Backends to try for a name, in order: one, or all for ``auto``.
+
+    Parameters
+    ----------
+    name : str
+    curved : bool, optional
+        Whether a mean over the whole motion is held.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    if name == "auto":
+        return tuple(TABLE[each] for each in (CURVED_ORDER if curved else AUTO_ORDER))
+    if name not in TABLE:
+        raise UnknownNameError("solver", name, NAMES, where="solver.name")
+    return (TABLE[name],)

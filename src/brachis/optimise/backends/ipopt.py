@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.optimise.backends.monitor import SolveMonitor, objective_at
+from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
 from brachis.optimise.backends.protocol import SolverReport, SolveStatus
 
 NAME = "ipopt"
@@ -33,9 +33,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     problem = monitor.problem
     options = monitor.options
 
-    def or_nan(
-        function: Callable[[np.ndarray], np.ndarray],
-    ) -> Callable[[np.ndarray, np.ndarray], None]:
+    def or_nan(function: Function) -> Callable[[np.ndarray, np.ndarray], None]:
         def write(point: np.ndarray, out: np.ndarray) -> None:
             try:
                 out[:] = function(point)

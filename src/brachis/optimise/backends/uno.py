@@ -7,11 +7,12 @@ Uno's limited-memory approximation, the subproblem solver its BQPD. https://gith
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from brachis.optimise.backends.monitor import SolveMonitor, objective_at
+from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
 from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
 
 NAME = "uno"
@@ -124,30 +125,27 @@ def _run(
         (problem.x_upper / units).tolist(),
         unopy.ZERO_BASED_INDEXING,
     )
-    entry_units = units[problem.jacobian_columns]
 
-    def objective(point: np.ndarray) -> float:
-        return monitor.objective(units * point)
+    def scale(function: Function, factors: np.ndarray | float) -> Callable[..., None]:
+        def write(point: np.ndarray, out: np.ndarray) -> None:
+            out[:] = factors * function(units * point)
 
-    def objective_gradient(point: np.ndarray, out: np.ndarray) -> None:
-        out[:] = units * monitor.gradient(units * point)
+        return write
 
-    def rows(point: np.ndarray, out: np.ndarray) -> None:
-        out[:] = monitor.rows(units * point)
-
-    def jacobian(point: np.ndarray, out: np.ndarray) -> None:
-        out[:] = entry_units * monitor.jacobian(units * point)
-
-    model.set_objective(unopy.MINIMIZE, objective, objective_gradient)
+    model.set_objective(
+        unopy.MINIMIZE,
+        lambda point: monitor.objective(units * point),
+        scale(monitor.gradient, units),
+    )
     model.set_constraints(
         len(problem.lower),
-        rows,
+        scale(monitor.rows, 1.0),
         problem.lower.tolist(),
         problem.upper.tolist(),
         len(problem.jacobian_rows),
         problem.jacobian_rows.tolist(),
         problem.jacobian_columns.tolist(),
-        jacobian,
+        scale(monitor.jacobian, units[problem.jacobian_columns]),
     )
     model.set_initial_primal_iterate((x / units).tolist())
     backend = unopy.UnoSolver()
