@@ -233,7 +233,7 @@ def _read(
 
 
 def _report_plan(robot: Robot, task: Task, report: Listener) -> None:
-    """Report for what is planned."""
+    """Report the robot, the path and the task space of a plan."""
     given = task.task_space
     space = given if isinstance(given, str) else f"[{', '.join(given)}]"
     joints = write_count(robot.n, "joint")

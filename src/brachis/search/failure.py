@@ -44,7 +44,7 @@ class Failure:
         Key of the task, or name of the limit; what was found there, and what would be accepted.
     hint : str
         What to try.
-    remedies : tuple of Remedy
+    remedies : sequence of Remedy
         Numbers of the task to change.
     share : float
         How much of what is asked for is possible, where that is known.
@@ -57,7 +57,7 @@ class Failure:
     found: str | None = None
     needed: str | None = None
     hint: str = ""
-    remedies: tuple[Remedy, ...] = ()
+    remedies: Sequence[Remedy] = ()
     share: float = 1.0
 
     def error(self) -> BrachisError:
@@ -121,7 +121,7 @@ def explain_reach(
             phase="path",
             s_interval=(first, last),
             hint=hint,
-            remedies=tuple(remedies),
+            remedies=remedies,
         )
 
     robot = problem.robot
@@ -345,11 +345,11 @@ def explain_no_motion(
     return Failure(
         f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
         hint=reason + more,
-        remedies=tuple(
+        remedies=[
             Remedy(key, speed, 0.7 * speed, problem.task.speed_unit)
             for key, speed in speeds.items()
             if speed
-        ),
+        ],
     )
 
 

@@ -140,7 +140,7 @@ def explain_holding(
         found=f"{taken} {label.unit} to hold the arm, {mean} {label.unit} on average (root mean square)",
         needed=f"{figure:.4g} {label.unit}",
         hint="Lead the path through postures that take less, or mount the robot otherwise",
-        remedies=tuple(remedies),
+        remedies=remedies,
     )
 
 
@@ -263,11 +263,11 @@ def _explain_end_speed(problem: Problem, plane: PhasePlane) -> Failure | None:
         where=f"boundary.{key}",
         found=f"{speeds[key]:g} {unit}, where one joint path was estimated to allow about {most}",
         hint="Raise the limits that hold the motion back",
-        remedies=tuple(
+        remedies=[
             Remedy(f"boundary.{key}", speed, _FIRST * shares[key] * speed, unit)
             for key, speed in speeds.items()
             if shares[key] < _EXACT
-        ),
+        ],
         share=share,
     )
 
@@ -326,7 +326,7 @@ def _explain_shortfall(
         found=f"{found} to {most} {label.unit} on that part, the least at s = {motion.s[place]:.2g}, {how}",
         needed=f"{allowed} {label.unit}",
         hint="Raise the limits that hold the motion back",
-        remedies=tuple(remedies),
+        remedies=remedies,
         share=1.0 - worst,
     )
 

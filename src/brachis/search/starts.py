@@ -406,7 +406,7 @@ def _refuse_beyond(
         found=f"{found} {label.unit} at s = {s[station]:.3g}",
         needed=f"{allowed} {label.unit}",
         hint="Lead the path elsewhere",
-        remedies=tuple(remedies),
+        remedies=remedies,
     )
     raise failure.error()
 
