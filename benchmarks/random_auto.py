@@ -21,8 +21,7 @@ from brachis import LimitSpec, Robot, load_task
 from brachis.errors import BrachisError
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.search.joint_path import DeadEnd
-from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import lattice_starts
+from brachis.search.starts import SEARCH_LEVELS, lattice_starts
 
 
 def planar_arm() -> Robot:
@@ -56,9 +55,7 @@ def has_course(robot: Robot, task: dict[str, object]) -> bool:
     except BrachisError:
         return False
     return any(
-        not isinstance(
-            lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0), DeadEnd
-        )
+        not isinstance(lattice_starts(decomposition, SEARCH_LEVELS["fast"][0]), DeadEnd)
         for decomposition in found
     )
 

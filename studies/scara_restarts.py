@@ -16,7 +16,7 @@ from brachis.optimise.backends import SolverOptions, solver_named
 from brachis.optimise.guess import starting_point
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.search.solving import MARGINS, solve_by_margin_continuation
+from brachis.search.candidates import MARGINS, solve_by_margin_continuation
 
 ROOT = Path(__file__).parents[1]
 spec = importlib.util.spec_from_file_location(

@@ -14,7 +14,7 @@ import brachis
 from brachis.errors import StartError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.search.solving import MARGINS, solve_by_margin_continuation
+from brachis.search.candidates import MARGINS, solve_by_margin_continuation
 from support.effort import QUICK
 from support.starts import starting_points
 

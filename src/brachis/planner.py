@@ -233,7 +233,7 @@ def _read(
 
 
 def _report_plan(robot: Robot, task: Task, report: Listener) -> None:
-    """Report for what is planned."""
+    """Report the robot, the path and the task space of a plan."""
     given = task.task_space
     space = given if isinstance(given, str) else f"[{', '.join(given)}]"
     joints = write_count(robot.n, "joint")
@@ -268,7 +268,7 @@ def transcribe(
     Raises
     ------
     InputError
-        See `plan`.
+        As `plan` does.
 
     Examples
     --------
@@ -285,7 +285,7 @@ def transcribe(
 
 Outcome = Result | BrachisError
 OnProgress = Callable[[int, int, Outcome], None]
-"""Told after every plan: how many are done, of how many, and what came out."""
+"""Called after every plan with how many are done, of how many, and what came out."""
 
 
 def plan_many(

@@ -87,7 +87,7 @@ class Result(PlannedMotion):
     def report(
         self, path: str | os.PathLike[str] | None = None, *, degrees: bool = False
     ) -> Report:
-        """Make a page from which a person decides whether to run the motion; see `brachis.report.make_report`.
+        """Make a page from which a person decides whether to run the motion, as `brachis.report.make_report` does.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Result(PlannedMotion):
     def bottleneck(
         self, *, check: bool = False, reference: bool = False
     ) -> BottleneckReport:
-        """Find out what holds the motion back; see `brachis.bottleneck.report`."""
+        """Find out what holds the motion back, as `brachis.bottleneck.report` does."""
         return bottleneck.report(self, check=check, reference=reference)
 
     def view(
@@ -120,7 +120,7 @@ class Result(PlannedMotion):
         port: int | None = None,
         block: bool | None = None,
     ) -> Viewer:
-        """Show the motion and the list of candidates in the browser; see `brachis.view`."""
+        """Show the motion and the list of candidates in the browser, as `brachis.view` does."""
         candidates = [candidate.to_dict() for candidate in self.candidates]
         return view(
             self.trajectory,

@@ -14,8 +14,8 @@ from brachis.common.deadline import NEVER
 from brachis.kinematics import CHART
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
-from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.schedule import batches
+from brachis.search.starts import SEARCH_LEVELS
 
 ROOT = Path(__file__).parents[2]
 COARSE = {"cells_per_turn": 36, "nodes": 60}
@@ -81,7 +81,6 @@ def test_closed_forms_are_left_for_the_last(
                 decompositions_of(problem),
                 NEVER,
                 lambda _text: None,
-                lambda *_dead_end: None,
             )
         )
         first = [

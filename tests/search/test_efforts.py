@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import SCREENED
+from brachis.search.starts import SCREENED, SEARCH_LEVELS
 
 PAGE = Path(__file__).parents[2] / "docs/fastest_motion.md"
 

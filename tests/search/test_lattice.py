@@ -18,8 +18,7 @@ from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_no_motion
 from brachis.search.joint_path import DeadEnd
-from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import lattice_starts
+from brachis.search.starts import SEARCH_LEVELS, lattice_starts
 from support.pose_arms import panda
 
 ROOT = Path(__file__).parents[2]
@@ -166,7 +165,7 @@ def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
     given = problem(scara(**options), **changes)
     ends = [
-        lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0)
+        lattice_starts(decomposition, SEARCH_LEVELS["fast"][0])
         for decomposition in decompositions_of(given)
     ]
     assert all(isinstance(end, DeadEnd) for end in ends)
@@ -209,7 +208,7 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
         "task_space": "pose",
     }
     given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
-    dead_ends = {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})}
+    dead_ends = {"panda_joint4": DeadEnd(0.4, "the branch ends")}
     failure = explain_no_motion(
         given, decompositions_of(given), [], dead_ends, Deadline.after(10.0)
     )

@@ -68,7 +68,7 @@ def test_a_circle_too_many_for_the_range_is_a_dead_end_at_its_joint():
     end = ClosedFormLattice(decomposition).joint_paths(4)
     assert isinstance(end, DeadEnd)
     assert 1.8 / 2.1 < end.s < 1.0
-    assert "the range of joint 'j1' ends" in end.causes
+    assert "the range of joint 'j1' ends" in end.cause
 
 
 @pytest.mark.parametrize("reach", [None, [-30.0, 30.0], [8.0, None]])
@@ -128,7 +128,7 @@ def test_a_free_start_that_no_torque_holds_says_so():
     end = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(end, DeadEnd)
     assert end.s == 0.0
-    assert "the torque limit cannot hold the arm against gravity" in end.causes
+    assert "the torque limit cannot hold the arm against gravity" in end.cause
 
 
 def test_acceleration_limits_alone_have_shortest_courses():

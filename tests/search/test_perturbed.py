@@ -11,8 +11,7 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import starts as module
 from brachis.search.joint_path import JointPath
-from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import perturb
+from brachis.search.starts import SEARCH_LEVELS, perturb
 from brachis.task import load_task
 
 URDF = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"

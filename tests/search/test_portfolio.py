@@ -25,9 +25,9 @@ from brachis.search import candidates, portfolio, schedule, starts
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
 from brachis.search.joint_path import DeadEnd
-from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.processes import processes
+from brachis.search.starts import SEARCH_LEVELS
 from brachis.task import load_task
 
 ROOT = Path(__file__).parents[2]
@@ -223,7 +223,7 @@ class NoPosture:
         pass
 
     def joint_paths(self, _most: int) -> DeadEnd:
-        return DeadEnd(0.5, {"nothing": 1})
+        return DeadEnd(0.5, "nothing")
 
 
 def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(

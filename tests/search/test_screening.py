@@ -12,8 +12,7 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import screening
-from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.starts import chart_starts
+from brachis.search.starts import SEARCH_LEVELS, chart_starts
 from brachis.task import load_task
 
 MOST = 2
@@ -116,7 +115,7 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
         )
 
     monkeypatch.setattr(screening, "_solve_quickly", quickly)
-    monkeypatch.setattr(screening, "_same", lambda *_starts: False)
+    monkeypatch.setattr(screening, "_is_same", lambda *_starts: False)
     kept = screening.screen(starts, MOST, NEVER, quiet)
     assert len(looked_at) == 6
     assert [start.estimate for start in kept] == [1.0, 1.0]

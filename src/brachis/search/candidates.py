@@ -2,35 +2,72 @@
 
 1. `solve_candidate` solves from a joint path at the first collocation points.
 2. `finish_candidate` adapts the mesh, refines and verifies.
+
+In between, changes of the solved program are tried, and the better motion is kept (`improve`):
+
+Branch margins: near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early
+creeps along it. Far from it the solve is easy, and its answer is a good start for a smaller margin.
+
+Charts: a chart holds around its joint path. If a solve ends far from that path, the chart's rows may no longer be
+transversal, or the least singular value may hold the motion back. Then a new chart is laid around the motion, and the
+solve goes on in it. At the optimum any rows that are transversal along the motion describe the same motions, but
+splines of their coordinates are not the same curves: over the same knots one measure of self-motion may be a few parts
+in a thousand faster than another. So several choices of single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import itertools
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.optimise.backends import SolveStatus, solver_named
-from brachis.optimise.candidate import (
-    Candidate,
-    InitialGuess,
-    refine_and_verify,
+from brachis.errors import UnreachableError
+from brachis.kinematics import (
+    ChartMap,
+    ChartRows,
+    Newton,
+    chart_around,
+    null_spaces,
+    transversality,
 )
-from brachis.optimise.improve import SolvedProgram
+from brachis.limits.safeguards import MARGIN
+from brachis.optimise.backends import SolverReport, SolveStatus, solver_named
+from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
+from brachis.optimise.guess import fit_curves, shortest_time
+from brachis.optimise.improve import (
+    Change,
+    Solve,
+    SolvedProgram,
+    attempt_once,
+    improve,
+)
 from brachis.optimise.mesh import adapt_mesh, coarsest
+from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import phase_in, program_of
+from brachis.problem.problem import Problem
 from brachis.search.phase_plane import initial_guess, initial_knots
-from brachis.search.solving import (
-    MARGINS,
-    best_of_joints,
-    solve_by_margin_continuation,
-    solve_in_chart,
-    solve_without_third_order_limits,
-)
+
+MARGINS = (0.1, 0.02, MARGIN)
+"""Branch margins that are tried in turn."""
+WORTH_IT = 2e-4
+"""A further solve that shortens the motion by less than this fraction of its time was not worth it."""
+SELECTABLE = 0.05
+"""Least transversality along the motion of joints that may take the place of the chart's rows."""
+
+
+def solvers_of(problem: Problem) -> list[str]:
+    """Names of the solvers for a problem, the one that is tried first at the front."""
+    curved = any(limit.guarantee.is_mean for limit in problem.limits)
+    found = solver_named(problem.task.solver.name, curved=curved)
+    return [solver.name for solver in found]
 
 
 def solve_candidate(
@@ -141,3 +178,236 @@ def _open_session(
     return SolverSession.for_task(
         backend, settings, start.joint_map, deadline, listener
     )
+
+
+def solve_by_margin_continuation(
+    program: Program, x: np.ndarray, solve: Solve, margins: Sequence[float]
+) -> SolvedProgram:
+    """Solve with ever smaller branch margins, each from the last answer.
+
+    A margin that does not hold the motion back, or that hardly shortens it, ends the continuation.
+
+    Parameters
+    ----------
+    program : Program
+    x : (v,) ndarray
+        Starting point.
+    solve : callable
+        ``solve(program, x)`` returns a `SolverReport`.
+    margins : sequence of float
+        Least branch margins, descending.
+
+    Returns
+    -------
+    SolvedProgram
+        With the last margin for which the solve ended well; with the last one tried if none did.
+    """
+
+    def use(smaller: Program, kept: SolvedProgram) -> tuple[Program, np.ndarray] | None:
+        if not kept.reports:
+            return smaller, x
+        report = kept.report
+        is_free = kept.usable and not _is_held_back(kept)
+        if is_free or report.status is SolveStatus.TIME_LIMIT:
+            return None
+        # An unusable answer may have run out of iterations on its way.
+        return smaller, report.x if kept.usable or report.violation <= 1e-3 else x
+
+    # Closed forms may have no margins, or the start posture caps them.
+    programs = {
+        each.safeguard_bounds: each for each in map(program.with_margin, margins)
+    }
+    return improve(
+        SolvedProgram(program),
+        [partial(use, smaller) for smaller in programs.values()],
+        attempt_once(solve),
+        least_gain=WORTH_IT,
+        go_on_above=WORTH_IT,
+    )
+
+
+def _is_held_back(solved: SolvedProgram) -> bool:
+    """Tell whether a branch margin is so near to its bound that it holds the motion back."""
+    return solved.program.safeguard_slack(solved.report.x) <= 1e-4
+
+
+def solve_without_third_order_limits(
+    program: Program, x: np.ndarray, solve: Solve, margin: float
+) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
+    """Find a better starting point for limits on the third derivative: the answer without them, time-scaled.
+
+    Where the motion must slow down, such limits have local optima in which it all but stops. The fastest motion without
+    them has slowed down where it must; its shape over time, slowed down as a whole, leads past them.
+
+    Parameters
+    ----------
+    program : Program
+    x : (v,) ndarray
+        Starting point.
+    solve : callable
+    margin : float
+        Least branch margin.
+
+    Returns
+    -------
+    x : (v,) ndarray
+        The given point without such limits, or if that solve failed.
+    reports : tuple of SolverReport
+        Of the solve without them.
+    """
+    easier = program.without_orders_above(2)
+    if len(easier.limits) == len(program.limits):
+        return x, ()
+    report = solve(easier.with_margin(margin), x)
+    if report.status.usable:
+        with contextlib.suppress(UnreachableError):
+            x = shortest_time(program, report.x)
+    return x, (report,)
+
+
+def solve_in_chart(
+    problem: Problem, program: Program, x: np.ndarray, solve: Solve
+) -> SolvedProgram:
+    """Solve in a chart, and go on in one around the motion if that is needed.
+
+    Parameters
+    ----------
+    problem : Problem
+    program : Program
+        Of one phase in a chart.
+    x : (v,) ndarray
+        Starting point.
+    solve : callable
+
+    Returns
+    -------
+    SolvedProgram
+        In the last chart.
+    """
+
+    def solve_first(program: Program, x: np.ndarray) -> SolvedProgram:
+        return solve_by_margin_continuation(program, x, solve, MARGINS[:1])
+
+    def solve_further(program: Program, x: np.ndarray) -> SolvedProgram:
+        return solve_by_margin_continuation(program, x, solve, MARGINS[1:])
+
+    def follow(kept: SolvedProgram) -> tuple[Program, np.ndarray] | None:
+        if not kept.usable or _has_good_chart(kept):
+            return None
+        return move_to_chart(problem, kept)
+
+    out_of_time = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
+    solved = solve_first(program, x)
+    if not solved.usable and solved.report.status not in out_of_time:
+        solved = improve(solved, [_go_to((program, x))], solve_further)
+    solved = improve(solved, 3 * [follow], solve_first, go_on_above=WORTH_IT)
+    if solved.usable and _is_held_back(solved):
+        point = solved.program, solved.report.x
+        solved = improve(solved, [_go_to(point)], solve_further)
+    return solved
+
+
+def best_of_joints(
+    problem: Problem, solved: SolvedProgram, solve: Solve
+) -> SolvedProgram:
+    """Solve again with joints in place of the chart's rows, and keep the fastest.
+
+    Parameters
+    ----------
+    problem : Problem
+    solved : SolvedProgram
+        A program of one phase in a chart.
+    solve : callable
+
+    Returns
+    -------
+    SolvedProgram
+    """
+
+    def solve_again(program: Program, x: np.ndarray) -> SolvedProgram:
+        return solve_by_margin_continuation(program, x, solve, MARGINS)
+
+    points = [move_to_chart(problem, solved, rows) for rows in _select_joints(solved)]
+    return improve(
+        solved,
+        [_go_to(point) for point in points if point is not None],
+        solve_again,
+        least_gain=0.0,
+        go_on_above=None,
+    )
+
+
+def _go_to(point: tuple[Program, np.ndarray]) -> Change:
+    """Change to a program and a point, whatever was kept so far."""
+    return lambda _kept: point
+
+
+def move_to_chart(
+    problem: Problem, solved: SolvedProgram, rows: ChartRows | None = None
+) -> tuple[Program, np.ndarray] | None:
+    """Write a motion in a chart around itself; None if it has none.
+
+    Parameters
+    ----------
+    problem : Problem
+    solved : SolvedProgram
+        A program of one phase.
+    rows : ChartRows, optional
+        Of the chart, as for `chart_around`.
+
+    Returns
+    -------
+    program : Program
+    x : (v,) ndarray
+        The same motion but for what splines of the new coordinates cannot say.
+    """
+    (phase,) = solved.program.phases
+    (motion,) = solved.program.motions(solved.report.x)
+    t_norm = np.linspace(0.0, 1.0, 4 * len(phase.t_norm) + 1)
+    times = t_norm * motion.t_end
+    try:
+        state = phase.joint_map.state(*motion.at(times), t=times)
+        s = state.y[:, 0]
+        chart = chart_around(problem.task_map, problem.path, s, state.q, rows)
+        program = Program([phase_in(problem, chart, phase.grid)])
+        curves = chart.curves(s, state.q)
+        fit = fit_curves(program.phases[0], motion.t_end, t_norm, curves)
+        return program, shortest_time(program, fit)
+    except UnreachableError:
+        return None
+
+
+def _self_motion(solved: SolvedProgram) -> tuple[ChartMap, np.ndarray, np.ndarray]:
+    """Return the chart, and along the motion s, (K,), and bases of the null spaces of the task Jacobian, (K, n, r)."""
+    (state,) = solved.program.states(solved.report.x)
+    (phase,) = solved.program.phases
+    chart = phase.joint_map
+    assert isinstance(chart, ChartMap)
+    jacobian = Newton(chart.task_map).task_coordinates(state.q)[1]
+    return chart, state.y[:, 0], null_spaces(jacobian)
+
+
+def _has_good_chart(solved: SolvedProgram) -> bool:
+    """Tell whether the chart is transversal along the motion, and does not hold it back."""
+    try:
+        chart, s, null = _self_motion(solved)
+        least = transversality(chart.rows.at(s)[0], null).min()
+        return not _is_held_back(solved) and bool(least >= 0.5)
+    except UnreachableError:
+        return False
+
+
+def _select_joints(solved: SolvedProgram) -> list[ChartRows]:
+    """Rows that select joints and are transversal along the motion, the most transversal ones first."""
+    _, _, null = _self_motion(solved)
+    n, r = null.shape[1:]
+    # Three choices of one redundant joint and one of several are tried: these solves take longest.
+    most = (0, 3, 1)[min(r, 2)]
+    selections = []
+    for joints in itertools.islice(itertools.combinations(range(n), r), 500):
+        rows = np.eye(n)[list(joints)]
+        least = float(transversality(rows[None], null).min())
+        if least >= SELECTABLE:
+            selections.append((least, rows))
+    selections.sort(key=lambda item: -item[0])
+    return [ChartRows.constant(rows) for _, rows in selections[:most]]

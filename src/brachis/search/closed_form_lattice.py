@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 
-from brachis.common.deadline import NEVER, Deadline
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.joints import TURN, complement
 from brachis.search.joint_path import OTHER_BRANCH
-from brachis.search.lattice import LARGEST_STEP, Edges, Lattice, Layer
+from brachis.search.lattice import LARGEST_STEP, Edges, Lattice, Layer, Options
 
 
 @dataclass(frozen=True)
@@ -52,25 +52,21 @@ class Cells:
     ) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
-        The posture, (n,), from which joint paths begin is the middle of a cell. Where none is given, the cells cover
-        closed ranges, a turn of an open revolute joint, and what of an open prismatic joint is near where the path
-        begins.
+        The posture, (n,), from which joint paths begin is the middle of a cell. Without one the cells cover closed
+        ranges, a turn of an open revolute joint, and what of an open prismatic joint is near the path's beginning.
         """
-        given = decomposition.problem
+        problem = decomposition.problem
         joints = list(decomposition.redundant)
-        turning = given.robot.revolute[joints]
-        low = given.robot.limits.position_lower[joints]
-        high = given.robot.limits.position_upper[joints]
+        turning = problem.robot.revolute[joints]
+        low = problem.robot.limits.position_lower[joints]
+        high = problem.robot.limits.position_upper[joints]
         size = cell_sizes(turning, cells_per_turn)
-        if posture is not None:
-            origin = posture[joints]
+        if posture is None:
+            near = [_near_start(problem, joint) for joint in joints]
+            origin = np.clip(np.where(turning, 0.0, near), low, high)
         else:
-            near = [
-                0.0 if turns else _nearby(given, joint)
-                for joint, turns in zip(joints, turning, strict=True)
-            ]
-            origin = np.clip(near, low, high)
-        reach = np.where(turning, 0.5 * TURN, 2.0 + given.path.length)
+            origin = posture[joints]
+        reach = np.where(turning, 0.5 * TURN, 2.0 + problem.path.length)
         # Closed ranges are covered whole, up to 20 rad or m: every cell takes memory.
         closed = np.isfinite(low) & np.isfinite(high)
         reach = np.where(closed, np.maximum(reach, 20.0), reach)
@@ -93,28 +89,20 @@ class Cells:
 
     def everywhere(self, most: int, rng: np.random.Generator) -> np.ndarray:
         """List the cells at which a motion may begin, (C, r); of several joints `most` random ones."""
-        if self.r == 0:
-            return np.zeros((1, 0), dtype=int)
         if self.r == 1:
             return np.arange(self.first[0], self.last[0] + 1)[:, None]
-        return rng.integers(self.first, self.last + 1, (most, self.r))
+        return rng.integers(self.first, self.last + 1, (most if self.r else 1, self.r))
 
     def neighbours(self, rng: np.random.Generator) -> np.ndarray:
         """Offsets to the cells that the next station may be in, (O, r): all within the window, or a sample."""
-        if self.r == 0:
-            return np.zeros((1, 0), dtype=int)
         if self.r == 1:
             return np.arange(-self.window, self.window + 1)[:, None]
-        single = [
-            sign * step * row
-            for row in np.eye(self.r, dtype=int)
-            for step in (1, 2, 4, 8)
-            for sign in (-1, 1)
-        ]
+        still = np.zeros((1, self.r), dtype=int)
+        if self.r == 0:
+            return still
+        single = np.kron([[1], [2], [4], [8]], np.eye(self.r, dtype=int))
         random = np.rint(rng.normal(0.0, 2.5, (24, self.r))).astype(int)
-        return np.unique(
-            np.vstack([np.zeros((1, self.r), dtype=int), single, random]), axis=0
-        )
+        return np.unique(np.vstack([still, single, -single, random]), axis=0)
 
 
 def cell_sizes(revolute: np.ndarray, cells_per_turn: int) -> np.ndarray:
@@ -124,6 +112,7 @@ def cell_sizes(revolute: np.ndarray, cells_per_turn: int) -> np.ndarray:
 
 def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the different cells, (C, r), and where each given one, (K, r), is among them, (K,)."""
+    # A number for each cell: NumPy's sorting of rows takes many times as long.
     span = np.ptp(cells, axis=0) + 1
     weights = np.append(np.cumprod(span[:0:-1])[::-1], 1)[: len(span)]
     keys = (cells - cells.min(axis=0)) @ weights.astype(int)
@@ -131,19 +120,29 @@ def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return cells[first], where.ravel()
 
 
-def _nearby(given: Problem, joint: int) -> float:
-    """Where a prismatic joint takes the tool, with the other joints at zero, nearest to the path's beginning, m."""
-    axes = list(given.task_map.axes)
-    q = np.zeros(given.robot.n)
-    there = np.array(given.robot.tool_placement(q).translation)
-    q[joint] = 1.0
-    axis = (np.array(given.robot.tool_placement(q).translation) - there)[axes]
-    wanted = given.path.sample(np.zeros(1)).target[0, : len(axes)]
-    return float(axis @ (wanted - there[axes]) / max(axis @ axis, 1e-12))
+def _near_start(problem: Problem, joint: int) -> float:
+    """Where a joint takes the tool nearest to the path's beginning, if it is prismatic, others at zero, m."""
+    axes = list(problem.task_map.axes)
+    q = np.zeros((2, problem.robot.n))
+    q[1, joint] = 1.0
+    there, beyond = (
+        np.array(problem.robot.tool_placement(each).translation)[axes] for each in q
+    )
+    axis = beyond - there
+    wanted = problem.path.sample(np.zeros(1)).target[0, : len(axes)]
+    return float(axis @ (wanted - there) / max(axis @ axis, 1e-12))
 
 
-_CLEAR = 0.02
-"""Branch margin that nodes keep, where a given posture has twice as much."""
+def solve_all(
+    decomposition: Decomposition, targets: np.ndarray, q_r: np.ndarray
+) -> np.ndarray:
+    """Postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r); NaN out of reach."""
+    n = decomposition.problem.robot.n
+    answers = decomposition.match.solver.solve(targets, q_r)
+    q = np.empty((*answers.shape[:3], n))
+    q[..., list(decomposition.redundant)] = q_r[:, None, None]
+    q[..., complement(n, decomposition.redundant)] = answers
+    return q
 
 
 class ClosedFormLattice(Lattice):
@@ -152,42 +151,30 @@ class ClosedFormLattice(Lattice):
     Parameters
     ----------
     decomposition : Decomposition
-    cells_per_turn : int, optional
-        Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
-    density, nodes, seed, deadline
-        See `Lattice`.
+    **options
+        As of `Lattice`.
     """
 
     def __init__(
-        self,
-        decomposition: Decomposition,
-        *,
-        cells_per_turn: int = 72,
-        density: float = 1.0,
-        nodes: int = 120,
-        seed: int = 0,
-        deadline: Deadline = NEVER,
+        self, decomposition: Decomposition, **options: Unpack[Options]
     ) -> None:
-        given = decomposition.problem
-        self._redundant = list(decomposition.redundant)
-        self._rest = np.array(
-            complement(given.robot.n, decomposition.redundant), dtype=int
-        )
-        turning = given.robot.revolute & np.isin(np.arange(given.robot.n), self._rest)
-        super().__init__(
-            given, turning, density=density, nodes=nodes, seed=seed, deadline=deadline
-        )
+        problem = decomposition.problem
         self.decomposition = decomposition
+        self._redundant = list(decomposition.redundant)
+        turning = problem.robot.revolute.copy()
+        turning[self._redundant] = False
+        super().__init__(problem, turning, **options)
         self._solver = decomposition.match.solver
         self._modulo = turning
         self._given_branch = decomposition.branches[0]
-        self._cells = Cells.of(decomposition, cells_per_turn, self._origin)
-        self._clear = _CLEAR
+        self._cells = Cells.of(decomposition, self._cells_per_turn, self._origin)
+        # Branch margin that nodes keep: half that of the given posture, where that is less.
+        self._clear = 0.02
         if self._origin is not None:
-            at_origin = self._solver.branch_margins(
-                self._origin[None], decomposition.branches[0]
-            )[0]
-            self._clear = float(np.minimum(_CLEAR, 0.5 * at_origin.min(initial=np.inf)))
+            margins = self._solver.branch_margins(
+                self._origin[None], self._given_branch
+            )
+            self._clear = min(0.02, 0.5 * float(margins.min(initial=np.inf)))
 
     def _at_end(self, last: Layer) -> np.ndarray:
         """Tell which nodes, (K,) bool, are in the end's cell: the plan goes on to the end."""
@@ -200,70 +187,55 @@ class ClosedFormLattice(Lattice):
         """Make nodes all over the ranges of the redundant joints."""
         cells = self._cells.everywhere(4 * self._nodes, rng)
         branches = np.array(self.decomposition.branches)
-        answers = self._solve(cells, 0)[:, branches]
-        cell, branch, alternative = np.nonzero(np.isfinite(answers).all(axis=3))
-        q = self._postures(cells[cell], answers[cell, branch, alternative])
-        return Layer.start(q, branches[branch])
+        q = self._postures(cells, 0)[:, branches]
+        exists = np.isfinite(q).all(axis=3)
+        return Layer.start(q[exists], branches[np.nonzero(exists)[1]])
 
-    def _solve(self, cells: np.ndarray, station: int) -> np.ndarray:
-        """Non-redundant joints of all branches, (C, B, A, m)."""
-        target = np.repeat(self._targets[station][None], len(cells), axis=0)
-        return self._solver.solve(target, self._cells.positions(cells))
-
-    def _postures(self, cells: np.ndarray, answers: np.ndarray) -> np.ndarray:
-        """Postures, (K, n), of cells, (K, r), with non-redundant joints, (K, m)."""
-        q = np.empty((len(cells), self._robot.n))
-        q[:, self._redundant] = self._cells.positions(cells)
-        q[:, self._rest] = answers
-        return q
+    def _postures(self, cells: np.ndarray, station: int) -> np.ndarray:
+        """Postures, (C, B, A, n), of cells, (C, r), on all branches."""
+        targets = np.repeat(self._targets[station][None], len(cells), axis=0)
+        return solve_all(self.decomposition, targets, self._cells.positions(cells))
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
         """List edges to the cells around; at the very end to the given end's, too."""
         offsets = self._cells.neighbours(rng)
-        count = len(before.branch)
-        nodes = np.arange(count)
-        parent = np.repeat(nodes, len(offsets))
+        nodes = np.arange(len(before.branch))
         own = self._cells.near(before.q[:, self._redundant])
-        around = own[parent] + np.tile(offsets, (count, 1))
+        parent = np.repeat(nodes, len(offsets))
+        around = (own[:, None] + offsets).reshape(len(parent), self._cells.r)
         end = self.problem.end
         if self._to_end and end is not None and station == len(self.s) - 1:
-            aim = np.tile(self._cells.near(end[self._redundant]), (count, 1))
+            aim = np.tile(self._cells.near(end[self._redundant]), (len(nodes), 1))
             parent = np.append(parent, nodes)
             around = np.vstack([around, aim])
         cells, where = unique(around)
-        answers = self._solve(cells, station)
+        postures = self._postures(cells, station)
         several = self._solver.alternatives
         alternative = np.tile(np.arange(several), len(parent))
         parent = np.repeat(parent, several)
         where = np.repeat(where, several)
         branch = before.branch[parent]
-        q = self._postures(cells[where], answers[where, branch, alternative])
+        q = postures[where, branch, alternative]
         step = self._step(before.q[parent], q)
         turns = np.nan_to_num(np.round((before.q[parent] + step - q) / TURN))
         return Edges(
             parent,
             step,
             np.column_stack([where, branch, alternative, turns[:, self._counts_turns]]),
-            np.isfinite(answers).all(axis=3).any(axis=(1, 2))[where],
-            np.ones(len(parent), dtype=bool),
+            np.isfinite(postures).all(axis=3).any(axis=(1, 2))[where],
         )
 
-    def _keep(
-        self, layer: Layer, choose: Callable[[Layer], Layer]
-    ) -> Layer | dict[str, int]:
+    def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
         """Choose among the nodes clear of the branch boundary that can be held."""
         clear = np.ones(len(layer.branch), dtype=bool)
         for branch in np.unique(layer.branch):
             own = layer.branch == branch
             margins = self._solver.branch_margins(layer.q[own], int(branch))
             clear[own] = margins.min(axis=1, initial=np.inf) >= self._clear
-        kept = super()._keep(layer[clear], choose)
-        if isinstance(kept, Layer) or clear.all():
-            return kept
-        return kept | {OTHER_BRANCH: int((~clear).sum())}
+        return super()._keep(layer[clear], choose) or OTHER_BRANCH
 
     def _thin(self, layer: Layer) -> Layer:
-        """Keep a bounded number of nodes where there are several redundant joints."""
+        """Keep a bounded number of nodes with several redundant joints."""
         if self._cells.r <= 1:
             return layer
-        return layer.thin(self._nodes, layer.length, self._robot, self.problem.limits)
+        return layer[self._choose_some(layer, self._nodes, layer.length)]

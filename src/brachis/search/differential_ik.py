@@ -14,18 +14,6 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.kinematics import ClosedFormMap
 
-# metres a step
-_FEWEST_STEPS = 24
-_MOST_STEPS = 1000
-_STEP_LENGTH = 0.05
-_DAMPING = 1e-6
-_CORRECTIONS = 5
-_UNFOLDING_STEPS = 20
-_UNFOLDING_STEP = 0.06
-_LARGEST_STEP = 0.2
-_ROOMY = 0.05
-_RANGE_PUSH = 20.0
-
 
 @dataclass(frozen=True)
 class Strategy:
@@ -50,58 +38,25 @@ class Strategy:
 
 
 STRATEGIES = (
-    Strategy(push=2.0, threshold=0.4),
-    Strategy(push=6.0, threshold=0.8),
-    Strategy(push=4.0, threshold=0.6, drift=1.0),
-    Strategy(push=4.0, threshold=0.6, drift=-1.0),
-    Strategy(push=15.0, threshold=1.0),
-    Strategy(push=2.0, threshold=0.1, centre=12.0),
-    Strategy(push=4.0, threshold=0.6, drift=3.0),
-    Strategy(push=4.0, threshold=0.6, drift=-3.0),
+    Strategy(2.0, 0.4),
+    Strategy(6.0, 0.8),
+    Strategy(4.0, 0.6, drift=1.0),
+    Strategy(4.0, 0.6, drift=-1.0),
+    Strategy(15.0, 1.0),
+    Strategy(2.0, 0.1, centre=12.0),
+    Strategy(4.0, 0.6, drift=3.0),
+    Strategy(4.0, 0.6, drift=-3.0),
 )
 
 
 def differential_ik_paths(
     joint_map: ClosedFormMap, deadline: Deadline = NEVER
 ) -> Iterator[np.ndarray]:
-    """Yield joint paths one after the other; where the first one comes near a branch boundary, the roomiest ones first.
-
-    Parameters
-    ----------
-    joint_map : ClosedFormMap
-    deadline : Deadline, optional
-        Joint paths that are not complete by then are left out.
-
-    Yields
-    ------
-    (steps, 1 + r) ndarray
-        See `numeric_course`.
-    """
-    strategies = STRATEGIES if joint_map.r else STRATEGIES[:1]
-    joint_paths = (
-        differential_ik_path(joint_map, strategy, deadline)
-        for strategy in strategies
-        if not deadline.passed
-    )
-    found = (joint_path for joint_path in joint_paths if joint_path is not None)
-    first = next(found, None)
-    if first is None:
-        return
-    if _room(joint_map, first) > _ROOMY:
-        yield first
-        yield from found
-    else:
-        yield from sorted(
-            (first, *found), key=lambda joint_path: -_room(joint_map, joint_path)
-        )
-
-
-def _room(joint_map: ClosedFormMap, joint_path: np.ndarray) -> float:
-    """Return the least branch margin along a joint path; -inf where the branch cannot follow it."""
-    q = joint_map.postures(joint_path)
-    if not np.isfinite(q).all():
-        return -np.inf
-    return float(joint_map.branch_margins(q).min(initial=np.inf))
+    """Yield joint paths, (steps, 1 + r), strategy after strategy; those not complete by the deadline are left out."""
+    for strategy in STRATEGIES if joint_map.r else STRATEGIES[:1]:
+        joint_path = differential_ik_path(joint_map, strategy, deadline)
+        if joint_path is not None:
+            yield joint_path
 
 
 def differential_ik_path(
@@ -121,37 +76,30 @@ def differential_ik_path(
     Returns
     -------
     (steps, 1 + r) ndarray or None
-        Successive values of s and the redundant joints; None where the target cannot be followed, or not in time.
+        Successive values of s and the redundant joints; None if the target cannot be followed, or not in time.
     """
     if joint_map.r == 0:
         return np.array([[0.0], [1.0]])
-    steps = int(
-        np.clip(
-            np.ceil(joint_map.path.length / _STEP_LENGTH), _FEWEST_STEPS, _MOST_STEPS
-        )
-    )
-    s = np.linspace(0.0, 1.0, steps + 1)
-    targets = joint_map.path.sample(s).target
+    # No step is longer than 5 cm; before the first one the posture is unfolded in up to 20 steps.
+    steps = int(np.clip(np.ceil(joint_map.path.length / 0.05), 24, 1000))
+    s = np.append(np.zeros(20), np.linspace(0.0, 1.0, steps + 1)[1:])
     q = joint_map.start.astype(float)
     previous = np.zeros_like(q)
     joint_path = [np.append(0.0, q[joint_map.redundant])]
-    for _ in range(_UNFOLDING_STEPS):
-        if (
-            joint_map.branch_margins(q[None]).min(initial=1.0)
-            > 0.5 * strategy.threshold
-        ):
-            break
-        moved = _follow(joint_map, strategy, q, previous, targets[0], step_s=None)
-        if moved is None or deadline.passed:
-            break
-        q, previous = moved
-        joint_path.append(np.append(0.0, q[joint_map.redundant]))
-    for station, target in zip(s[1:], targets[1:], strict=True):
-        moved = _follow(joint_map, strategy, q, previous, target, step_s=1.0 / steps)
-        if moved is None or deadline.passed:
+    for station, target in zip(s, joint_map.path.sample(s).target, strict=True):
+        if not station:
+            margin = joint_map.branch_margins(q[None]).min(initial=1.0)
+            if margin > 0.5 * strategy.threshold:
+                continue
+        if deadline.passed:
             return None
-        q, previous = moved
-        joint_path.append(np.append(station, q[joint_map.redundant]))
+        step_s = 1.0 / steps if station else None
+        moved = _follow(joint_map, strategy, q, previous, target, step_s)
+        if moved is not None:
+            q, previous = moved
+            joint_path.append(np.append(station, q[joint_map.redundant]))
+        elif station:
+            return None
     return np.array(joint_path)
 
 
@@ -161,7 +109,6 @@ def _follow(
     q: np.ndarray,
     previous: np.ndarray,
     target: np.ndarray,
-    *,
     step_s: float | None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """One step to the next target: the new posture and the null-space motion made; None if it is not met.
@@ -169,20 +116,20 @@ def _follow(
     `step_s` is the step in s, None for unfolding on the spot.
     """
     task_map = joint_map.task_map
-    for correction in range(_CORRECTIONS):
+    for correction in range(5):
         miss = task_map.difference(target, task_map.value(q))
         if correction and np.abs(miss).max() < 1e-3:
             return q, previous
         jacobian = task_map.jacobian(task_map.twists(q[None]))[0]
-        square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
+        square = jacobian @ jacobian.T + 1e-6 * np.eye(len(miss))  # damped
         step = jacobian.T @ np.linalg.solve(square, miss)
         if correction == 0:
             wish = _wish(joint_map, strategy, q, previous)
             free = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
-            size = float(np.abs(free).max())
-            largest = _UNFOLDING_STEP if step_s is None else _LARGEST_STEP
-            factor = largest / max(size, 1e-9)
-            previous = free * (factor if step_s is None else min(step_s, factor))
+            size = max(float(np.abs(free).max()), 1e-9)
+            # No joint moves by more than 0.2 rad or m; unfolding, one does by 0.06.
+            factor = 0.06 / size if step_s is None else min(step_s, 0.2 / size)
+            previous = free * factor
             step = step + previous
         q = q + step
     return None
@@ -192,25 +139,24 @@ def _wish(
     joint_map: ClosedFormMap, strategy: Strategy, q: np.ndarray, previous: np.ndarray
 ) -> np.ndarray:
     """Joint motion per unit s that the null space may realise, (n,)."""
-    limits = joint_map.robot.limits
-    wish = np.zeros_like(q)
+    lower = joint_map.robot.limits.position_lower
+    upper = joint_map.robot.limits.position_upper
+    stroke = upper - lower
+    # A tenth of the range, or of a radian or metre of an open one, is kept clear at each end.
+    clear = 0.1 * np.where(np.isfinite(stroke), stroke, 1.0)
+    wish = 20.0 * np.maximum(lower + clear - q, 0.0)
+    wish -= 20.0 * np.maximum(q - upper + clear, 0.0)
     margins = joint_map.branch_margins(q[None])[0]
     if np.any(margins < strategy.threshold):
         gradients = joint_map.branch_margin_gradient(q[None])[0]
         shortfall = np.clip(strategy.threshold - margins, 0.0, 2.0 * strategy.threshold)
         wish += strategy.push * shortfall @ gradients
-    # A tenth of the range, or of a radian or metre where it is open, is kept clear at each end.
-    stroke = limits.position_upper - limits.position_lower
-    clear = 0.1 * np.where(np.isfinite(stroke), stroke, 1.0)
-    wish += _RANGE_PUSH * np.maximum(limits.position_lower + clear - q, 0.0)
-    wish -= _RANGE_PUSH * np.maximum(q - limits.position_upper + clear, 0.0)
     if strategy.centre:
         ranged = np.isfinite(stroke)
-        middle = limits.position_lower[ranged] + 0.5 * stroke[ranged]
+        middle = lower[ranged] + 0.5 * stroke[ranged]
         wish[ranged] += strategy.centre * (middle - q[ranged])
     if strategy.drift:
-        direction = (
-            previous if previous.any() else np.eye(len(q))[joint_map.redundant[0]]
-        )
+        first = np.eye(len(q))[joint_map.redundant[0]]
+        direction = previous if previous.any() else first
         wish += strategy.drift * direction / np.linalg.norm(direction)
     return wish

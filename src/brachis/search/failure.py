@@ -1,4 +1,4 @@
-"""Why there is no plan: the `Failure` that every explanation makes, and explanations of paths that cannot be followed.
+"""Why a plan failed: the `Failure` that every explanation makes, and explanations of paths that cannot be followed.
 
 What a decomposition reaches of a path is found by random postures at stations along it: is a station out of reach,
 beyond the joint ranges, on another branch, or too heavy to hold?
@@ -7,7 +7,7 @@ beyond the joint ranges, on another branch, or too heavy to hold?
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,23 +15,22 @@ import numpy as np
 from brachis import ik
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import BrachisError, PathError, PlanningError, Remedy
-from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, Moments
 from brachis.optimise.candidate import Candidate
 from brachis.problem.feasibility import in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
 from brachis.robot.joints import in_turn_of
+from brachis.search.closed_form_lattice import solve_all
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd, sampling_box
 from brachis.task import SolverSettings, Task
 
-_STATIONS = 101
 _NO_TIME = "There was no time to find out why: raise search.time_limit"
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Why there is no plan.
+    """Why a plan failed.
 
     Attributes
     ----------
@@ -45,7 +44,7 @@ class Failure:
         Key of the task, or name of the limit; what was found there, and what would be accepted.
     hint : str
         What to try.
-    remedies : tuple of Remedy
+    remedies : sequence of Remedy
         Numbers of the task to change.
     share : float
         How much of what is asked for is possible, where that is known.
@@ -58,7 +57,7 @@ class Failure:
     found: str | None = None
     needed: str | None = None
     hint: str = ""
-    remedies: tuple[Remedy, ...] = ()
+    remedies: Sequence[Remedy] = ()
     share: float = 1.0
 
     def error(self) -> BrachisError:
@@ -96,62 +95,63 @@ def explain_reach(
     problem = decomposition.problem
     given = "end" if problem.start is None else "start"
     posture = problem.end if problem.start is None else problem.start
-    joint_map = decomposition.joint_map(
-        np.zeros(problem.robot.n) if posture is None else posture,
-        decomposition.branches[0],
-    )
-    s = np.linspace(0.0, 1.0, _STATIONS)
-    found = _sample_postures(joint_map, s, deadline)
+    near = np.zeros(problem.robot.n) if posture is None else posture
+    branch = decomposition.branches[0]
+    s = np.linspace(0.0, 1.0, 101)
+    found = _sample_postures(decomposition, s, near, deadline)
     if found is None:
         return _NO_TIME
     anywhere = found
     if not _has_any(_exist(found)).all():
         # Wider ranges tell whether the ranges of the redundant joints or the arm are to blame.
-        wider = _sample_postures(joint_map, s, deadline, opened=True)
+        wider = _sample_postures(decomposition, s, near, deadline, opened=True)
         if wider is None:
             return _NO_TIME
         anywhere = np.concatenate([found, wider], axis=1)
-    own = found if posture is None else found[:, :, joint_map.branch][:, :, None]
+    own = found if posture is None else found[:, :, [branch]]
 
-    def list_reasons() -> Iterator[tuple[np.ndarray, str, str, list[Remedy]]]:
-        yield (
+    def fail(
+        possible: np.ndarray, cause: str, hint: str, remedies: Sequence[Remedy] = ()
+    ) -> Failure | None:
+        if possible.all():
+            return None
+        first, last = (float(end) for end in s[np.flatnonzero(~possible)[[0, -1]]])
+        return Failure(
+            cause.format(first=first),
+            phase="path",
+            s_interval=(first, last),
+            hint=hint,
+            remedies=remedies,
+        )
+
+    robot = problem.robot
+    label = decomposition.match.solver.branches[branch]
+    within = _has_any(_are_within(robot, found))
+    failure = (
+        fail(
             _has_any(_exist(anywhere)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
             "Shorten or move the path, or choose another start posture",
-            [],
         )
-        within = _has_any(_are_within(problem.robot, found))
-        yield (
+        or fail(
             within,
             "no posture within the joint ranges was found from s = {first:.3g} on"
-            + _describe_nearest(problem.robot, anywhere[np.argmin(within)]),
+            + _describe_nearest(robot, anywhere[np.argmin(within)]),
             "Shorten or move the path, or widen the joint ranges",
-            [],
         )
-        yield (
-            _has_any(_are_within(problem.robot, own)),
-            f"the branch {joint_map.branch_label!r} of the {given} posture does not reach s = {{first:.3g}}",
+        or fail(
+            _has_any(_are_within(robot, own)),
+            f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
             f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
-            [],
         )
-        for limit in problem.limits:
-            if limit.at_rest == "posture":
-                allowed, nearest, remedies = _check_at_rest(problem.robot, limit, own)
-                cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
-                yield allowed, cause, "Lead the path elsewhere", remedies
-
-    for possible, cause, hint, remedies in list_reasons():
-        if not possible.all():
-            first, last = s[np.flatnonzero(~possible)[[0, -1]]]
-            return Failure(
-                cause.format(first=first),
-                phase="path",
-                s_interval=(float(first), float(last)),
-                hint=hint,
-                remedies=tuple(remedies),
-            )
-    others = "other redundant joints, " if joint_map.r else ""
-    return (
+    )
+    for limit in problem.limits:
+        if failure is None and limit.at_rest == "posture":
+            allowed, nearest, remedies = _check_at_rest(robot, limit, own)
+            cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
+            failure = fail(allowed, cause, "Lead the path elsewhere", remedies)
+    others = "other redundant joints, " if decomposition.redundant else ""
+    return failure or (
         "Every point of the path is within reach of this branch, but no joint path through them was found; "
         f"try {others}another {given} posture"
     )
@@ -179,36 +179,37 @@ def _has_any(those: np.ndarray) -> np.ndarray:
 
 
 def _sample_postures(
-    joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool = False
+    decomposition: Decomposition,
+    s: np.ndarray,
+    given: np.ndarray,
+    deadline: Deadline,
+    *,
+    opened: bool = False,
 ) -> np.ndarray | None:
     """Draw T random redundant joints: postures (S, T, B, A, n) that reach stations s, (S,), on all branches.
 
-    Angles are turned into their ranges, and what does not exist is NaN; None where the time is up. `opened` ignores the
-    ranges of the redundant joints; otherwise the start posture's are tried as well.
+    Angles are turned into their ranges, and what does not exist is NaN; None if the time is up. `opened` ignores the
+    ranges of the redundant joints; otherwise those of the given posture are tried as well.
     """
-    robot = joint_map.robot
-    redundant = joint_map.redundant
-    low, high = sampling_box(robot, joint_map.start, opened=redundant if opened else [])
+    robot = decomposition.problem.robot
+    redundant = list(decomposition.redundant)
+    low, high = sampling_box(robot, given, opened=redundant if opened else [])
     tries = 400 * len(redundant) ** 2 if redundant else 1
     q_r = np.random.default_rng(0).uniform(
         low[redundant], high[redundant], (tries, len(redundant))
     )
     if not opened:
-        q_r[0] = np.clip(joint_map.start, low, high)[redundant]
-    targets = joint_map.path.sample(s).target
+        q_r[0] = np.clip(given, low, high)[redundant]
+    targets = decomposition.problem.path.sample(s).target
     parts = []
     # No more than 20,000 postures at once, so that the deadline is noticed.
     for those in np.array_split(targets, min(len(s), -(-len(s) * tries // 20_000))):
         if deadline.passed:
             return None
-        answers = joint_map.solver.solve(
-            np.repeat(those, tries, axis=0), np.tile(q_r, (len(those), 1))
-        )
-        answers = answers.reshape(len(those), tries, *answers.shape[1:])
-        postures = np.empty((*answers.shape[:-1], robot.n))
-        postures[..., redundant] = q_r[:, None, None]
-        postures[..., joint_map.nonredundant] = answers
-        parts.append(in_turn_of(postures, 0.5 * (low + high), robot.revolute))
+        several = np.repeat(those, tries, axis=0)
+        q = solve_all(decomposition, several, np.tile(q_r, (len(those), 1)))
+        q = q.reshape(len(those), tries, *q.shape[1:])
+        parts.append(in_turn_of(q, 0.5 * (low + high), robot.revolute))
     return np.concatenate(parts)
 
 
@@ -344,11 +345,11 @@ def explain_no_motion(
     return Failure(
         f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
         hint=reason + more,
-        remedies=tuple(
+        remedies=[
             Remedy(key, speed, 0.7 * speed, problem.task.speed_unit)
             for key, speed in speeds.items()
             if speed
-        ),
+        ],
     )
 
 

@@ -28,7 +28,13 @@ from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.feasibility import in_figures, load_remedies
 from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
-from brachis.search.phase_plane import fastest, postures_along, spread_stations
+from brachis.search.phase_plane import (
+    PhasePlane,
+    interpolate,
+    least_speeds,
+    postures_along,
+    spread_stations,
+)
 
 UNLIKELY = 0.8
 """Share of a speed below which no other joint path, and no more knots, make up for what a plan falls short by."""
@@ -134,7 +140,7 @@ def explain_holding(
         found=f"{taken} {label.unit} to hold the arm, {mean} {label.unit} on average (root mean square)",
         needed=f"{figure:.4g} {label.unit}",
         hint="Lead the path through postures that take less, or mount the robot otherwise",
-        remedies=tuple(remedies),
+        remedies=remedies,
     )
 
 
@@ -174,7 +180,7 @@ def explain_speed(
     starts = [
         each.start for each in candidates if each.start is not None and each.solver
     ]
-    if not starts or not _least_speeds(starts[0].problem):
+    if not starts or not least_speeds(starts[0].problem.limits):
         return None
     start = min(starts, key=lambda start: start.estimate)
     problem = dataclasses.replace(start.problem, limits=tuple(_others(start.problem)))
@@ -188,13 +194,8 @@ def explain_speed(
         moments = phase.joint_map.state(*motion.at(t), t=t)
     except UnreachableError:
         return None
-    q = np.column_stack([np.interp(_S, moments.s, joint) for joint in moments.q.T])
+    q = interpolate(_S, moments.s, moments.q)
     return _explain_shortfall(start, moments, "in the fastest motion without it", q)
-
-
-def _least_speeds(problem: Problem) -> list[Limit]:
-    """Limits that ask for a least speed."""
-    return [limit for limit in problem.limits if limit.longer_time == "violates"]
 
 
 def _others(problem: Problem) -> list[Limit]:
@@ -206,37 +207,33 @@ def _explain_in_phase_plane(start: InitialGuess) -> Failure | None:
     """Tell which speed no motion along the guess's joint path has; None if all are possible, or none is asked for."""
     problem = start.problem
     rates = problem.end_rates
-    is_asked = any(rates) or bool(_least_speeds(problem))
+    is_asked = any(rates) or bool(least_speeds(problem.limits))
     q = postures_along(start, _S) if is_asked else None
     if q is None or problem.task.boundary.periodic:
         return None
     stations = spread_stations(problem.limits)
-    if fastest(problem.limits, _S, q, rates, stations) is not None:
+    if PhasePlane(problem.limits, _S, q, stations).fastest(rates) is not None:
         return None
-    rate = fastest(_others(problem), _S, q, rates, stations)
+    others = PhasePlane(_others(problem), _S, q, stations)
+    rate = others.fastest(rates)
     if rate is None:
-        return _explain_end_speed(problem, q, stations)
+        return _explain_end_speed(problem, others)
     q_ds = np.gradient(q, _S, axis=0, edge_order=2)
-    places, slopes = (
-        np.column_stack([np.interp(stations, _S, joint) for joint in part.T])
-        for part in (q, q_ds)
-    )
+    places = interpolate(stations, _S, q)
+    qdot = interpolate(stations, _S, q_ds) * rate[:, None]
     still = np.zeros_like(places)
-    moments = Moments(places, slopes * rate[:, None], still, still, stations)
+    moments = Moments(places, qdot, still, still, stations)
     best = "along the best joint path that was found"
     return _explain_shortfall(
         start, moments, best if start.joint_map.r else "in the fastest motion", q
     )
 
 
-def _explain_end_speed(
-    problem: Problem, q: np.ndarray, stations: np.ndarray
-) -> Failure | None:
+def _explain_end_speed(problem: Problem, plane: PhasePlane) -> Failure | None:
     """Tell at which end the path cannot be passed as fast as asked for; the other is at rest, or slower likewise."""
 
     def is_possible(rates: np.ndarray) -> bool:
-        ends = (float(rates[0]), float(rates[1]))
-        return fastest(_others(problem), _S, q, ends, stations) is not None
+        return plane.fastest((float(rates[0]), float(rates[1]))) is not None
 
     if not is_possible(np.zeros(2)):
         return None
@@ -266,11 +263,11 @@ def _explain_end_speed(
         where=f"boundary.{key}",
         found=f"{speeds[key]:g} {unit}, where one joint path was estimated to allow about {most}",
         hint="Raise the limits that hold the motion back",
-        remedies=tuple(
+        remedies=[
             Remedy(f"boundary.{key}", speed, _FIRST * shares[key] * speed, unit)
             for key, speed in speeds.items()
             if shares[key] < _EXACT
-        ),
+        ],
         share=share,
     )
 
@@ -284,7 +281,7 @@ def _explain_shortfall(
     """
     problem = start.problem
     worst = 0.0
-    for each in _least_speeds(problem):
+    for each in least_speeds(problem.limits):
         parts = _parts_of(each, motion.s)
         everything = each.values(motion)
         shortfall = np.where(
@@ -329,7 +326,7 @@ def _explain_shortfall(
         found=f"{found} to {most} {label.unit} on that part, the least at s = {motion.s[place]:.2g}, {how}",
         needed=f"{allowed} {label.unit}",
         hint="Raise the limits that hold the motion back",
-        remedies=tuple(remedies),
+        remedies=remedies,
         share=1.0 - worst,
     )
 

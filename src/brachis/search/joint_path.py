@@ -54,14 +54,14 @@ class DeadEnd:
     ----------
     s : float
         Path coordinate of the first station that no node reaches.
-    causes : dict of str to int
-        Why, and how many edges say so; the cause of those that came nearest to being possible first.
+    cause : str
+        Why: of all edges that are impossible, the cause of those that came nearest to being possible.
     backwards : bool
         Whether the lattice begins at the given end posture.
     """
 
     s: float
-    causes: dict[str, int]
+    cause: str
     backwards: bool = False
 
     @property
@@ -70,16 +70,16 @@ class DeadEnd:
         return (0.0, self.s) if self.backwards else (self.s, 1.0)
 
     def __str__(self) -> str:
-        """Return the place and its first cause, in words."""
+        """Return the place and the cause, in words."""
         place = (
             f"back from the end posture, at s = {self.s:.3g}"
             if self.backwards
             else f"from s = {self.s:.3g} on"
         )
-        return f"{place} {next(iter(self.causes))}"
+        return f"{place} {self.cause}"
 
 
-def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
+def distinct(joint_paths: Sequence[JointPath], most: int) -> list[int]:
     """Choose up to `most` joint paths: the shortest one, and others far from those chosen.
 
     The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
@@ -93,7 +93,8 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
 
     Returns
     -------
-    list of JointPath
+    list of int
+        Their indices.
     """
     branches = np.array([joint_path.branch for joint_path in joint_paths])
     q = np.array([joint_path.q for joint_path in joint_paths])
@@ -113,7 +114,7 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
         largest = distance[np.isfinite(distance)].max(initial=0.0)
         if distance[best] <= 0.02 * largest:
             break
-    return [joint_paths[one] for one in chosen]
+    return chosen
 
 
 def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.ndarray:
@@ -148,32 +149,7 @@ def sampling_box(
     return low, high
 
 
-def causes_of(
-    robot: Robot,
-    anywhere: np.ndarray,
-    found: np.ndarray,
-    inside: np.ndarray,
-    near: np.ndarray,
-) -> dict[str, int]:
-    """Count why edges, (E,), are impossible, those first that came nearest to being possible.
-
-    `anywhere` tells whether there is an answer in any branch, `found` in the edge's own; `inside`, (E, n), which joints
-    stay within their ranges.
-    """
-    counts = {
-        OTHER_BRANCH: anywhere & ~found,
-        JUMPS: found & ~near,
-        NO_ANSWER: ~anywhere,
-    }
-    others = {cause: int(those.sum()) for cause, those in counts.items() if those.any()}
-    return beyond_ranges(robot, inside[found & near]) | others
-
-
-def beyond_ranges(robot: Robot, inside: np.ndarray) -> dict[str, int]:
-    """Name the joint that most often leaves its range in K postures, and count these; `inside` is (K, n) bool."""
-    outside = int((~inside.all(axis=1)).sum())
-    if not outside:
-        return {}
-    return {
-        f"the range of joint {robot.joint_names[int(np.argmin(inside.sum(axis=0)))]!r} ends": outside
-    }
+def leaving_range(robot: Robot, inside: np.ndarray) -> str:
+    """Name the joint that most often leaves its range in K postures; `inside` is (K, n) bool."""
+    joint = robot.joint_names[int(np.argmin(inside.sum(axis=0)))]
+    return f"the range of joint {joint!r} ends"

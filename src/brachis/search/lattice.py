@@ -4,12 +4,12 @@ The path is cut into stations. Layer by layer from the given start, the nodes of
 (postures that meet the target at its station) are joined to postures at the next station
 that are within the joint ranges, near, and allowed at rest (the torque limits hold the
 arm against gravity). Of all edges into a node the one with the least total length stays.
-Where the end posture is given and the start is not, the layers run backwards from the
+If the end posture is given and the start is not, the layers run backwards from the
 end. `ClosedFormLattice` takes its nodes from the closed form of one choice of redundant
 joints, `PostureLattice` from Newton's method.
 
 Turns of angles by 2 pi follow the joint path. From a given posture, nodes in different
-turns are different nodes. Where neither end is given, all turns of a joint path are
+turns are different nodes. If neither end is given, all turns of a joint path are
 equivalent: a node keeps how far its joints have gone, and is within the ranges as long as
 some multiple of 2 pi brings the whole joint path there. The length of an edge,
 
@@ -23,27 +23,33 @@ straight one is 2 sqrt(length).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import TypedDict, Unpack
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.limits import HasLatticeWeights, Limit, Moments
+from brachis.limits import HasLatticeWeights, Moments
 from brachis.path import Path
 from brachis.problem.problem import Problem
-from brachis.robot import Robot, TaskMap
+from brachis.robot import TaskMap
 from brachis.robot.joints import TURN
 from brachis.search.joint_path import (
     JUMPS,
     NO_ANSWER,
+    OTHER_BRANCH,
     DeadEnd,
     JointPath,
-    beyond_ranges,
-    causes_of,
     distinct,
+    leaving_range,
     weights_near,
 )
+
+LARGEST_STEP = 0.8
+"""Largest step of a joint between stations, rad or m."""
+_SLACK = 1e-9
+"""Rounding of joint positions, rad or m, and of ratios to limits."""
 
 
 @dataclass(frozen=True)
@@ -80,18 +86,6 @@ class Layer:
         """Make nodes, (K, n), with which joint paths begin, and their branches, (K,)."""
         return cls(branch, q, q, q, np.zeros(len(q)), np.zeros(len(q), dtype=int))
 
-    def thin(
-        self, most: int, cost: np.ndarray, robot: Robot, limits: Sequence[Limit]
-    ) -> Layer:
-        """Keep `most` nodes: half of least `cost`, (K,), the others far from each other."""
-        if len(self.branch) <= most:
-            return self
-        order = np.argsort(cost, kind="stable")
-        half = most // 2
-        scaled = self.q[order] * weights_near(robot, limits, self.q[order[0]])
-        far = half + np.unique(farthest(scaled[half:], scaled[:half], most - half))
-        return self[np.sort(np.concatenate([order[:half], order[far]]))]
-
 
 def farthest(points: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
     """Choose points, (K, n), each the farthest from all that are kept, (H, n)."""
@@ -119,20 +113,20 @@ class Edges:
     parent : (E,) int ndarray
         Node in the layer before.
     step : (E, n) ndarray
-        From the node to the posture, NaN where there is none.
+        From the node to the posture, NaN for one that does not exist.
     key : (E, k) int ndarray
         Equal for edges to the same node.
-    elsewhere : (E,) bool ndarray
-        Whether there is a posture on any branch.
-    allowed : (E,) bool ndarray
-        Whether the step is one that a motion may make.
+    elsewhere : (E,) bool ndarray, optional
+        Whether there is a posture on any branch; by default there is.
+    allowed : (E,) bool ndarray, optional
+        Whether the step is one that a motion may make; by default it is.
     """
 
     parent: np.ndarray
     step: np.ndarray
     key: np.ndarray
-    elsewhere: np.ndarray
-    allowed: np.ndarray
+    elsewhere: np.ndarray | bool = True
+    allowed: np.ndarray | bool = True
 
 
 def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
@@ -161,9 +155,13 @@ def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
     return np.linspace(0.0, 1.0, int(min(np.ceil(density * steps), 600)) + 1)
 
 
-LARGEST_STEP = 0.8
-"""Largest step of a joint between stations, rad or m."""
-_SLACK = 1e-9
+class Options(TypedDict, total=False):
+    """Options of a lattice, as of `Lattice`."""
+
+    cells_per_turn: int
+    density: float
+    nodes: int
+    deadline: Deadline
 
 
 class Lattice(ABC):
@@ -173,44 +171,35 @@ class Lattice(ABC):
     ----------
     problem : Problem
     turning : (n,) bool ndarray
-        Joints whose turn is open where neither end is given.
+        Joints whose turn is open if neither end is given.
+    cells_per_turn : int, optional
+        Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
     density : float, optional
         Factor on the number of stations.
     nodes : int, optional
-        Nodes that a layer keeps where there are several redundant joints.
-    seed : int, optional
-        Of what is drawn at random with several redundant joints.
+        Nodes that a layer keeps with several redundant joints.
     deadline : Deadline, optional
         No layer is begun after it.
     """
 
     def __init__(
-        self,
-        problem: Problem,
-        turning: np.ndarray,
-        *,
-        density: float = 1.0,
-        nodes: int = 120,
-        seed: int = 0,
-        deadline: Deadline = NEVER,
+        self, problem: Problem, turning: np.ndarray, **options: Unpack[Options]
     ) -> None:
         self.problem = problem
-        self.s = stations(problem.path, problem.task_map, density)
+        self.s = stations(problem.path, problem.task_map, options.get("density", 1.0))
         self._robot = problem.robot
-        self._nodes = nodes
-        self._seed = seed
-        self._deadline = deadline
+        self._cells_per_turn = options.get("cells_per_turn", 72)
+        self._nodes = options.get("nodes", 120)
+        self._deadline = options.get("deadline", NEVER)
         self._backwards = problem.start is None and problem.end is not None
         self._origin = problem.end if self._backwards else problem.start
         self._targets = problem.path.sample(self.s).target
-        # The turns of a free start stay open until the joint path is known.
-        self._static = [limit for limit in problem.limits if limit.at_rest == "posture"]
         limits = problem.robot.limits
         self._lower = limits.position_lower - _SLACK
         self._upper = limits.position_upper + _SLACK
+        # With a free start all turns are equivalent, and stay open until the joint path is known; a joint without a
+        # range needs no turn, unless a given end has to be met.
         self._open_turns = turning & (self._origin is None)
-        # With a free start all turns are equivalent; a joint without a range needs no
-        # turn, unless a given end has to be met.
         self._to_end = problem.end is not None and not self._backwards
         ranged = np.isfinite(self._lower) | np.isfinite(self._upper) | self._to_end
         self._counts_turns = turning & ranged & ~self._open_turns
@@ -222,7 +211,7 @@ class Lattice(ABC):
 
     @abstractmethod
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Make nodes at a free start, joint ranges left out of account."""
+        """Make nodes at a free start, whatever the joint ranges are."""
 
     @abstractmethod
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
@@ -251,12 +240,12 @@ class Lattice(ABC):
         Returns
         -------
         list of JointPath or DeadEnd
-            Distinct ones, the shortest first; none where the time was up; where the lattice ends, if there is none.
+            Distinct ones, the shortest first, or where the lattice ends; an empty list if the time was up.
         """
-        rng = np.random.default_rng(self._seed)
+        rng = np.random.default_rng(self.problem.task.search.seed)
         layers: list[Layer] = []
-        stations = range(len(self.s))
-        for station in reversed(stations) if self._backwards else stations:
+        numbers = range(len(self.s))
+        for station in numbers[:: -1 if self._backwards else 1]:
             if self._deadline.passed:
                 return []
             layer = (
@@ -267,41 +256,48 @@ class Lattice(ABC):
             if not isinstance(layer, Layer):
                 return DeadEnd(float(self.s[station]), layer, backwards=self._backwards)
             layers.append(layer)
-        ends = self._ends(layers[-1])
+        length = layers[-1].length
+        ends = np.argsort(length, kind="stable")
+        if self._to_end:
+            ends = ends[self._at_end(layers[-1])[ends]]
+        ends = ends[length[ends] <= 4.0 * length[ends[:1]] + _SLACK]
         if not len(ends):
-            return DeadEnd(1.0, {JUMPS: 1})
-        q = self._trace(layers, ends)
+            return DeadEnd(1.0, JUMPS)
         last = layers[-1][ends]
+        traced = []
+        for layer in reversed(layers):
+            traced.append(layer.q[ends])
+            ends = layer.parent[ends]
+        in_order = np.array(traced if self._backwards else traced[::-1])
+        q = in_order.swapaxes(0, 1) + TURN * self._turn_of(last)[:, None]
         found = [
-            JointPath(self.problem, self.s, joint_path, float(length), int(branch))
-            for joint_path, length, branch in zip(
-                q, last.length, last.branch, strict=True
-            )
+            JointPath(self.problem, self.s, own, float(last.length[i]), int(branch))
+            for i, (own, branch) in enumerate(zip(q, last.branch, strict=True))
         ]
         return self._choose(found, last, most)
 
-    def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
-        """Make the nodes with which joint paths begin, or count why there are none."""
+    def _first_layer(self, rng: np.random.Generator) -> Layer | str:
+        """Make the nodes with which joint paths begin, or tell what refuses them."""
         if self._origin is not None:
             branch = np.array([self._given_branch])
             return Layer.start(self._origin[None].astype(float), branch)
         layer = self._start_nodes(rng)
         if not len(layer.q):
-            return {NO_ANSWER: 1}
+            return NO_ANSWER
         inside = self._inside(layer.q, layer.q)
         within = np.flatnonzero(inside.all(axis=1))
         if not len(within):
-            return beyond_ranges(self._robot, inside)
+            return leaving_range(self._robot, inside)
         return self._keep(layer[within], self._choose_starts)
 
     def _next(
         self, before: Layer, station: int, rng: np.random.Generator
-    ) -> Layer | dict[str, int]:
-        """Join the nodes of a layer to the next station, or count why none can be."""
+    ) -> Layer | str:
+        """Join the nodes of a layer to the next station, or tell why none can be."""
         edges = self._edges(before, station, rng)
         parent = edges.parent
         if not len(parent):
-            return {NO_ANSWER: len(before.q)}
+            return NO_ANSWER
         q = before.q[parent] + edges.step
         low = np.minimum(before.low[parent], q)
         high = np.maximum(before.high[parent], q)
@@ -311,21 +307,43 @@ class Lattice(ABC):
             near = edges.allowed & np.all(np.abs(edges.step) <= LARGEST_STEP, axis=1)
         good = exists & inside.all(axis=1) & near
         if not good.any():
-            return causes_of(self._robot, edges.elsewhere, exists, inside, near)
+            # The cause of those that came nearest to being possible.
+            if (exists & near).any():
+                return leaving_range(self._robot, inside[exists & near])
+            if (edges.elsewhere & ~exists).any():
+                return OTHER_BRANCH
+            return JUMPS if exists.any() else NO_ANSWER
         parent = parent[good]
-        length = before.length[parent] + self._lengths(
-            before.q, edges.step[good], parent
-        )
+        steps = self._lengths(before.q, edges.step[good], parent)
+        length = before.length[parent] + steps
         branch = before.branch[parent]
         layer = Layer(branch, q[good], low[good], high[good], length, parent)
         return self._keep(layer[shortest(length, edges.key[good])], self._thin)
 
-    def _keep(
-        self, layer: Layer, choose: Callable[[Layer], Layer]
-    ) -> Layer | dict[str, int]:
-        """Choose among the nodes that can be held against gravity."""
-        held, refused = self._check_held(layer.q)
-        return choose(layer[held]) if held.any() else refused
+    def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
+        """Choose among the nodes that can be held against gravity, or tell what refuses them."""
+        still = Moments.at_rest(layer.q)
+        held = np.ones(len(layer.q), dtype=bool)
+        cause = ""
+        for limit in self.problem.limits:
+            if limit.at_rest == "posture":
+                allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)
+                held &= allowed
+                if not (cause or allowed.all()):
+                    cause = f"the {limit.name} limit {limit.refusal}"
+        return choose(layer[held]) if held.any() else cause
+
+    def _choose_some(self, layer: Layer, most: int, cost: np.ndarray) -> np.ndarray:
+        """Choose `most` nodes: half of least `cost`, (K,), the others far from each other."""
+        if len(cost) <= most:
+            return np.arange(len(cost))
+        order = np.argsort(cost, kind="stable")
+        half = most // 2
+        nearest = layer.q[order[0]]
+        weights = weights_near(self._robot, self.problem.limits, nearest)
+        scaled = layer.q[order] * weights
+        far = half + np.unique(farthest(scaled[half:], scaled[:half], most - half))
+        return np.sort(np.concatenate([order[:half], order[far]]))
 
     def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Return the steps, (E, n), from postures to others, modulo 2 pi."""
@@ -336,24 +354,7 @@ class Lattice(ABC):
         self, found: list[JointPath], _ends: Layer, most: int
     ) -> list[JointPath]:
         """Choose up to `most` of the joint paths found, which end at these nodes: some that differ."""
-        return distinct(found, most)
-
-    def _ends(self, last: Layer) -> np.ndarray:
-        """Nodes at which joint paths may end, (E,), the nearest first."""
-        order = np.argsort(last.length, kind="stable")
-        if self._to_end:
-            order = order[self._at_end(last)[order]]
-        return order[last.length[order] <= 4.0 * last.length[order[:1]] + _SLACK]
-
-    def _trace(self, layers: list[Layer], ends: np.ndarray) -> np.ndarray:
-        """Trace joint paths back from their ends, (E,): postures (E, S + 1, n), in their turns."""
-        nodes = ends
-        q = []
-        for layer in reversed(layers):
-            q.append(layer.q[nodes])
-            nodes = layer.parent[nodes]
-        joint_paths = np.array(q if self._backwards else q[::-1]).swapaxes(0, 1)
-        return np.asarray(joint_paths + TURN * self._turn_of(layers[-1][ends])[:, None])
+        return [found[i] for i in distinct(found, most)]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
         """Multiples of 2 pi, (E, n), that bring the joint paths to nodes into the ranges, in the middle if closed."""
@@ -368,48 +369,30 @@ class Lattice(ABC):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest multiples of 2 pi, (E, n), that bring joint paths within low and high into the ranges.
 
-        Joints that are in a turn already have the multiple 0 or, where it is not within the range, none at all: the
+        Joints that are in a turn already have the multiple 0 or, if that is not within the range, none at all: the
         least is then above the largest.
         """
-        first = np.where(
-            self._open_turns, np.ceil((self._lower - low) / TURN), low < self._lower
-        )
-        last = np.where(
-            self._open_turns,
-            np.floor((self._upper - high) / TURN),
-            -1.0 * (high > self._upper),
-        )
+        lowest = np.ceil((self._lower - low) / TURN)
+        highest = np.floor((self._upper - high) / TURN)
+        first = np.where(self._open_turns, lowest, low < self._lower)
+        last = np.where(self._open_turns, highest, -1.0 * (high > self._upper))
         return first, last
 
     def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Which joints of joint paths, (E, n), can be brought into their ranges; see `_turns_within`."""
+        """Which joints of joint paths, (E, n), can be brought into their ranges."""
         first, last = self._turns_within(low, high)
         return np.asarray(first <= last)
 
     def _lengths(
         self, q: np.ndarray, step: np.ndarray, origin: np.ndarray
     ) -> np.ndarray:
-        """Lengths of steps, (E, n), from the postures q[origin]; see the module."""
-        by_acceleration = np.zeros(len(step))
-        by_velocity = np.zeros(len(step))
+        """Lengths of steps, (E, n), from the postures q[origin], as the module defines them."""
+        lengths = np.zeros((2, len(step)))
         for limit in self.problem.limits:
             if not isinstance(limit, HasLatticeWeights):
                 continue
-            for length, rows in zip(
-                (by_acceleration, by_velocity), limit.lattice_weights(q), strict=True
-            ):
+            for length, rows in zip(lengths, limit.lattice_weights(q), strict=True):
                 if rows is not None:
                     parts = np.abs(np.einsum("eij,ej->ei", rows[origin], step))
                     np.maximum(length, parts.max(axis=1), out=length)
-        return by_acceleration + 0.5 * by_velocity  # T = 0.5 s
-
-    def _check_held(self, q: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
-        """Which postures, (K, n), can be held against gravity, (K,) bool, and what refuses how many of the others."""
-        still = Moments.at_rest(q)
-        held = np.ones(len(q), dtype=bool)
-        refused: dict[str, int] = {}
-        for limit in self._static:
-            allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)
-            refused[f"the {limit.name} limit {limit.refusal}"] = int((~allowed).sum())
-            held &= allowed
-        return held, {cause: count for cause, count in refused.items() if count}
+        return np.asarray(lengths[0] + 0.5 * lengths[1])  # T = 0.5 s

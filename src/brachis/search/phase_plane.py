@@ -22,7 +22,6 @@ may need no force at all, so that no limit's change with the end time tells a so
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -45,166 +44,143 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
 
     Parameters
     ----------
-    limits : sequence of Limit
-    s : (S,) ndarray
-        Path coordinates, ascending.
-    q : (S, n) ndarray
-        Postures there, rad or m, continuous.
+    limits, s, q
+        As of `PhasePlane`.
 
     Returns
     -------
     float
         s; infinite for a joint path that cannot be followed at any speed.
     """
-    times = least_times(limits, s, q)
+    times = PhasePlane(limits, s, q).times()
     return np.inf if times is None else float(times[-1])
 
 
-def least_times(
-    limits: Sequence[Limit],
-    s: np.ndarray,
-    q: np.ndarray,
-    rates: tuple[float, float] = (0.0, 0.0),
-    stations: np.ndarray | None = None,
-) -> np.ndarray | None:
-    """Estimate when stations are passed, (P,), s; None if they cannot be.
+class PhasePlane:
+    """Limits along a joint path: slope x + lower <= u <= slope x + upper, and floor <= x <= ceiling.
 
     Parameters
     ----------
-    limits, s, q
-        As for `least_time`.
-    rates : tuple of float, optional
-        ds/dt at both ends, 1/s.
+    limits : sequence of Limit
+    s : (S,) ndarray
+        Path coordinates, ascending.
+    q : (S, n) ndarray
+        Postures there, rad or m, continuous.
     stations : (P,) ndarray, optional
         Path coordinates, ascending from s[0] to s[-1]; s by default. Derivatives of the joint path are interpolated.
     """
-    stations = s if stations is None else stations
-    rate = fastest(limits, s, q, rates, stations)
-    if rate is None:
-        return None
-    durations = 2.0 * np.diff(stations) / (rate[1:] + rate[:-1])
-    return np.append(0.0, np.cumsum(durations))
+
+    def __init__(
+        self,
+        limits: Sequence[Limit],
+        s: np.ndarray,
+        q: np.ndarray,
+        stations: np.ndarray | None = None,
+    ) -> None:
+        stations = s if stations is None else stations
+        q_ds = np.gradient(q, s, axis=0, edge_order=2)
+        q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
+        joints = [interpolate(stations, s, part) for part in (q, q_ds, q_dds)]
+        self._steps = np.diff(stations)
+        self._floor = np.zeros(len(stations))
+        self._ceiling = np.full(len(stations), np.inf)
+        sloped = []
+        for limit in limits:
+            if not isinstance(limit, HasPhasePlaneRows):
+                continue
+            line = limit.phase_plane_rows(stations, *joints)
+            if line.u is not None:
+                sloped.append((line.u, line.x, line.constant))
+                continue
+            with np.errstate(divide="ignore", invalid="ignore"):
+                level = (1.0 - line.constant) / line.x
+            highest = np.where(line.x > 0.0, level, np.inf).min(axis=1)
+            lowest = np.where(line.x < 0.0, level, 0.0).max(axis=1)
+            self._ceiling = np.minimum(self._ceiling, highest)
+            self._floor = np.maximum(self._floor, lowest)
+        a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
+        # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
+        a = np.where(np.abs(a) < _TINY, _TINY, a)
+        ends = (1.0 - c) / a, (-1.0 - c) / a
+        self._slope = -b / a
+        self._lower = np.minimum(*ends)
+        self._upper = np.maximum(*ends)
+
+    def times(self, rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray | None:
+        """Estimate when the stations are passed, (P,), s, with ds/dt at both ends, 1/s; None if they cannot be."""
+        rate = self.fastest(rates)
+        if rate is None:
+            return None
+        durations = 2.0 * self._steps / (rate[1:] + rate[:-1])
+        return np.append(0.0, np.cumsum(durations))
+
+    def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
+        """Largest ds/dt at the stations, (P,), 1/s, each as large as any motion along the joint path has it there.
+
+        Parameters
+        ----------
+        rates : tuple of float
+            ds/dt at both ends, 1/s.
+
+        Returns
+        -------
+        (P,) ndarray or None
+            None for a joint path that cannot be followed.
+        """
+        first, last = (rate**2 for rate in rates)
+        intervals = self._go_backwards(last)
+        if intervals is None:
+            return None
+        low, high = intervals
+        if not low[0] <= first <= high[0]:
+            return None
+        x = np.full(len(low), first)
+        for i, step in enumerate(self._steps):
+            upper = self._slope[i] * x[i] + self._upper[i]
+            largest = np.min(upper, initial=np.inf)
+            x[i + 1] = np.clip(x[i] + 2.0 * step * largest, low[i + 1], high[i + 1])
+        if not x.max() > 0.0:
+            return None
+        # Between stations nothing stops; a station where the grid says so is an artefact of its width.
+        x[1:-1] = np.maximum(x[1:-1], 1e-3 * np.median(x))
+        return np.sqrt(x)
+
+    def _go_backwards(self, last: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """Find the intervals of x, (P,), from which the end can be reached with x = `last`; None if one is empty."""
+        lowest = self._floor[-1] * (1.0 - 1e-6)  # of the rounding
+        if not lowest <= last <= self._ceiling[-1] * (1.0 + 1e-6):
+            return None
+        low = np.full(len(self._floor), last)
+        high = low.copy()
+        for i in range(len(low) - 2, -1, -1):
+            # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
+            half = 0.5 / self._steps[i]
+            slope = np.append(self._slope[i], -half)
+            upper = np.append(self._upper[i], half * high[i + 1])
+            lower = np.append(self._lower[i], half * low[i + 1])
+            tilt = (slope[:, None] - slope[None]).ravel()
+            clearance = (upper[:, None] - lower[None]).ravel()
+            if np.any((clearance < 0.0) & (np.abs(tilt) < _TINY)):
+                return None
+            falling = tilt < -_TINY
+            rising = tilt > _TINY
+            highest = np.min(clearance[falling] / -tilt[falling], initial=np.inf)
+            lowest = np.max(-clearance[rising] / tilt[rising], initial=0.0)
+            high[i] = min(self._ceiling[i], highest)
+            low[i] = max(self._floor[i], lowest)
+            if low[i] > high[i]:
+                return None
+        return low, high
 
 
-def fastest(
-    limits: Sequence[Limit],
-    s: np.ndarray,
-    q: np.ndarray,
-    rates: tuple[float, float],
-    stations: np.ndarray,
-) -> np.ndarray | None:
-    """Largest ds/dt at the stations, (P,), 1/s, each as large as any motion along the joint path has it there.
-
-    Parameters
-    ----------
-    limits, s, q, rates, stations
-        As for `least_times`.
-
-    Returns
-    -------
-    (P,) ndarray or None
-        None for a joint path that cannot be followed.
-    """
-    lines = _collect_lines(limits, s, q, stations)
-    steps = np.diff(stations)
-    first, last = (rate**2 for rate in rates)
-    intervals = _go_backwards(lines, steps, last)
-    if intervals is None:
-        return None
-    low, high = intervals
-    if not low[0] <= first <= high[0]:
-        return None
-    x = np.full(len(low), first)
-    for i, step in enumerate(steps):
-        largest = np.min(lines.slope[i] * x[i] + lines.upper[i], initial=np.inf)
-        x[i + 1] = np.clip(x[i] + 2.0 * step * largest, low[i + 1], high[i + 1])
-    if not x.max() > 0.0:
-        return None
-    # Between stations nothing stops; a station where the grid says so is an artefact of its width.
-    x[1:-1] = np.maximum(x[1:-1], 1e-3 * np.median(x))
-    return np.sqrt(x)
-
-
-@dataclass(frozen=True)
-class _Lines:
-    """Limits along a joint path: slope x + lower <= u <= slope x + upper, and floor <= x <= ceiling.
-
-    Attributes
-    ----------
-    slope, lower, upper : (S, c) ndarray
-    floor, ceiling : (S,) ndarray
-    """
-
-    slope: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    floor: np.ndarray
-    ceiling: np.ndarray
-
-
-def _collect_lines(
-    limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, stations: np.ndarray
-) -> _Lines:
-    """Collect the lines of all limits at stations of a joint path."""
-    q_ds = np.gradient(q, s, axis=0, edge_order=2)
-    q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
-    joints = [_interpolate(stations, s, part) for part in (q, q_ds, q_dds)]
-    floor = np.zeros(len(stations))
-    ceiling = np.full(len(stations), np.inf)
-    sloped = []
-    for limit in limits:
-        if not isinstance(limit, HasPhasePlaneRows):
-            continue
-        rows = limit.phase_plane_rows(stations, *joints)
-        if rows.u is not None:
-            sloped.append((rows.u, rows.x, rows.constant))
-            continue
-        with np.errstate(divide="ignore", invalid="ignore"):
-            level = (1.0 - rows.constant) / rows.x
-        highest = np.where(rows.x > 0.0, level, np.inf).min(axis=1)
-        ceiling = np.minimum(ceiling, highest)
-        floor = np.maximum(floor, np.where(rows.x < 0.0, level, 0.0).max(axis=1))
-    a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
-    # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
-    a = np.where(np.abs(a) < _TINY, _TINY, a)
-    ends = (1.0 - c) / a, (-1.0 - c) / a
-    return _Lines(-b / a, np.minimum(*ends), np.maximum(*ends), floor, ceiling)
-
-
-def _interpolate(places: np.ndarray, s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def interpolate(places: np.ndarray, s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Interpolate values (S, c) at s, (S,), linearly at places, (P,)."""
     return np.column_stack([np.interp(places, s, column) for column in values.T])
 
 
-def _go_backwards(
-    lines: _Lines, steps: np.ndarray, last: float
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Find the intervals of x, (S,), from which the end can be reached with x = `last`; None if one is empty."""
-    count = len(lines.ceiling)
-    lowest = lines.floor[-1] * (1.0 - 1e-6)  # of the rounding
-    if not lowest <= last <= lines.ceiling[-1] * (1.0 + 1e-6):
-        return None
-    low = np.full(count, last)
-    high = np.full(count, last)
-    for i in range(count - 2, -1, -1):
-        # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
-        half = 0.5 / steps[i]
-        slope = np.append(lines.slope[i], -half)
-        upper = np.append(lines.upper[i], half * high[i + 1])
-        lower = np.append(lines.lower[i], half * low[i + 1])
-        tilt = (slope[:, None] - slope[None]).ravel()
-        clearance = (upper[:, None] - lower[None]).ravel()
-        if np.any((clearance < 0.0) & (np.abs(tilt) < _TINY)):
-            return None
-        falling = tilt < -_TINY
-        rising = tilt > _TINY
-        highest = np.min(clearance[falling] / -tilt[falling], initial=np.inf)
-        lowest = np.max(-clearance[rising] / tilt[rising], initial=0.0)
-        high[i] = min(lines.ceiling[i], highest)
-        low[i] = max(lines.floor[i], lowest)
-        if low[i] > high[i]:
-            return None
-    return low, high
+def least_speeds(limits: Sequence[Limit]) -> list[Limit]:
+    """Limits that ask for a least speed."""
+    return [limit for limit in limits if limit.longer_time == "violates"]
 
 
 def initial_knots(start: InitialGuess) -> np.ndarray:
@@ -272,7 +248,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
         curves, times = guess
         # Even times: the run-up to a speed is passed in milliseconds.
         even = np.linspace(0.0, times[-1], 64 * _STATIONS)
-        motion = _interpolate(even, times, curves)
+        motion = interpolate(even, times, curves)
         x = starting_point(program, [motion], times[-1], keep=keep)
         if x is not None:
             return x
@@ -283,10 +259,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
 
 def _least_speed_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and their times, (S,), s; None if no limit asks for a least speed."""
-    has_least_speed = any(
-        limit.longer_time == "violates" for limit in start.problem.limits
-    )
-    return _phase_plane_guess(start) if has_least_speed else None
+    return _phase_plane_guess(start) if least_speeds(start.problem.limits) else None
 
 
 def _moving_ends_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
@@ -312,7 +285,7 @@ def _phase_plane_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | N
     if q is None:
         return None
     stations = spread_stations(problem.limits)
-    times = least_times(problem.limits, s, q, problem.end_rates, stations)
+    times = PhasePlane(problem.limits, s, q, stations).times(problem.end_rates)
     if times is None or not np.isfinite(times[-1]):
         return None
     return _curves_along(start, stations), times
@@ -321,7 +294,7 @@ def _phase_plane_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | N
 def _curves_along(start: InitialGuess, s: np.ndarray) -> np.ndarray:
     """Curves, (S, c), of a guess at path coordinates, (S,)."""
     path = start.joint_path
-    return np.column_stack([s, _interpolate(s, path[:, 0], path)[:, 1:]])
+    return np.column_stack([s, interpolate(s, path[:, 0], path)[:, 1:]])
 
 
 def postures_along(start: InitialGuess, s: np.ndarray) -> np.ndarray | None:
@@ -334,7 +307,7 @@ def spread_stations(limits: Sequence[Limit]) -> np.ndarray:
     """Spread stations evenly, and ever closer towards places at which a least speed sets in or ends."""
     even = np.linspace(0.0, 1.0, _STATIONS)
     steps = even[1] * 0.5 ** np.arange(12)
-    breaks = [limit.breaks for limit in limits if limit.longer_time == "violates"]
+    breaks = [limit.breaks for limit in least_speeds(limits)]
     near = np.concatenate([np.empty(0), *breaks])[:, None] + np.r_[-steps, 0.0, steps]
     places = np.union1d(even, np.clip(near, 0.0, 1.0))
     return places[np.append(np.diff(places) > 0.5 * steps[-1], True)]

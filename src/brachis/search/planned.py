@@ -38,42 +38,33 @@ class PlannedMotion(Summary):
     warnings: tuple[Issue, ...] = ()
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
-        """Sample the trajectory every `dt` seconds; see `Trajectory.sample`."""
+        """Sample the trajectory every `dt` seconds, as `Trajectory.sample` does."""
         return self.trajectory.sample(dt, last=last)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the trajectory to an npz file, which `Trajectory.load` reads; see `Trajectory.save`."""
+        """Write the trajectory to an npz file, which `Trajectory.load` reads."""
         self.trajectory.save(path)
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
-        """Return a pandas table, a row every `dt` seconds; see `Trajectory.to_dataframe`."""
+        """Return a pandas table, a row every `dt` seconds."""
         return self.trajectory.to_dataframe(dt)
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
-        trajectory = self.trajectory
-        last = self.solver_report
-        left = (
-            {"not_completed": "; ".join(self.not_completed)}
-            if self.not_completed
-            else {}
-        )
-        remarks = (
-            {"warnings": "; ".join(remark.message for remark in self.warnings)}
-            if self.warnings
-            else {}
-        )
-        return {
-            **trajectory.summary(),
+        report = self.solver_report
+        verified = sum(candidate.verified for candidate in self.candidates)
+        shown = {
             "verified": "yes" if self.verified else "NO",
             "worst ratio to a limit": f"{self.verification.worst_ratio:.5f}",
             "path error": f"{self.verification.path_error:.1e} m or rad",
-            "solver": f"{last.solver}, {last.status.name.lower()}",
-            "candidates": f"{len(self.candidates)}, {sum(each.verified for each in self.candidates)} verified",
+            "solver": f"{report.solver}, {report.status.name.lower()}",
+            "candidates": f"{len(self.candidates)}, {verified} verified",
             "wall time": f"{self.timing.get('total', 0.0):.2f} s",
-            **left,
-            **remarks,
+            "not_completed": "; ".join(self.not_completed),
+            "warnings": "; ".join(remark.message for remark in self.warnings),
         }
+        filled = {name: text for name, text in shown.items() if text}
+        return {**self.trajectory.summary(), **filled}
 
     @property
     def t_end(self) -> float:
@@ -102,28 +93,29 @@ class PlannedMotion(Summary):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of the plan as plain data for JSON."""
-        last = self.candidate
+        candidate = self.candidate
+        report = self.solver_report
+        trajectory = self.trajectory
+        least_motion = self.least_motion
         return {
             "t_end": self.t_end,
-            "redundant_joints": list(self.trajectory.redundant_joints),
-            "branch": self.trajectory.branch,
-            "start_posture": self.trajectory.position(0.0).tolist(),
-            "end_posture": self.trajectory.position(self.t_end).tolist(),
-            "position_units": list(self.trajectory.robot.position_units),
+            "redundant_joints": list(trajectory.redundant_joints),
+            "branch": trajectory.branch,
+            "start_posture": trajectory.position(0.0).tolist(),
+            "end_posture": trajectory.position(self.t_end).tolist(),
+            "position_units": list(trajectory.robot.position_units),
             "family": self.family,
-            "in_use": in_use(self.trajectory.robot),
-            "status": self.solver_report.status.name.lower(),
-            "advice": self.solver_report.status.value,
-            "solver": self.solver_report.solver,
-            "iterations": sum(report.iterations for report in last.reports),
-            "refinement_rounds": last.refinement_rounds,
-            "collocation_points": last.collocation_points,
-            "time_scaled": last.time_scaled,
-            "least_motion": None
-            if self.least_motion is None
-            else self.least_motion.to_dict(),
+            "in_use": in_use(trajectory.robot),
+            "status": report.status.name.lower(),
+            "advice": report.status.value,
+            "solver": report.solver,
+            "iterations": sum(each.iterations for each in candidate.reports),
+            "refinement_rounds": candidate.refinement_rounds,
+            "collocation_points": candidate.collocation_points,
+            "time_scaled": candidate.time_scaled,
+            "least_motion": None if least_motion is None else least_motion.to_dict(),
             "fits": [fit.to_dict() for fit in self.fits],
-            "candidates": [candidate.to_dict() for candidate in self.candidates],
+            "candidates": [each.to_dict() for each in self.candidates],
             "interrupted": self.interrupted,
             "undone": list(self.not_completed),
             "warnings": [remark.to_dict() for remark in self.warnings],
@@ -132,5 +124,5 @@ class PlannedMotion(Summary):
             "verified": self.verified,
             "worst_ratio": self.verification.worst_ratio,
             "path_error": self.verification.path_error,
-            "joint_names": list(self.trajectory.joint_names),
+            "joint_names": list(trajectory.joint_names),
         }

@@ -3,7 +3,7 @@
 At every node the r joints that move most in the arm's self-motion there are cut into
 cells; the postures at the cells around, at the next station, follow by Newton's method.
 So every posture that a continuous motion reaches from the nodes before is found, at the
-spacing of the cells, and no closed form ends it. Where neither end is given, the first
+spacing of the cells, and no closed form ends it. If neither end is given, the first
 layer comes from all closed forms there are, which see the whole self-motion manifold, or,
 for arms without one, from random postures. Two postures are joined if no joint moves far
 and the step is along the self-motion: what the next target asks of the joints apart, most
@@ -15,24 +15,27 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import fields
+from typing import Unpack
 
 import numpy as np
 
-from brachis.common.deadline import NEVER, Deadline
 from brachis.kinematics import Newton, moving_most, null_spaces, solve_each
 from brachis.problem.problem import Decomposition, Problem
-from brachis.robot.joints import TURN, complement
-from brachis.search.closed_form_lattice import Cells, cell_sizes
+from brachis.robot.joints import TURN
+from brachis.search.closed_form_lattice import Cells, cell_sizes, solve_all
 from brachis.search.joint_path import JointPath, distinct, sampling_box
 from brachis.search.lattice import (
     LARGEST_STEP,
     Edges,
     Lattice,
     Layer,
+    Options,
     farthest,
     shortest,
 )
+
+_SAME = 1e-3
+"""Spacing, rad or m, below which postures are the same node."""
 
 
 def start_postures(
@@ -43,7 +46,7 @@ def start_postures(
     count: int,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find postures all over the self-motion manifold at the path's beginning, ranges left out of account.
+    """Find postures all over the self-motion manifold at the path's beginning, whatever the joint ranges are.
 
     Parameters
     ----------
@@ -51,9 +54,9 @@ def start_postures(
     decompositions : sequence of Decomposition
         Their closed forms give the postures, on all branches.
     newton : Newton
-        Brings random postures to the beginning where there is no closed form.
+        Brings random postures to the beginning without decompositions.
     cells_per_turn : int
-        Spacing of a single redundant joint; see `Cells`.
+        Spacing of a single redundant joint, as of `Cells`.
     count : int
         Choices of several redundant joints, or random postures.
     rng : Generator
@@ -63,12 +66,12 @@ def start_postures(
     q : (K, n) ndarray
         rad or m.
     seeds : (K,) int ndarray
-        Which of the decompositions gave it; -1 where chance did.
+        Which of the decompositions gave it; -1 for random ones.
     """
     target = problem.path.sample(np.zeros(1)).target
     if not decompositions:
         low, high = sampling_box(problem.robot)
-        drawn = rng.uniform(low, high, (count, problem.robot.n))
+        drawn = rng.uniform(low, high, (count, len(low)))
         q = newton.nearest(np.repeat(target, count, axis=0), drawn)
         q = q[np.isfinite(q).all(axis=1)]
         return q, np.full(len(q), -1)
@@ -76,22 +79,10 @@ def start_postures(
     for decomposition in decompositions:
         cells = Cells.of(decomposition, cells_per_turn, None)
         q_r = cells.positions(cells.everywhere(count, rng))
-        answers = decomposition.match.solver.solve(
-            np.repeat(target, len(q_r), axis=0), q_r
-        )
-        q = np.empty((*answers.shape[:3], problem.robot.n))
-        q[..., list(decomposition.redundant)] = q_r[:, None, None]
-        q[..., complement(problem.robot.n, decomposition.redundant)] = answers
+        q = solve_all(decomposition, np.repeat(target, len(q_r), axis=0), q_r)
         found.append(q[np.isfinite(q).all(axis=3)])
-    return np.concatenate(found), np.repeat(
-        np.arange(len(found)), [len(q) for q in found]
-    )
-
-
-_SAME = 1e-3
-"""Spacing, rad or m, below which postures are the same node."""
-_AROUND = 3.0
-"""Distance, in cells, within which nodes are neighbours on the self-motion manifold."""
+    seeds = np.repeat(np.arange(len(found)), [len(q) for q in found])
+    return np.concatenate(found), seeds
 
 
 class PostureLattice(Lattice):
@@ -101,13 +92,11 @@ class PostureLattice(Lattice):
     ----------
     problem : Problem
     decompositions : sequence of Decomposition
-        Whose closed forms give the first layer where neither end is given.
-    cells_per_turn : int, optional
-        Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
+        Their closed forms give the first layer if neither end is given.
     only_minima : bool, optional
         Whether of one redundant joint only joint paths of locally least length are taken.
-    density, nodes, seed, deadline
-        See `Lattice`.
+    **options
+        As of `Lattice`.
     """
 
     def __init__(
@@ -115,76 +104,50 @@ class PostureLattice(Lattice):
         problem: Problem,
         decompositions: Sequence[Decomposition],
         *,
-        cells_per_turn: int = 72,
-        density: float = 1.0,
-        nodes: int = 120,
         only_minima: bool = True,
-        seed: int = 0,
-        deadline: Deadline = NEVER,
+        **options: Unpack[Options],
     ) -> None:
-        super().__init__(
-            problem,
-            problem.robot.revolute,
-            density=density,
-            nodes=nodes,
-            seed=seed,
-            deadline=deadline,
-        )
+        revolute = problem.robot.revolute
+        super().__init__(problem, revolute, **options)
         self._only_minima = only_minima
         self._decompositions = decompositions
-        self._cells_per_turn = cells_per_turn
-        revolute = problem.robot.revolute
         self._r = problem.robot.n - problem.task_map.m
-        self._size = cell_sizes(revolute, cells_per_turn)
+        self._size = cell_sizes(revolute, self._cells_per_turn)
+        # Distance within which nodes are neighbours on the self-motion manifold.
+        self._around = 3.0 * float(self._size.max())
         self._newton = Newton(problem.task_map)
         self._modulo = revolute & ~self._counts_turns
         self._seeds: tuple[np.ndarray, np.ndarray] | None = None
 
     def _at_end(self, last: Layer) -> np.ndarray:
-        """Tell which nodes of the last layer, (K,) bool, are the given end posture."""
-        assert self.problem.end is not None
+        """Tell which nodes, (K,) bool, are the given end posture."""
         return np.asarray(np.abs(last.q - self.problem.end).max(axis=1) < _SAME)
 
     def _choose(
         self, found: list[JointPath], ends: Layer, most: int
     ) -> list[JointPath]:
-        """Choose joint paths, and name the closed forms from which they start."""
-        return [
-            dataclasses.replace(each, seed=self._seed_of(each.q[0]))
-            for each in self._choose_minima(found, ends, most)
-        ]
+        """Choose joint paths no longer than any to a node around theirs, then some that differ, and name their seeds.
 
-    def _choose_minima(
-        self, found: list[JointPath], ends: Layer, most: int
-    ) -> list[JointPath]:
-        """Choose those no longer than any to a node around theirs, then some that differ.
-
-        Of several redundant joints the nodes are samples: there are no such minima.
+        Of several redundant joints the nodes are samples, which have no such minima.
         """
-        if self._r > 1:
-            return distinct(found, most)
-        first, second = self._near(ends.q, ends.q, _AROUND * float(self._size.max()))
-        own = ends.branch[first] == ends.branch[second]
-        around = np.full(len(ends.q), np.inf)
-        np.minimum.at(around, first[own], ends.length[second[own]])
-        least = around >= ends.length
-        minima = [
-            joint_path
-            for joint_path, is_one in zip(found, least, strict=True)
-            if is_one
-        ][:most]
-        if self._only_minima:
-            return minima
-        others = [
-            each
-            for each in distinct(found, most)
-            if not any(each is one for one in minima)
+        chosen: list[int] = []
+        if self._r <= 1:
+            first, second = self._near(ends.q, ends.q, self._around)
+            own = ends.branch[first] == ends.branch[second]
+            around = np.full(len(ends.q), np.inf)
+            np.minimum.at(around, first[own], ends.length[second[own]])
+            chosen = np.flatnonzero(around >= ends.length)[:most].tolist()
+        if self._r > 1 or not self._only_minima:
+            others = distinct(found, most)
+            chosen += [i for i in others if i not in chosen][: most - len(chosen)]
+        return [
+            dataclasses.replace(found[i], seed=self._seed_of(found[i].q[0]))
+            for i in chosen
         ]
-        return minima + others[: most - len(minima)]
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
         """Make nodes all over the self-motion manifold, one in a cell."""
-        self._seeds = start_postures(
+        q, seeds = start_postures(
             self.problem,
             self._decompositions,
             self._newton,
@@ -192,19 +155,17 @@ class PostureLattice(Lattice):
             4 * self._nodes,
             rng,
         )
-        q, seeds = self._seeds
+        self._seeds = q, seeds
         _, kept = np.unique(self._key(q, self._size), axis=0, return_index=True)
         return Layer.start(q[kept], seeds[kept])
 
     def _seed_of(self, q: np.ndarray) -> str:
-        """Name the closed form that gave the start, (n,); empty where it was given."""
+        """Name the closed form that gave the start, (n,); empty for a given one."""
         if self._seeds is None:
             return ""
         postures, seeds = self._seeds
-        nearest = int(np.abs(self._step(q, postures)).max(axis=1).argmin())
-        if seeds[nearest] < 0:
-            return "random"
-        return self._decompositions[seeds[nearest]].name
+        seed = seeds[np.abs(self._step(q, postures)).max(axis=1).argmin()]
+        return "random" if seed < 0 else self._decompositions[seed].name
 
     def _choose_starts(self, layer: Layer) -> Layer:
         """Label the starts: joint paths of different labels do not displace each other.
@@ -215,22 +176,23 @@ class PostureLattice(Lattice):
         q = layer.q
         if self._r > 1:
             scaled = q / self._size
-            chosen = np.unique([0, *farthest(scaled, scaled[:1], 11)])
-            return Layer.start(q[chosen], np.arange(len(chosen)))
+            q = q[np.unique([0, *farthest(scaled, scaled[:1], 11)])]
+            return Layer.start(q, np.arange(len(q)))
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
-        first, second = self._near(q, q, _AROUND * float(self._size.max()))
-        graph = coo_array(
-            (np.ones(len(first)), (first, second)), shape=(len(q), len(q))
-        )
+        pairs = self._near(q, q, self._around)
+        graph = coo_array((np.ones(len(pairs[0])), pairs), shape=(len(q), len(q)))
         return Layer.start(q, connected_components(graph, directed=False)[1])
 
     def _key(self, q: np.ndarray, size: np.ndarray | float) -> np.ndarray:
         """Round postures to whole numbers of a spacing, (K, n), without turns that do not count."""
-        return np.rint(np.where(self._modulo, np.remainder(q, TURN), q) / size).astype(
-            int
-        )
+        return np.rint(self._without_turns(q) / size).astype(int)
+
+    def _without_turns(self, q: np.ndarray) -> np.ndarray:
+        """Postures, (K, n), with angles whose turns do not count in [0, 2 pi)."""
+        # Rounding may make a remainder a whole turn.
+        return np.where(self._modulo, np.remainder(q, TURN) % TURN, q)
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
         """List edges to the postures at the cells around the nodes, along self-motion."""
@@ -242,13 +204,15 @@ class PostureLattice(Lattice):
         needed = solve_each(square, np.concatenate([wanted, still], axis=1))
         if self._r <= 1:
             around = self._at_cells(before.q, jacobian, null, wanted, station)
-            parent, q = self._pairs(before.q, around)
+            parent, which = self._near(before.q, around, LARGEST_STEP)
+            q = around[which]
         else:
             parent, q = self._sample(before.q, null, needed, station, rng)
         if self._to_end and station == len(self.s) - 1:
-            node, end = self._pairs(before.q, np.array([self.problem.end]))
+            end = np.array([self.problem.end])
+            node, which = self._near(before.q, end, LARGEST_STEP)
             parent = np.append(parent, node)
-            q = np.vstack([q, end])
+            q = np.vstack([q, end[which]])
         step = self._step(before.q[parent], q)
         own = step - needed[parent]
         small = np.all(np.abs(own) <= self._size, axis=1)
@@ -258,16 +222,8 @@ class PostureLattice(Lattice):
             parent,
             step,
             np.column_stack([before.branch[parent], self._key(q, _SAME)]),
-            np.ones(len(parent), dtype=bool),
-            small | (along >= 0.7 * np.linalg.norm(own, axis=1)),
+            allowed=small | (along >= 0.7 * np.linalg.norm(own, axis=1)),
         )
-
-    def _pairs(
-        self, before: np.ndarray, q: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes, (E,), with postures (E, n) of those given, (C, n), to which no joint moves far."""
-        node, posture = self._near(before, q, LARGEST_STEP)
-        return node, q[posture]
 
     def _near(
         self, first: np.ndarray, second: np.ndarray, reach: float
@@ -277,8 +233,7 @@ class PostureLattice(Lattice):
 
         box = np.where(self._modulo, TURN, 0.0)
         one, other = (
-            KDTree(np.where(self._modulo, np.remainder(q, TURN) % TURN, q), boxsize=box)
-            for q in (first, second)
+            KDTree(self._without_turns(q), boxsize=box) for q in (first, second)
         )
         pairs = one.sparse_distance_matrix(
             other, reach, p=np.inf, output_type="ndarray"
@@ -299,36 +254,24 @@ class PostureLattice(Lattice):
         size = self._size[joints]
         at = np.take_along_axis(q, joints, axis=1)
         offsets = np.arange(-2, 3)[:, None] if self._r else np.zeros((1, 0), dtype=int)
-        cells = np.rint(at / size).astype(int)[:, None] + offsets
-        levels = cells * size[:, None]
-        moved = levels - at[:, None]
-        right = np.concatenate(
-            [
-                np.broadcast_to(wanted[:, None], (*moved.shape[:2], wanted.shape[1])),
-                moved,
-            ],
-            axis=2,
-        )
-        augmented = np.concatenate([jacobian, rows], axis=1)
         which = np.repeat(np.arange(len(q)), len(offsets))
-        cells, levels, right = (
-            part.reshape(len(which), -1) for part in (cells, levels, right)
-        )
-        begun = q[which] + solve_each(augmented[which], right)
-        regular = np.isfinite(begun).all(axis=1)
-        which, begun, cells, levels = (
-            part[regular] for part in (which, begun, cells, levels)
-        )
-        keys = np.concatenate([joints[which], cells, self._key(begun, 0.5)], axis=1)
-        far = np.tile(np.abs(offsets).sum(axis=1), len(q))[regular]
-        chosen = shortest(far.astype(float), keys)
+        cells = np.rint(at / size).astype(int)[which] + np.tile(offsets, (len(q), 1))
+        levels = cells * size[which]
+        augmented = np.concatenate([jacobian, rows], axis=1)[which]
+        right = np.concatenate([wanted[which], levels - at[which]], axis=1)
+        begun = q[which] + solve_each(augmented, right)
+        regular = np.flatnonzero(np.isfinite(begun).all(axis=1))
+        # One start for each posture: from the node whose own cell is nearest.
+        keys = [joints[which], cells, self._key(np.nan_to_num(begun), 0.5)]
+        far = np.tile(np.abs(offsets).sum(axis=1), len(q)).astype(float)
+        keys_of_regular = np.concatenate(keys, axis=1)[regular]
+        chosen = regular[shortest(far[regular], keys_of_regular)]
         found = self._project(
             begun[chosen], rows[which[chosen]], levels[chosen], station
         )
         found = found[np.isfinite(found).all(axis=1)]
-        return np.asarray(
-            found[np.unique(self._key(found, _SAME), axis=0, return_index=True)[1]]
-        )
+        _, kept = np.unique(self._key(found, _SAME), axis=0, return_index=True)
+        return np.asarray(found[kept])
 
     def _sample(
         self,
@@ -339,45 +282,32 @@ class PostureLattice(Lattice):
         rng: np.random.Generator,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Nodes, (E,), and postures (E, n) around them: along each direction of self-motion, and at random."""
-        single = [
-            sign * step * row
-            for row in np.eye(self._r)
-            for step in (1.0, 4.0)
-            for sign in (-1.0, 1.0)
-        ]
-        offsets = np.vstack(
-            [
-                np.zeros((1, self._r)),
-                single,
-                rng.normal(0.0, 2.5, (6, self._r)),
-            ]
-        )
+        r = self._r
+        single = np.kron(np.eye(r), [[-1.0], [1.0], [-4.0], [4.0]])
+        random = rng.normal(0.0, 2.5, (6, r))
+        offsets = np.vstack([np.zeros((1, r)), single, random])
         aside = np.einsum("kij,oj->koi", null, offsets) * self._size
         if self._to_end:  # one more: a part of the way to the given end
-            left = self.problem.end - q
-            homing = np.einsum("kir,kjr,kj->ki", null, null, left) / max(
-                1, len(self.s) - station
-            )
+            left = (self.problem.end - q) / max(1, len(self.s) - station)
+            homing = np.einsum("kir,kjr,kj->ki", null, null, left)
             aside = np.concatenate([aside, homing[:, None]], axis=1)
         parent = np.repeat(np.arange(len(q)), aside.shape[1])
         begun = ((q + needed)[:, None] + aside).reshape(len(parent), -1)
         rows = np.swapaxes(null, 1, 2)[parent]
-        found = self._project(
-            begun, rows, np.einsum("kij,kj->ki", rows, begun), station
-        )
+        levels = np.einsum("kij,kj->ki", rows, begun)
+        found = self._project(begun, rows, levels, station)
         exists = np.isfinite(found).all(axis=1)
         return parent[exists], found[exists]
 
     def _project(
         self, q: np.ndarray, rows: np.ndarray, levels: np.ndarray, station: int
     ) -> np.ndarray:
-        """Postures (C, n) near given ones that meet a station's target; see `Newton.solve`."""
-        return self._newton.solve(
-            np.repeat(self._targets[station][None], len(q), axis=0), q, rows, levels
-        )
+        """Postures (C, n) near given ones that meet a station's target, as of `Newton.solve`."""
+        targets = np.repeat(self._targets[station][None], len(q), axis=0)
+        return self._newton.solve(targets, q, rows, levels)
 
     def _thin(self, layer: Layer) -> Layer:
-        """Keep a bounded number of nodes of each label, of several redundant joints."""
+        """Keep a bounded number of nodes of each label, with several redundant joints."""
         if self._r <= 1:
             return layer
         cost = layer.length
@@ -386,14 +316,8 @@ class PostureLattice(Lattice):
             cost = cost + self._lengths(layer.q, left, np.arange(len(left)))
         labels = np.unique(layer.branch)
         most = max(10, self._nodes // len(labels))
-        parts = []
-        for label in labels:
-            own = layer.branch == label
-            part = layer[own].thin(most, cost[own], self._robot, self.problem.limits)
-            parts.append(part)
-        return Layer(
-            *(
-                np.concatenate([getattr(part, each.name) for part in parts])
-                for each in fields(Layer)
-            )
-        )
+        own = (np.flatnonzero(layer.branch == label) for label in labels)
+        kept = [
+            those[self._choose_some(layer[those], most, cost[those])] for those in own
+        ]
+        return layer[np.concatenate(kept)]

@@ -9,21 +9,23 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.optimise.backends import solver_named
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
+from brachis.search.candidates import solvers_of
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import DeadEnd
-from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.processes import each, processes
 from brachis.search.starts import (
+    SEARCH_LEVELS,
+    SearchLevel,
     chart_starts,
     joint_space_start,
     lattice_starts,
@@ -36,6 +38,8 @@ _LATTICE_SHARE = 0.4
 """Part of the time left in which the guesses of a level are looked for; those found by then are planned."""
 
 Lattices = tuple[tuple[Decomposition | None, DeadEnd | None], ...]
+"""Lattices that gave no guesses (None: of all postures), and where they end (None: the time was up)."""
+Found = tuple[list[InitialGuess], Lattices]
 
 
 @dataclass(frozen=True)
@@ -76,13 +80,6 @@ class Batch:
         return cls(combined, refined, fallback, lattices)
 
 
-def solvers_of(problem: Problem) -> list[str]:
-    """Names of the solvers for a problem, the one that is tried first at the front."""
-    curved = any(limit.guarantee.is_mean for limit in problem.limits)
-    found = solver_named(problem.task.solver.name, curved=curved)
-    return [solver.name for solver in found]
-
-
 def batches(
     problem: Problem,
     decompositions: Sequence[Decomposition],
@@ -117,12 +114,23 @@ def batches(
             yield Batch.of([start], [solver], 1, fallback=solver != solvers[0])
         return
     if has_charts(problem, decompositions):
-        yield from _in_charts(
-            problem, decompositions, levels, solvers, deadline, listener
-        )
+        find = partial(_guess_in_charts, problem, decompositions, deadline, listener)
+        known = yield from _level_by_level(levels, solvers, find)
+        for solver in solvers[1:]:
+            yield Batch.of(known[:_SIZE], [solver], len(known))
         levels = tuple(dataclasses.replace(level, fallback=True) for level in levels)
-    if decompositions:
-        yield from _in_closed_forms(decompositions, levels, solvers, deadline, listener)
+    if not decompositions:
+        return
+    find = partial(_guess_on_branches, decompositions, deadline, listener)
+    known = yield from _level_by_level(levels, solvers, find)
+    many = len(known) + len(STRATEGIES)
+    tried = {(start.joint_map.redundant_joints, start.origin) for start in known}
+    yield Batch.of(known[:_SIZE], solvers[1:2], many)
+    for decomposition in decompositions[: levels[-1].decompositions]:
+        for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
+            if (start.joint_map.redundant_joints, start.origin) not in tried:
+                yield Batch.of([start], solvers[:2], many)
+    yield Batch.of(known[:2], solvers[2:], many)
 
 
 def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
@@ -136,61 +144,19 @@ def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> boo
     return is_open and (problem.robot.n > problem.task_map.m or not decompositions)
 
 
-def _in_charts(
-    problem: Problem,
-    decompositions: Sequence[Decomposition],
+def _level_by_level(
     levels: Sequence[SearchLevel],
     solvers: Sequence[str],
-    deadline: Deadline,
-    listener: Listener,
-) -> Iterator[Batch]:
-    """Yield batches of guesses in charts: level by level with the first solver, then with the others."""
-    known: list[InitialGuess] = []
-    for level in levels:
-        if level.fallback:
-            yield Batch(fallback=True)
-        listener("looking for joint paths on the lattice of all postures")
-        found = chart_starts(
-            problem, decompositions, level, deadline.part(_LATTICE_SHARE), listener
-        )
-        dead_end = found if isinstance(found, DeadEnd) else None
-        starts = [] if isinstance(found, DeadEnd) else found
-        known += starts
-        yield Batch.of(
-            starts,
-            solvers[:1],
-            level.refined,
-            fallback=level.fallback,
-            lattices=() if starts else ((None, dead_end),),
-        )
-    for solver in solvers[1:]:
-        yield Batch.of(known[:_SIZE], [solver], len(known))
-
-
-def _in_closed_forms(
-    decompositions: Sequence[Decomposition],
-    levels: Sequence[SearchLevel],
-    solvers: Sequence[str],
-    deadline: Deadline,
-    listener: Listener,
-) -> Iterator[Batch]:
-    """Yield batches of guesses on the branches of closed forms, then of numeric guesses and with other solvers."""
+    find: Callable[[SearchLevel], Found],
+) -> Generator[Batch, None, list[InitialGuess]]:
+    """Yield batches of the guesses that are found for each level, with the first solver; return all guesses."""
     known: list[InitialGuess] = []
     for level in levels:
         if level.fallback:
             # The search may end here, before lattices are looked at.
             yield Batch(fallback=True)
-        starts: list[InitialGuess] = []
-        lattices: Lattices = ()
-        # Decompositions without a joint path make room for others.
-        for first in range(0, len(decompositions), level.decompositions):
-            own = decompositions[first : first + level.decompositions]
-            starts, more = _on_branches(own, level, deadline, listener)
-            lattices += more
-            if starts:
-                break
+        starts, lattices = find(level)
         known += starts
-        refuse_hopeless(known)
         for first in range(0, max(1, len(starts)), _SIZE):
             yield Batch.of(
                 starts[first : first + _SIZE],
@@ -199,26 +165,50 @@ def _in_closed_forms(
                 fallback=level.fallback,
                 lattices=() if first else lattices,
             )
-    many = len(known) + len(STRATEGIES)
-    tried = {(start.joint_map.redundant_joints, start.origin) for start in known}
-    yield Batch.of(known[:_SIZE], solvers[1:2], many)
-    for decomposition in decompositions[: level.decompositions]:
-        for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
-            if (start.joint_map.redundant_joints, start.origin) not in tried:
-                yield Batch.of([start], solvers[:2], many)
-    yield Batch.of(known[:2], solvers[2:], many)
+    return known
 
 
-def _on_branches(
+def _guess_in_charts(
+    problem: Problem,
     decompositions: Sequence[Decomposition],
-    level: SearchLevel,
     deadline: Deadline,
     listener: Listener,
-) -> tuple[list[InitialGuess], Lattices]:
-    """Take one guess of every choice after the other, of each those with the least estimated times first.
+    level: SearchLevel,
+) -> Found:
+    """Find guesses in charts."""
+    listener("looking for joint paths on the lattice of all postures")
+    soon = deadline.part(_LATTICE_SHARE)
+    found = chart_starts(problem, decompositions, level, soon, listener)
+    if isinstance(found, DeadEnd):
+        return [], ((None, found),)
+    return found, () if found else ((None, None),)
 
-    Also return the lattices that gave none.
-    """
+
+def _guess_on_branches(
+    decompositions: Sequence[Decomposition],
+    deadline: Deadline,
+    listener: Listener,
+    level: SearchLevel,
+) -> Found:
+    """Find guesses on the branches of closed forms; decompositions without a joint path make room for others."""
+    lattices: Lattices = ()
+    for first in range(0, len(decompositions), level.decompositions):
+        some = decompositions[first : first + level.decompositions]
+        starts, more = _guess_on_some_branches(some, deadline, listener, level)
+        lattices += more
+        if starts:
+            refuse_hopeless(starts)
+            return starts, lattices
+    return [], lattices
+
+
+def _guess_on_some_branches(
+    decompositions: Sequence[Decomposition],
+    deadline: Deadline,
+    listener: Listener,
+    level: SearchLevel,
+) -> Found:
+    """Take one guess of every choice after the other, of each those with the least estimated times first."""
     search = decompositions[0].problem.task.search
     if search.guesses == "numeric":
         most = level.joint_paths
@@ -229,7 +219,6 @@ def _on_branches(
         _starts_of,
         decompositions,
         level,
-        search.seed,
         deadline,
         jobs=processes(search.jobs, deadline),
         listener=listener,
@@ -258,11 +247,10 @@ def _on_branches(
 def _starts_of(
     decomposition: Decomposition,
     level: SearchLevel,
-    seed: int,
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess] | DeadEnd:
     if deadline.passed:
         return []
     listener(f"looking for joint paths on the lattice of {decomposition.name}")
-    return lattice_starts(decomposition, level, seed, deadline)
+    return lattice_starts(decomposition, level, deadline)

@@ -21,9 +21,9 @@ from brachis.optimise.backends import SolverOptions, solver_named
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
+from brachis.search.candidates import solve_in_chart, solvers_of
 from brachis.search.phase_plane import initial_guess
 from brachis.search.processes import each, processes
-from brachis.search.solving import solve_in_chart
 
 _DEGREE = 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few intervals say most."""
@@ -41,7 +41,7 @@ def screen(
     starts : sequence of InitialGuess
         At least one.
     most : int
-        How many to keep; if there are no more than these, none is looked at.
+        How many to keep; if so few are given, all are kept without a solve.
     deadline : Deadline
     listener : callable
 
@@ -92,8 +92,7 @@ def _solve_quickly(
         task=task.model_copy(update={"spline": spline}),
         limits=tuple(limit for limit in start.problem.limits if limit.order <= _DEGREE),
     )
-    curved = any(limit.guarantee.is_mean for limit in start.problem.limits)
-    backend = solver_named(task.solver.name, curved=curved)[0]
+    (backend,) = solver_named(solvers_of(start.problem)[0])
     # An answer that nearly holds the limits will do, and so will one that hardly gets any faster.
     options = SolverOptions(1e-3, 25, np.inf, progress=5e-3, patience=3)
     session = SolverSession(backend, options, deadline, acceptable=1e-2)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,8 +29,7 @@ from brachis.search.failure import Failure
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.levels import SEARCH_LEVELS, SearchLevel
-from brachis.search.phase_plane import least_time, least_times
+from brachis.search.phase_plane import PhasePlane, interpolate, least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.processes import ignore
 from brachis.search.screening import screen
@@ -40,11 +40,64 @@ FAMILY = "path of joints"
 """Family, and origin, of the guess for a path of joints."""
 
 
+@dataclass(frozen=True)
+class SearchLevel:
+    """One level of the search.
+
+    Attributes
+    ----------
+    decompositions : int
+        Decompositions that are looked at; those farthest from singularity at the start come first.
+    joint_paths : int
+        Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
+    numeric : int
+        Joint paths by numeric inverse kinematics as well, if the start posture is given.
+    in_charts : int
+        Plans in charts; four times as many joint paths are looked at.
+    in_closed_forms : int
+        Coarse plans in closed forms; those with the least estimated time come first.
+    refined : int
+        Plans that are refined and verified at most, as long as they may beat the best one.
+    cells_per_turn, nodes : int
+        Of the lattice.
+    only_minima : bool
+        Whether of the lattice of all postures only joint paths of locally least length are taken.
+    fallback : bool
+        Whether it is gone through only while no motion is verified.
+    """
+
+    decompositions: int
+    joint_paths: int
+    numeric: int
+    in_charts: int
+    in_closed_forms: int
+    refined: int
+    cells_per_turn: int = 72
+    nodes: int = 120
+    only_minima: bool = True
+    fallback: bool = False
+
+
+_SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
+_FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
+_THOROUGH = SearchLevel(
+    20, 8, 8, 8, 100, 12, cells_per_turn=96, nodes=300, only_minima=False
+)
+_EXHAUSTIVE = SearchLevel(
+    10_000, 30, 8, 12, 10_000, 40, cells_per_turn=144, nodes=600, only_minima=False
+)
+
+SEARCH_LEVELS = {
+    "single": (_SINGLE, dataclasses.replace(_FAST, fallback=True)),
+    "fast": (_FAST,),
+    "thorough": (_FAST, _THOROUGH),
+    "exhaustive": (_FAST, _THOROUGH, _EXHAUSTIVE),
+}
+"""Levels that are gone through one after the other, by the task's ``search.effort``; so a good motion is known soon."""
+
+
 def lattice_starts(
-    decomposition: Decomposition,
-    level: SearchLevel,
-    seed: int,
-    deadline: Deadline = NEVER,
+    decomposition: Decomposition, level: SearchLevel, deadline: Deadline = NEVER
 ) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
 
@@ -52,8 +105,6 @@ def lattice_starts(
     ----------
     decomposition : Decomposition
     level : SearchLevel
-    seed : int
-        Of what is drawn at random with several redundant joints.
     deadline : Deadline, optional
 
     Returns
@@ -68,7 +119,6 @@ def lattice_starts(
             cells_per_turn=finer * level.cells_per_turn,
             density=density,
             nodes=finer * level.nodes,
-            seed=seed,
             deadline=deadline,
         )
         found = lattice.joint_paths(most * len(decomposition.branches))
@@ -94,8 +144,7 @@ def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, pieces + 1), np.ones(3)]
         spline = make_lsq_spline(s, joint_path.q, knots, k=3, w=weights)
         yield fine, np.asarray(spline(fine))
-    columns = [np.interp(fine, s, column) for column in joint_path.q.T]
-    yield fine, np.column_stack(columns)
+    yield fine, interpolate(fine, s, joint_path.q)
 
 
 def _guess_on_branch(
@@ -131,7 +180,7 @@ def numeric_starts(
     Parameters
     ----------
     decomposition : Decomposition
-        Without a given start posture there are no ways.
+        With a given start posture; without one the list is empty.
     most : int
     deadline : Deadline
 
@@ -181,7 +230,6 @@ def chart_starts(
     PlanningError
         No motion along any joint path can hold a least speed, or a mean of a load.
     """
-    seed = problem.task.search.seed
     for finer in (1, 2):
         lattice = PostureLattice(
             problem,
@@ -190,7 +238,6 @@ def chart_starts(
             density=float(finer),
             nodes=finer * level.nodes // 2,
             only_minima=level.only_minima,
-            seed=seed,
             deadline=deadline,
         )
         found = lattice.joint_paths(SCREENED * level.in_charts)
@@ -205,7 +252,8 @@ def chart_starts(
         for number, each in enumerate(found, 1)
     ]
     if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:
-        more = perturb(found, 2 * level.in_charts - len(found), seed)
+        missing = 2 * level.in_charts - len(found)
+        more = perturb(found, missing, problem.task.search.seed)
         named += [(f"perturbed {number}", each) for number, each in enumerate(more, 1)]
     newton = Newton(problem.task_map)
     guesses = []
@@ -216,7 +264,7 @@ def chart_starts(
         if guess is not None:
             guesses.append(guess)
     if not guesses:
-        return [] if deadline.passed else DeadEnd(0.0, {NO_CHART: len(named)})
+        return [] if deadline.passed else DeadEnd(0.0, NO_CHART)
     guesses.sort(key=lambda guess: guess.estimate)
     refuse_hopeless(guesses)
     # Joint paths whose estimated time is three times the least one are hopeless.
@@ -291,7 +339,7 @@ def bring_onto_path(
     Raises
     ------
     UnreachableError
-        There are none, or they jump.
+        Such postures do not exist, or they jump.
     """
     if newton is not None:
         q = newton.nearest(problem.path.sample(s).target, q)
@@ -323,7 +371,7 @@ def joint_space_start(problem: Problem) -> InitialGuess:
     """
     s = np.linspace(0.0, 1.0, 401)
     q = problem.path.sample(s).target
-    times = least_times(problem.limits, s, q, problem.end_rates)
+    times = PhasePlane(problem.limits, s, q).times(problem.end_rates)
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
         is_needed = times is None or limit.longer_time != "relieves"
@@ -358,7 +406,7 @@ def _refuse_beyond(
         found=f"{found} {label.unit} at s = {s[station]:.3g}",
         needed=f"{allowed} {label.unit}",
         hint="Lead the path elsewhere",
-        remedies=tuple(remedies),
+        remedies=remedies,
     )
     raise failure.error()
 
@@ -385,7 +433,7 @@ def first_map(
     found = (
         chart_starts(problem, decompositions, level)
         if first is None
-        else lattice_starts(first, level, problem.task.search.seed)
+        else lattice_starts(first, level)
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)

@@ -41,7 +41,7 @@ from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase import Motion, Phase
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.search.phase_plane import fastest
+from brachis.search.phase_plane import PhasePlane
 from brachis.trajectory import Trajectory
 
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
@@ -258,7 +258,7 @@ def knot_cost(
     )
     q = trajectory.position(motion.times_of(s))
     first, last = np.abs(trajectory.path_spline.derivative()([0.0, trajectory.t_end]))
-    rate = fastest(limits, s, q, (first, last), s)
+    rate = PhasePlane(limits, s, q).fastest((first, last))
     if rate is None:
         return None
     steps = 2.0 * np.diff(s) / (rate[1:] + rate[:-1])

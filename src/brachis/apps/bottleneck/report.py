@@ -64,7 +64,7 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
 from brachis.robot.joints import shown_unit
 from brachis.robot.task_map import JOINTS
-from brachis.search.solving import MARGINS
+from brachis.search.candidates import MARGINS
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -153,8 +153,8 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
 
 
 def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
-    """Print the candidates of the search, the fastest first; the same motion is shown once."""
-    from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
+    """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once."""
+    from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
 
     rows = candidate_rows(candidates)[:_MOST_CANDIDATES]
     others = len(candidates) - len(rows)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from brachis.apps.plots.panels import curves_of, panels_of
-from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
+from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import Samples, Trajectory
 
 _MANY = 60
