@@ -9,9 +9,17 @@ import pinocchio as pin
 import pytest
 
 from brachis import LimitSpec
-from brachis.errors import InputError, LimitError, UnknownNameError, UrdfError
+from brachis.errors import (
+    InputError,
+    LimitError,
+    TaskError,
+    UnknownNameError,
+    UrdfError,
+)
 from brachis.robot import Robot
+from brachis.robot.robot import RobotKeywords
 from brachis.robot.urdf import DefaultChain, default_chain
+from brachis.task import RobotSettings
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
@@ -368,3 +376,18 @@ def test_posture_checks():
         robot.posture({"j1x": 1.0}, "start.joints")
     with pytest.raises(InputError, match="a joint position is out of range"):
         robot.posture([1.0, float("inf")], "start.joints")
+
+
+def test_the_keywords_of_from_urdf_are_the_settings_of_a_task():
+    settings = RobotSettings.model_fields.keys() - {"urdf", "limits_file"}
+    assert RobotKeywords.__annotations__.keys() == settings
+    assert all(f"        {name} : " in Robot.from_urdf.__doc__ for name in settings)
+    with pytest.raises(TaskError, match=r"tol_frame.*tool_frame"):
+        Robot.from_urdf("file.urdf", urdf_text=planar_urdf("RR"), tol_frame="tool")
+
+
+def test_what_is_none_is_as_by_default():
+    text = planar_urdf("RR")
+    nothing = dict.fromkeys(RobotKeywords.__annotations__)
+    made = Robot.from_urdf("file.urdf", urdf_text=text, **nothing)
+    assert made.settings == Robot.from_urdf("file.urdf", urdf_text=text).settings

@@ -91,6 +91,15 @@ class TaskMap(Summary, ABC):
         """World axes (0, 1, 2) of the position rows; none in a space of joints."""
         return tuple(AXES.index(row) for row in self.rows if row in AXES)
 
+    @cached_property
+    def _data(self) -> pin.Data:
+        """Pinocchio's workspace."""
+        return self.robot.model.createData()
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave the workspace behind."""
+        return {name: value for name, value in vars(self).items() if name != "_data"}
+
     @property
     def m(self) -> int:
         """Number of rows."""
@@ -142,7 +151,7 @@ class TaskMap(Summary, ABC):
     def twists(self, q: np.ndarray) -> np.ndarray:
         """Columns (6, K, n) of the tool frame's Jacobian at K postures (K, n): linear, then angular velocity."""
         model = self.robot.model
-        data = model.createData()
+        data = self._data
         frame = self.robot.frame_id
         columns = np.empty((len(q), 6, self.robot.n))
         for k in range(len(q)):
