@@ -1,15 +1,14 @@
-"""The saved quintic pieces, evaluated by piece and place in it, so that a piece of a microsecond is as clear as any.
+"""The motion of a trajectory file, evaluated by polynomial piece and place in it.
 
-Roots of polynomials in Bernstein form, many at a time: where a motion turns, peaks or crosses a value.
-
-A polynomial of degree m is monotone between the roots of its derivative, which has degree m - 1; so the roots follow
-one degree after the other, from the linear case on, each between neighbouring ones of the degree below. A polynomial
-whose Bernstein coefficients do not change their sign has no root at all, which decides nearly every case.
+A piece of a microsecond is evaluated as exactly as any other. Roots of the polynomials, in Bernstein form, show where a
+motion turns, peaks or crosses a value. A polynomial whose Bernstein coefficients do not change their sign has no root,
+which decides nearly every case.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -18,15 +17,13 @@ from brachis.robot import Robot
 from brachis.trajectory import Trajectory
 from brachis.verify.mechanics import torques
 
-_STEPS = 60
-_ROUNDING = 1e-14
-
 
 def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,)."""
     degree = len(coefficients) - 1
     factors = np.array([math.comb(degree, k) for k in range(degree + 1)], dtype=float)
-    up, down = np.ones((degree + 1, len(u))), np.ones((degree + 1, len(u)))
+    up = np.ones((degree + 1, len(u)))
+    down = np.ones((degree + 1, len(u)))
     np.cumprod(np.broadcast_to(u, (degree, len(u))), axis=0, out=up[1:])
     np.cumprod(np.broadcast_to(1.0 - u, (degree, len(u))), axis=0, out=down[1:])
     return np.einsum("k,kf,kf,kf...->f...", factors, up, down[::-1], coefficients)
@@ -47,68 +44,58 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u : (Z,) ndarray
         Root; ascending within a polynomial.
     """
-    kept = np.flatnonzero(
-        (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
-    )
+    changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
+    kept = np.flatnonzero(changing)
     c = coefficients[:, kept]
     if len(c) == 2:
         return kept, c[0] / (c[0] - c[1])
-    turns, at = roots(np.diff(c, axis=0))
+    turning, at = roots(np.diff(c, axis=0))
     every = np.arange(len(kept))
-    column = np.concatenate([every, turns, every])
+    column = np.concatenate([every, turning, every])
     u = np.concatenate([np.zeros(len(kept)), at, np.ones(len(kept))])
     order = np.lexsort((u, column))
-    column, u = column[order], u[order]
+    column = column[order]
+    u = u[order]
     value = values_of(c[:, column], u)
-    crossing = np.flatnonzero(
-        (column[1:] == column[:-1]) & (value[1:] * value[:-1] < 0.0)
-    )
-    found = _between(
-        c[:, column[crossing]],
-        u[crossing],
-        u[crossing + 1],
-        value[crossing],
-        value[crossing + 1],
+    same = column[1:] == column[:-1]
+    low = np.flatnonzero(same & (value[1:] * value[:-1] < 0.0))
+    high = low + 1
+    between = _root_between(
+        c[:, column[low]], (u[low], u[high]), (value[low], value[high])
     )
     exact = (value == 0.0) & (u > 0.0) & (u < 1.0)
-    column, u = (
-        np.concatenate([column[crossing], column[exact]]),
-        np.concatenate([found, u[exact]]),
-    )
+    column = np.concatenate([column[low], column[exact]])
+    u = np.concatenate([between, u[exact]])
     order = np.lexsort((u, column))
     return kept[column[order]], u[order]
 
 
-def _between(
-    c: np.ndarray, a: np.ndarray, b: np.ndarray, at_a: np.ndarray, at_b: np.ndarray
+def _root_between(
+    c: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+    values: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Find the root between a and b, where monotone polynomials have values of opposite sign (the Illinois method)."""
-    enough = _ROUNDING * np.abs(c).max(axis=0, initial=0.0)
-    powers = _powers(c)
+    """Find the root between ends at which monotone polynomials have values of opposite sign (the Illinois method)."""
+    a, b = ends
+    at_a, at_b = values
+    rounding = 1e-14
+    enough = rounding * np.abs(c).max(axis=0, initial=0.0)
+    degree = len(c) - 1
+    powers = [math.comb(degree, k) * np.diff(c, n=k, axis=0)[0] for k in range(len(c))]
     u = a
-    for _ in range(_STEPS if len(a) else 0):
+    for _ in range(60 if len(a) else 0):
         u = np.clip((a * at_b - b * at_a) / (at_b - at_a), a, b)
         value = powers[-1]
         for coefficient in powers[-2::-1]:
             value = value * u + coefficient
-        if np.all((np.abs(value) <= enough) | (b - a <= _ROUNDING)):
+        if np.all((np.abs(value) <= enough) | (b - a <= rounding)):
             break
-        left = (
-            value * at_a > 0.0
-        )  # the root lies right of u; the value that stays is halved
-        a, b = np.where(left, u, a), np.where(left, b, u)
-        at_a, at_b = (
-            np.where(left, value, 0.5 * at_a),
-            np.where(left, 0.5 * at_b, value),
-        )
+        is_left = value * at_a > 0.0  # of the root; the value that stays is halved
+        a = np.where(is_left, u, a)
+        b = np.where(is_left, b, u)
+        at_a = np.where(is_left, value, 0.5 * at_a)
+        at_b = np.where(is_left, 0.5 * at_b, value)
     return u
-
-
-def _powers(c: np.ndarray) -> np.ndarray:
-    """Coefficients of the powers of u, (m + 1, F), of polynomials in Bernstein form."""
-    return np.array(
-        [math.comb(len(c) - 1, k) * np.diff(c, n=k, axis=0)[0] for k in range(len(c))]
-    )
 
 
 def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -123,7 +110,8 @@ def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return column, u, values_of(coefficients[:, column], u)
 
 
-_SAME_PLACE = 1e-9
+SAME_PLACE = 1e-9
+"""Places in a piece that are nearer to each other, as parts of the piece, are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +131,8 @@ class Pieces:
     velocity : (5, L, n) ndarray
     acceleration : (4, L, n) ndarray
     jerk : (3, L, n) ndarray
+    path_coordinate : callable
+        ``path_coordinate(t)`` returns s, (K,), at times t, (K,), s.
     """
 
     times: np.ndarray
@@ -152,14 +142,15 @@ class Pieces:
     velocity: np.ndarray
     acceleration: np.ndarray
     jerk: np.ndarray
+    path_coordinate: Callable[[np.ndarray], np.ndarray]
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> Pieces:
         """Take the pieces of a trajectory."""
-        position, lengths = trajectory.pieces.c, np.diff(trajectory.times)
+        position = trajectory.pieces.c
+        lengths = np.diff(trajectory.times)
         velocity = 5.0 * np.diff(position, axis=0) / lengths[:, None]
         acceleration = 4.0 * np.diff(velocity, axis=0) / lengths[:, None]
-        jerk = trajectory.jerk_pieces.c
         return cls(
             trajectory.times,
             lengths,
@@ -167,7 +158,8 @@ class Pieces:
             position,
             velocity,
             acceleration,
-            jerk,
+            trajectory.jerk_pieces.c,
+            trajectory.path_spline,
         )
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -176,10 +168,20 @@ class Pieces:
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
-        piece = np.clip(
-            np.searchsorted(self.times, t, side="right") - 1, 0, len(self.lengths) - 1
-        )
+        piece = np.searchsorted(self.times, t, side="right") - 1
+        piece = np.clip(piece, 0, len(self.lengths) - 1)
         return piece, np.clip((t - self.times[piece]) / self.lengths[piece], 0.0, 1.0)
+
+    def times_of(self, s: np.ndarray) -> np.ndarray:
+        """Find the times, (P,), s, at which path coordinates, (P,), are reached; s(t) does not decrease."""
+        low = np.zeros(len(s))
+        high = np.full(len(s), self.times[-1])
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            before = self.path_coordinate(middle) < s
+            low = np.where(before, middle, low)
+            high = np.where(before, high, middle)
+        return 0.5 * (low + high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,14 +191,15 @@ class States:
     Attributes
     ----------
     piece : (K,) int ndarray
-    u, t : (K,) ndarray
-        Place in the piece; time, s.
+    u, t, s : (K,) ndarray
+        Place in the piece; time, s; path coordinate.
     q, qdot, qddot, qdddot, tau : (K, n) ndarray
     """
 
     piece: np.ndarray
     u: np.ndarray
     t: np.ndarray
+    s: np.ndarray
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
@@ -209,41 +212,34 @@ class States:
     ) -> States:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
-        piece, u = piece[order], u[order]
-        again = (
-            (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0)
-        )
+        piece = piece[order]
+        u = u[order]
+        near = (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= SAME_PLACE)
+        again = near & ((u[1:] < 1.0) | (u[:-1] == 1.0))  # an end stays
         first = np.append(True, ~again)[: len(piece)]
-        piece, u = piece[first], u[first]
+        piece = piece[first]
+        u = u[first]
+        t = pieces.time(piece, u)
         q = pieces.nodes[piece] + values_of(pieces.position[:, piece], u)
-        qdot, qddot = (
-            values_of(pieces.velocity[:, piece], u),
-            values_of(pieces.acceleration[:, piece], u),
+        qdot, qddot, qdddot = (
+            values_of(coefficients[:, piece], u)
+            for coefficients in (pieces.velocity, pieces.acceleration, pieces.jerk)
         )
-        qdddot = values_of(pieces.jerk[:, piece], u)
-        return cls(
-            piece,
-            u,
-            pieces.time(piece, u),
-            q,
-            qdot,
-            qddot,
-            qdddot,
-            torques(robot, q, qdot, qddot),
-        )
+        tau = torques(robot, q, qdot, qddot)
+        s = pieces.path_coordinate(t)
+        return cls(piece, u, t, s, q, qdot, qddot, qdddot, tau)
+
+    def torque(self, _robot: Robot) -> np.ndarray:
+        """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
+        return self.tau
 
     def only(self, chosen: np.ndarray | slice) -> States:
         """Return some of the states, in the order that is chosen."""
         return States(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def merged(self, other: States) -> tuple[States, np.ndarray]:
+    def merge(self, other: States) -> tuple[States, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
-        names = [field.name for field in fields(self)]
-        both = States(
-            *(
-                np.concatenate([getattr(self, name), getattr(other, name)])
-                for name in names
-            )
-        )
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        both = States(*(np.concatenate(pair) for pair in pairs))
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order

@@ -1,8 +1,9 @@
-"""Re-checks a trajectory on a dense grid with Pinocchio, sharing no code with the optimiser.
+"""Verification of a trajectory on a dense grid, which shares no code with the optimiser.
 
-Position errors come from forward kinematics of the saved joint polynomials against the path at the saved s(t), torques
-from Pinocchio's rnea and the friction formula written out again, velocities and accelerations from differentiating the
-polynomials. What is judged is the file that a controller would execute, not the optimiser's idea of it.
+Positions come from the saved joint polynomials and the kinematics of the URDF, and are compared with the path at the
+saved s(t). Torques come from Newton's and Euler's equations and the friction formula written out again, velocities and
+accelerations from differentiating the polynomials. So the file is verified that a controller would execute, not the
+optimiser's idea of it.
 """
 
 from __future__ import annotations
@@ -18,20 +19,16 @@ from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace
 from brachis.trajectory import Motion, Trajectory, motion_of
 from brachis.verify.checks import (
-    check_instants,
-    continuity_checks,
-    end_checks,
-    progress_checks,
-    reversals,
-    seam_checks,
-    sharpest,
-    spline_checks,
-    spread_out,
-    within_path_pieces,
+    check_continuity,
+    check_ends,
+    check_progress,
+    check_seam,
+    check_splines,
 )
-from brachis.verify.limits import Given, limit_checks
+from brachis.verify.limits import Given, check_limits
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Pieces, States
+from brachis.verify.places import all_places
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 
@@ -89,59 +86,52 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    pieces, path = Pieces.of(trajectory), path_of(task_map, trajectory.task)
-    parts = (
-        spread_out(trajectory, pieces, options),
-        within_path_pieces(trajectory, pieces, path.breaks, options),
-        sharpest(pieces),
-        reversals(pieces, robot),
-    )
-    places = [np.concatenate(part) for part in zip(*parts, strict=True)]
-    check_instants(len(places[0]))
-    states = States.at(pieces, robot, *places)
-    path_check = _path_error(trajectory, path, task_map, states, options)
-    ratios = limit_checks(Given(robot, trajectory, pieces, states), own_limits, options)
+    pieces = Pieces.of(trajectory)
+    path = path_of(task_map, trajectory.task)
+    piece, u = all_places(trajectory, pieces, robot, path, options)
+    states = States.at(pieces, robot, piece, u)
+    path_check = _check_path(trajectory, path, task_map, states, options)
+    given = Given(robot, trajectory.task, pieces, states)
+    ratios = check_limits(given, own_limits, options)
     checks = [
         path_check,
         *ratios,
-        *progress_checks(trajectory, states.t, options),
-        *end_checks(trajectory, robot, task_map, path, options),
-        *spline_checks(trajectory, robot, states, options),
-        *continuity_checks(trajectory, pieces, robot, options),
-        *seam_checks(trajectory, pieces, robot, options),
+        *check_progress(trajectory, states.t, options),
+        *check_ends(trajectory, robot, task_map, path, options),
+        *check_splines(trajectory, robot, states, options),
+        *check_continuity(trajectory, pieces, robot, options),
+        *check_seam(trajectory, pieces, robot, options),
     ]
     worst = max((check.value for check in ratios), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)
 
 
-def _path_error(
+def _check_path(
     trajectory: Trajectory,
     path: Path,
     task_map: TaskMap,
     states: States,
     options: VerifyOptions,
 ) -> Check:
-    """Largest distance of the tool from the path at the saved s(t)."""
+    """Check the largest distance of the tool from the path at the saved s(t)."""
     once = np.append(np.diff(states.t) > 0.0, True)  # not both sides of a node
-    t, q = states.t[once], states.q[once]
-    targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
+    q = states.q[once]
+    targets = path.sample(np.clip(states.s[once], 0.0, 1.0)).target
+    placements = tool_placements(task_map.robot, q)
     of_joints = isinstance(task_map, JointSpace)
-    found = (
-        q if of_joints else task_map.of_placements(*tool_placements(task_map.robot, q))
-    )
+    found = q if of_joints else task_map.of_placements(*placements)
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = int(np.argmax(errors))
-    tolerance, remark = options.path_tolerance, ""
+    tolerance = options.path_tolerance
+    remark = ""
     if trajectory.recovered is not None:
         tolerance = max(tolerance, trajectory.recovered.tolerance)
         remark = "the path was recovered from the motion"
-    passed = bool(errors[worst] <= tolerance)
     return Check(
         "path error",
         float(errors[worst]),
         tolerance,
         "m, rad",
-        passed,
-        time=float(t[worst]),
+        time=float(states.t[once][worst]),
         remark=remark,
     )
