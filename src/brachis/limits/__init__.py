@@ -15,7 +15,7 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from brachis.limits.checks import build_user_limits
@@ -109,7 +109,13 @@ def limits_of(
     return tuple(limits)
 
 
+def describe_guarantees(limits: Iterable[Limit]) -> dict[str, str]:
+    """Say of each limit, by its name, where it holds."""
+    return {limit.name: limit.guarantee.value for limit in limits}
+
+
 __all__ = [
+    "JOINT_LIMITS",
     "TABLE",
     "Bound",
     "Guarantee",
@@ -123,5 +129,6 @@ __all__ = [
     "Partials",
     "PhasePlaneRows",
     "Role",
+    "describe_guarantees",
     "limits_of",
 ]

@@ -103,7 +103,7 @@ class JointLimit(Limit):
         return np.asarray(-self._middle * self._scale)
 
     @classmethod
-    def build(cls, robot: Robot, _task: Task) -> Self | None:
+    def build(cls, robot: Robot, _task: Task | None = None) -> Self | None:
         """Build the limit for the joints with a finite limit; None without such joints."""
         joints = np.flatnonzero(
             np.isfinite(robot.limits.both_ways(cls.kind)).any(axis=0)

@@ -83,6 +83,7 @@ def inspect(
         from brachis import ik
         from brachis.apps.cli.settings import task_space_of, urdf_of
         from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
+        from brachis.limits import JOINT_LIMITS, describe_guarantees, limits_of
         from brachis.problem.plausibility import of_robot
         from brachis.robot import bind
         from brachis.robot.from_task import in_use, robot_from_settings
@@ -111,6 +112,11 @@ def inspect(
         remarks.append(missing)
     if posture is not None:
         remarks.append(_tool_pose(robot, posture))
+    if task is None:
+        built = [kind.build(robot) for kind in JOINT_LIMITS.values()]
+        limits = [limit for limit in built if limit is not None]
+    else:
+        limits = limits_of(robot, task)
     data = {
         "robot": str(source),
         "tool_frame": robot.tool_frame,
@@ -120,6 +126,7 @@ def inspect(
         "remarks": remarks,
         "in_use": in_use(robot),
         "joints": _joint_rows(robot),
+        "guarantees": describe_guarantees(limits),
         "decompositions": [_decomposition(candidate) for candidate in candidates],
         "fits": [fit.to_dict() for fit in task.fits] if task else [],
     }
@@ -160,6 +167,8 @@ def _print_robot(
     )
     for name, text in data["in_use"].items():
         console.print(f"{name}: {text}")
+    for name, text in data["guarantees"].items():
+        console.print(f"{name} limit: {text}")
     if task is not None:
         _print_points(task)
     redundancy = data["degree_of_redundancy"]

@@ -11,9 +11,10 @@ from brachis.apps.bottleneck.saturation import saturations_of
 from brachis.apps.bottleneck.text import active_in_words
 from brachis.apps.plots.motion import dense_samples
 from brachis.errors import BrachisError
-from brachis.limits import Limit, Role
+from brachis.limits import Limit, Role, describe_guarantees, limits_of
 from brachis.optimise.candidate import Candidate
 from brachis.problem.plausibility import of_robot, of_task
+from brachis.robot import bind
 from brachis.robot.plausibility import Remark
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
@@ -43,6 +44,8 @@ class ReportedMotion:
         What the search did not complete.
     candidates : tuple of Attempt
         What the search looked at; none for a saved motion.
+    guarantees : dict of str to str
+        Where each limit holds, by its name.
     planned : dict of str to str
         How the motion was planned, where that is known.
     degrees : bool
@@ -58,6 +61,7 @@ class ReportedMotion:
     remarks: tuple[Remark, ...]
     not_completed: tuple[str, ...]
     candidates: tuple[Candidate, ...]
+    guarantees: dict[str, str]
     planned: dict[str, str]
     degrees: bool
 
@@ -66,7 +70,7 @@ def reported_motion(
     motion: PlannedMotion | Trajectory, *, degrees: bool = False
 ) -> ReportedMotion:
     """Gather what there is to say of a motion; a saved one is verified again."""
-    limits: list[Limit] | None = None
+    limits: list[Limit] = []
     not_completed: list[str] = []
     if isinstance(motion, Trajectory):
         trajectory = motion
@@ -91,6 +95,9 @@ def reported_motion(
                 "the search was ended early: a faster motion may have been missed"
             )
         not_completed += motion.not_completed
+    if not limits:
+        robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+        limits += limits_of(robot, trajectory.task)
     ratios = limit_ratios(trajectory, limits)
     saturations = saturations_of(ratios)
     return ReportedMotion(
@@ -103,6 +110,7 @@ def reported_motion(
         remarks=remarks,
         not_completed=tuple(not_completed),
         candidates=candidates,
+        guarantees=describe_guarantees(limits),
         planned=planned,
         degrees=degrees,
     )
