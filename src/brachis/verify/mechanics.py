@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.common.arrays import cross
+from brachis.common.arrays import cross, rates
 from brachis.robot import Robot
 from brachis.task import Placement
 
@@ -85,32 +85,16 @@ def torques(
 def torque_rates(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray
 ) -> np.ndarray:
-    """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s.
+    """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s."""
 
-    Differences of fourth order, over a step in which no joint goes far, nor changes its speed or acceleration much.
-    """
-    speeds = [
-        np.abs(part).max(axis=1) ** (1.0 / order)
-        for order, part in enumerate((qdot, qddot, qdddot), 1)
-    ]
-    step = 1e-3 / np.maximum(np.max(speeds, axis=0), 1.0)[:, None]  # in rad or m
+    def rigid(*states: np.ndarray) -> tuple[np.ndarray]:
+        return (_rigid(robot, *states[:3]),)
 
-    def rigid_at(t: np.ndarray) -> np.ndarray:
-        return _rigid(
-            robot,
-            q + t * qdot + t**2 / 2.0 * qddot + t**3 / 6.0 * qdddot,
-            qdot + t * qddot + t**2 / 2.0 * qdddot,
-            qddot + t * qdddot,
-        )
-
-    def change(h: np.ndarray) -> np.ndarray:
-        return (rigid_at(h) - rigid_at(-h)) / (2.0 * h)
-
+    (rate,) = rates(rigid, (q, qdot, qddot, qdddot))
     f = robot.friction
     widths = np.clip(qdot / f.v_eps, -300.0, 300.0)  # farther the slope is zero
     slope = f.viscous + f.coulomb / f.v_eps * np.cosh(widths) ** -2
-    friction = f.armature * qdddot + slope * qddot
-    return (4.0 * change(step) - change(2.0 * step)) / 3.0 + friction
+    return rate + f.armature * qdddot + slope * qddot
 
 
 def _rigid(

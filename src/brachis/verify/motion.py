@@ -1,8 +1,7 @@
 """The motion of a trajectory file, evaluated by polynomial piece and place in it.
 
 A piece of a microsecond is evaluated as exactly as any other. Roots of the polynomials, in Bernstein form, show where a
-motion turns, peaks or crosses a value. A polynomial whose Bernstein coefficients do not change their sign has no root,
-which decides nearly every case.
+motion turns, peaks or crosses a value.
 """
 
 from __future__ import annotations
@@ -44,58 +43,20 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u : (Z,) ndarray
         Root; ascending within a polynomial.
     """
+    from scipy.interpolate import BPoly, PPoly
+
+    # Coefficients that do not change their sign have no root, which decides nearly every case.
     changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
     kept = np.flatnonzero(changing)
-    c = coefficients[:, kept]
-    if len(c) == 2:
-        return kept, c[0] / (c[0] - c[1])
-    turning, at = roots(np.diff(c, axis=0))
-    every = np.arange(len(kept))
-    column = np.concatenate([every, turning, every])
-    u = np.concatenate([np.zeros(len(kept)), at, np.ones(len(kept))])
-    order = np.lexsort((u, column))
-    column = column[order]
-    u = u[order]
-    value = values_of(c[:, column], u)
-    same = column[1:] == column[:-1]
-    low = np.flatnonzero(same & (value[1:] * value[:-1] < 0.0))
-    high = low + 1
-    between = _root_between(
-        c[:, column[low]], (u[low], u[high]), (value[low], value[high])
-    )
-    exact = (value == 0.0) & (u > 0.0) & (u < 1.0)
-    column = np.concatenate([column[low], column[exact]])
-    u = np.concatenate([between, u[exact]])
-    order = np.lexsort((u, column))
-    return kept[column[order]], u[order]
-
-
-def _root_between(
-    c: np.ndarray,
-    ends: tuple[np.ndarray, np.ndarray],
-    values: tuple[np.ndarray, np.ndarray],
-) -> np.ndarray:
-    """Find the root between ends at which monotone polynomials have values of opposite sign (the Illinois method)."""
-    a, b = ends
-    at_a, at_b = values
-    rounding = 1e-14
-    enough = rounding * np.abs(c).max(axis=0, initial=0.0)
-    degree = len(c) - 1
-    powers = [math.comb(degree, k) * np.diff(c, n=k, axis=0)[0] for k in range(len(c))]
-    u = a
-    for _ in range(60 if len(a) else 0):
-        u = np.clip((a * at_b - b * at_a) / (at_b - at_a), a, b)
-        value = powers[-1]
-        for coefficient in powers[-2::-1]:
-            value = value * u + coefficient
-        if np.all((np.abs(value) <= enough) | (b - a <= rounding)):
-            break
-        is_left = value * at_a > 0.0  # of the root; the value that stays is halved
-        a = np.where(is_left, u, a)
-        b = np.where(is_left, b, u)
-        at_a = np.where(is_left, value, 0.5 * at_a)
-        at_b = np.where(is_left, 0.5 * at_b, value)
-    return u
+    if not len(kept):
+        return kept, np.empty(0)
+    side_by_side = BPoly(coefficients[:, kept], np.arange(len(kept) + 1.0))
+    polynomials = PPoly.from_bernstein_basis(side_by_side)
+    places = np.sort(polynomials.roots(discontinuity=False, extrapolate=False))
+    number = np.floor(places).astype(int)
+    u = places - number
+    inside = (u > 0.0) & (number < len(kept))
+    return kept[number[inside]], u[inside]
 
 
 def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
