@@ -152,42 +152,27 @@ def check_splines(
 def check_continuity(
     trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions
 ) -> list[Check]:
-    """Check jumps of position, velocity, acceleration and torque where polynomial pieces join."""
-    behind = np.arange(1, len(pieces.lengths))
-    before = States.at(pieces, robot, behind - 1, np.ones(len(behind)))
-    after = States.at(pieces, robot, behind, np.zeros(len(behind)))
-    return _check_jumps(before, after, " jump", trajectory.degree, options)
-
-
-def check_seam(
-    trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions
-) -> list[Check]:
-    """Check that a periodic motion goes on where it ends as it begins."""
-    if not trajectory.task.boundary.periodic:
-        return []
+    """Check jumps where polynomial pieces join, and where a periodic motion goes on from its end to its beginning."""
     last = len(pieces.lengths) - 1
-    before = States.at(pieces, robot, np.array([last]), np.ones(1))
-    after = States.at(pieces, robot, np.array([0]), np.zeros(1))
-    return _check_jumps(before, after, " over the seam", trajectory.degree, options)
-
-
-def _check_jumps(
-    before: States, after: States, what: str, degree: int, options: VerifyOptions
-) -> list[Check]:
-    """Compare the states on both sides of joints between pieces, relative to their size."""
+    ends = np.arange(last)
+    joins = {" jump": (ends, ends + 1)}
+    if trajectory.task.boundary.periodic:
+        joins[" over the seam"] = (np.array([last]), np.array([0]))
     names = {"position": "q", "velocity": "qdot"}
-    if degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
+    if trajectory.degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
         names |= {"acceleration": "qddot", "torque": "tau"}
     checks = []
-    for name, part in names.items():
-        left = getattr(before, part)
-        scale = 1.0 + np.abs(left).max(initial=0.0)
-        jumps = np.abs(getattr(after, part) - left).max(axis=1, initial=0.0) / scale
-        value = float(jumps.max(initial=0.0))
-        time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
-        checks.append(
-            Check(f"{name}{what}", value, options.jump_tolerance, "relative", time=time)
-        )
+    for what, (first, second) in joins.items():
+        before = States.at(pieces, robot, first, np.ones(len(first)))
+        after = States.at(pieces, robot, second, np.zeros(len(second)))
+        for name, part in names.items():
+            left = getattr(before, part)
+            scale = 1.0 + np.abs(left).max(initial=0.0)
+            jumps = np.abs(getattr(after, part) - left).max(axis=1, initial=0.0)
+            value = float(jumps.max(initial=0.0) / scale)
+            time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
+            allowed = options.jump_tolerance
+            checks.append(Check(f"{name}{what}", value, allowed, "relative", time=time))
     return checks
 
 

@@ -23,7 +23,10 @@ import numpy as np
 
 from brachis.common.arrays import cross, rates
 from brachis.robot import Robot
+from brachis.robot.urdf_bodies import Body
 from brachis.task import Placement
+
+_AXES = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +50,29 @@ class _Weight:
 def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n)."""
     tool = robot.stated.tool @ _matrix(robot.settings.tool_offset)
-    count = len(q)
-    z = np.array([0.0, 0.0, 1.0])
-    roll = q[:, -1] if robot.rolls_freely else np.zeros(count)
+    roll = q[:, -1] if robot.rolls_freely else np.zeros(len(q))
+    axes = [_rotate(_AXES[2], roll, axis[:, None] + 0.0 * roll) for axis in _AXES]
     # The tool's axes and its origin, (3, K) each, in the frame of one joint after the other.
-    vectors = [
-        tool[:3, :3] @ _rotate(z, roll, np.tile(axis[:, None], count))
-        for axis in np.eye(3)
-    ]
-    vectors.append(np.tile(tool[:3, 3:], count))
-    for joint, body in reversed(list(enumerate(robot.stated.bodies))):
+    vectors = [tool[:3, :3] @ axis for axis in axes]
+    vectors.append(np.tile(tool[:3, 3:], len(q)))
+    for body, position in reversed(list(zip(robot.stated.bodies, q.T, strict=False))):
         if body.sliding:
-            vectors[3] = vectors[3] + body.axis[:, None] * q[:, joint]
-        else:
-            vectors = [_rotate(body.axis, q[:, joint], part) for part in vectors]
-        vectors = [body.placement[:3, :3] @ part for part in vectors]
+            vectors[3] = vectors[3] + body.axis[:, None] * position
+        vectors = _to_parent(body, position, *vectors)
         vectors[3] = vectors[3] + body.placement[:3, 3, None]
     base = _matrix(robot.settings.mounting)
-    *axes, origin = (base[:3, :3] @ part for part in vectors)
-    rotations = np.moveaxis(np.stack(axes, axis=1), 2, 0)
+    *turned, origin = (base[:3, :3] @ part for part in vectors)
+    rotations = np.moveaxis(np.stack(turned, axis=1), 2, 0)
     return (origin + base[:3, 3, None]).T, rotations
+
+
+def _to_parent(
+    body: Body, position: np.ndarray, *vectors: np.ndarray
+) -> list[np.ndarray]:
+    """Return vectors (3, K) in a joint's frame in the frame of the joint before, at positions (K,)."""
+    if not body.sliding:
+        vectors = tuple(_rotate(body.axis, position, part) for part in vectors)
+    return [body.placement[:3, :3] @ part for part in vectors]
 
 
 def torques(
@@ -115,12 +121,8 @@ def _rigid(
         tau[:, joint] = body.axis @ (force if body.sliding else moment)
         if body.sliding:
             moment = moment + cross(body.axis[:, None] * q[:, joint], force)
-        else:
-            force = _rotate(body.axis, q[:, joint], force)
-            moment = _rotate(body.axis, q[:, joint], moment)
-        rotation = body.placement[:3, :3]
-        force = rotation @ force
-        moment = rotation @ moment + cross(body.placement[:3, 3, None], force)
+        force, moment = _to_parent(body, q[:, joint], force, moment)
+        moment = moment + cross(body.placement[:3, 3, None], force)
     return tau
 
 
@@ -183,8 +185,8 @@ def _matrix(placement: Placement) -> np.ndarray:
     """Placement as a (4, 4) matrix."""
     matrix = np.eye(4)
     angles = np.radians(placement.rpy_deg)  # about fixed axes: x, y, z
-    for axis, angle in zip(np.eye(3), angles, strict=True):
-        matrix[:3, :3] = _rotate(axis, np.full(3, angle), matrix[:3, :3])
+    for axis, angle in zip(_AXES, angles, strict=True):
+        matrix[:3, :3] = _rotate(axis, angle, matrix[:3, :3])
     matrix[:3, 3] = placement.xyz
     return matrix
 

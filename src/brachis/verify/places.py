@@ -54,18 +54,11 @@ def all_places(
 
 def _spread(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> Places:
     """Both ends of every piece and places between, no two of them further apart than a knot interval allows."""
-    times = trajectory.times
     knots = np.unique(trajectory.knots) * trajectory.t_end
-    after = np.searchsorted(times, knots)
-    distance = np.minimum(
-        np.abs(times[after.clip(max=len(times) - 1)] - knots),
-        np.abs(times[(after - 1).clip(min=0)] - knots),
-    )
-    same_time = 1e-12 * trajectory.t_end
-    edges = np.union1d(times, knots[distance > same_time])
+    edges = np.union1d(pieces.times, knots[(knots > 0.0) & (knots < pieces.times[-1])])
     first, _ = pieces.place(edges[:-1])
-    low = (edges[:-1] - times[first]) / pieces.lengths[first]
-    high = (edges[1:] - times[first]) / pieces.lengths[first]
+    low = (edges[:-1] - pieces.times[first]) / pieces.lengths[first]
+    high = (edges[1:] - pieces.times[first]) / pieces.lengths[first]
     middle = 0.5 * (edges[1:] + edges[:-1])
     interval = np.searchsorted(knots, middle).clip(1, len(knots) - 1)
     share = np.diff(edges) / np.diff(knots)[interval - 1]

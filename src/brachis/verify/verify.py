@@ -22,7 +22,6 @@ from brachis.verify.checks import (
     check_continuity,
     check_ends,
     check_progress,
-    check_seam,
     check_splines,
 )
 from brachis.verify.limits import Given, check_limits
@@ -100,7 +99,6 @@ def verify_trajectory(
         *check_ends(trajectory, robot, task_map, path, options),
         *check_splines(trajectory, robot, states, options),
         *check_continuity(trajectory, pieces, robot, options),
-        *check_seam(trajectory, pieces, robot, options),
     ]
     worst = max((check.value for check in ratios), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)
