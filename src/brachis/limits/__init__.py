@@ -109,13 +109,18 @@ def limits_of(
     return tuple(limits)
 
 
+def joint_limits_of(robot: Robot) -> tuple[Limit, ...]:
+    """List the limits of a robot without a task: those of its joints."""
+    built = [kind.build(robot) for kind in JOINT_LIMITS.values()]
+    return tuple(limit for limit in built if limit is not None)
+
+
 def describe_guarantees(limits: Iterable[Limit]) -> dict[str, str]:
     """Say of each limit, by its name, where it holds."""
     return {limit.name: limit.guarantee.value for limit in limits}
 
 
 __all__ = [
-    "JOINT_LIMITS",
     "TABLE",
     "Bound",
     "Guarantee",
@@ -130,5 +135,6 @@ __all__ = [
     "PhasePlaneRows",
     "Role",
     "describe_guarantees",
+    "joint_limits_of",
     "limits_of",
 ]

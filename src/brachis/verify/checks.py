@@ -53,34 +53,35 @@ def check_ends(
         ("start", 0.0, task.start, boundary.start_speed),
         ("end", trajectory.t_end, task.end, boundary.end_speed),
     )
+    derivatives = (
+        ("velocity", "velocity", options.rest_velocity_tolerance),
+        ("acceleration", "acceleration", options.rest_acceleration_tolerance),
+        ("jerk", "relative", options.rest_jerk_tolerance),
+    )
     checks = []
     for name, time, posture, speed in ends:
-        # What is to vanish: its values by joint, the allowed size, the unit.
-        misses: dict[str, tuple[np.ndarray, float, str]] = {}
         if posture != "free":
             given = robot.posture(posture.joints, f"{name}.joints")
             target = path.sample(np.array([time / trajectory.t_end])).target
             miss = trajectory.position(time) - _move_onto(given, task_map, target)
-            misses["posture"] = (miss, options.posture_tolerance, "position")
-        if not (boundary.periodic or speed):
-            velocity = trajectory.velocity(time)
-            allowed = options.rest_velocity_tolerance
-            misses["velocity"] = (velocity, allowed, "velocity")
-            if task.spline.vanishing > 1:
-                acceleration = trajectory.acceleration(time)
-                allowed = options.rest_acceleration_tolerance
-                misses["acceleration"] = (acceleration, allowed, "acceleration")
-            if task.spline.vanishing > 2:
-                largest = np.abs(trajectory.jerk(trajectory.times)).max()
-                jerk = trajectory.jerk(time) / (1.0 + largest)
-                misses["jerk"] = (jerk, options.rest_jerk_tolerance, "relative")
-        checks += [
-            _check_joints(f"{name} {what}", *miss, robot, time)
-            for what, miss in misses.items()
-        ]
-        if speed and not boundary.periodic:
+            allowed = options.posture_tolerance
+            checks.append(
+                _check_joints(f"{name} posture", miss, allowed, "position", robot, time)
+            )
+        if boundary.periodic:
+            continue
+        if speed:
             checks += _check_speed(
                 name, trajectory, task_map, path, speed, time, options
+            )
+            continue
+        for what, unit, allowed in derivatives[: max(task.spline.vanishing, 1)]:
+            derivative = getattr(trajectory, what)
+            miss = derivative(time)
+            if unit == "relative":
+                miss = miss / (1.0 + np.abs(derivative(trajectory.times)).max())
+            checks.append(
+                _check_joints(f"{name} {what}", miss, allowed, unit, robot, time)
             )
     return checks
 

@@ -6,7 +6,6 @@ motion turns, peaks or crosses a value.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 
@@ -18,14 +17,12 @@ from brachis.verify.mechanics import torques
 
 
 def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,)."""
-    degree = len(coefficients) - 1
-    factors = np.array([math.comb(degree, k) for k in range(degree + 1)], dtype=float)
-    up = np.ones((degree + 1, len(u)))
-    down = np.ones((degree + 1, len(u)))
-    np.cumprod(np.broadcast_to(u, (degree, len(u))), axis=0, out=up[1:])
-    np.cumprod(np.broadcast_to(1.0 - u, (degree, len(u))), axis=0, out=down[1:])
-    return np.einsum("k,kf,kf,kf...->f...", factors, up, down[::-1], coefficients)
+    """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,), by de Casteljau's algorithm."""
+    values = coefficients
+    u = u.reshape(-1, *[1] * (values.ndim - 2))
+    while len(values) > 1:
+        values = (1.0 - u) * values[:-1] + u * values[1:]
+    return np.asarray(values[0])
 
 
 def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -83,7 +83,7 @@ def inspect(
         from brachis import ik
         from brachis.apps.cli.settings import task_space_of, urdf_of
         from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
-        from brachis.limits import JOINT_LIMITS, describe_guarantees, limits_of
+        from brachis.limits import describe_guarantees, joint_limits_of, limits_of
         from brachis.problem.plausibility import of_robot
         from brachis.robot import bind
         from brachis.robot.from_task import in_use, robot_from_settings
@@ -112,11 +112,7 @@ def inspect(
         remarks.append(missing)
     if posture is not None:
         remarks.append(_tool_pose(robot, posture))
-    if task is None:
-        built = [kind.build(robot) for kind in JOINT_LIMITS.values()]
-        limits = [limit for limit in built if limit is not None]
-    else:
-        limits = limits_of(robot, task)
+    limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     data = {
         "robot": str(source),
         "tool_frame": robot.tool_frame,

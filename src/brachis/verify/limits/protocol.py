@@ -40,12 +40,9 @@ class Given:
 
     def within(self, begin: float, end: float) -> Given:
         """Return the same with only the states in a part of the path, its ends included."""
-        ends = np.array([begin, end])
-        more = self.with_states_at(ends)
-        first, last = self.pieces.times_of(ends)
-        slack = 1e-9 * self.pieces.times[-1]
-        t = more.states.t
-        inside = (t >= first - slack) & (t <= last + slack)
+        more = self.with_states_at(np.array([begin, end]))
+        s = more.states.s
+        inside = (s >= begin - 1e-9) & (s <= end + 1e-9)
         return replace(more, states=more.states.only(inside))
 
 
@@ -111,7 +108,7 @@ def worst_between(
         new = States.at(given.pieces, given.robot, states.piece[steps], middle)
         states, order = states.merge(new)
         ratio = np.concatenate([ratio, ratio_at(new)])[order]
-    k, column = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+    k, column = map(int, np.unravel_index(int(np.argmax(ratio)), ratio.shape))
     return Worst(float(ratio[k, column]), subjects[column], float(states.t[k]))
 
 

@@ -50,6 +50,10 @@ def _worst_motion(key: str, vector: str, given: Given) -> Worst | None:
     return worst_between(given, ratios, ("tool",))
 
 
+_SAME_S = 1e-12
+"""Path coordinates that are nearer to each other are the same."""
+
+
 def _worst_speed(given: Given) -> Worst | None:
     """Find the largest ratio of the tool's speed, at the states and between them; also at the places of tables."""
     limits = given.task.tool_limits
@@ -76,20 +80,12 @@ def _worst_speed(given: Given) -> Worst | None:
     return worst_between(given.with_states_at(places), ratios, ("tool",))
 
 
-_SAME_S = 1e-12
-"""Path coordinates that are nearer to each other are the same."""
-
-
 def _speed_limit(table: SpeedTable, s: np.ndarray) -> np.ndarray:
     """Largest speeds, (K,), at path coordinates s, (K,); of both sides of a step the lower one."""
-    places = np.array(table.s)
-    speeds = np.array(table.speed)
-    limit = np.interp(s, places, speeds)  # which takes one side of a step
-    for step in np.flatnonzero(np.diff(places) == 0.0).tolist():
-        at_step = np.abs(s - places[step]) <= _SAME_S
-        lower = np.minimum(limit, speeds[step : step + 2].min())
-        limit = np.where(at_step, lower, limit)
-    return np.asarray(limit)
+    before, behind = (
+        np.interp(s + step, table.s, table.speed) for step in (-_SAME_S, _SAME_S)
+    )
+    return np.minimum(before, behind)
 
 
 def _worst_process_speed(side: float, given: Given) -> Worst | None:
