@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -178,6 +179,11 @@ class Partials:
     qddot: np.ndarray | None = None
     qdddot: np.ndarray | None = None
     s: np.ndarray | None = None
+
+    def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
+        """Return the partials by q and its derivatives, changed."""
+        parts = (self.q, self.qdot, self.qddot, self.qdddot)
+        return Partials(*(None if part is None else change(part) for part in parts))
 
 
 @dataclass(frozen=True)
