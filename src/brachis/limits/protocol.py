@@ -51,7 +51,7 @@ class JointStates(Protocol):
     q, qdot, qddot, qdddot : (K, n) ndarray
         rad or m, and per second.
     s : (K,) ndarray
-        Path coordinate; NaN where there is no path, or its place is not known.
+        Path coordinate; NaN without a path, or if it is not known.
     """
 
     @property
@@ -116,7 +116,7 @@ class Label:
     unit : str
         Of the limit that the user gives.
     key : str
-        Key of the task that sets it; empty where there is none.
+        Key of the task that sets it; empty without one.
     active_text, slack_text : str
         Text for "the limit is active", and for the slack that a wider bound provides. If empty, both are made of
         subject and kind.

@@ -14,7 +14,7 @@ from brachis.errors import InputError, LimitError, UnknownNameError
 from brachis.task import FROM_URDF, LIMIT_KINDS, LimitScale, LimitSpec
 
 Curve = tuple[tuple[float, float], ...]
-"""Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty where there is no curve."""
+"""Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
 
 LEAST = 1e-6
 LARGEST = 1e12

@@ -4,50 +4,45 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.path import Path
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import UNITS
-from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
-from brachis.verify.motion import Pieces, States
-from brachis.verify.report import Check, VerifyOptions
+from brachis.trajectory import CONTINUOUS_TORQUE
+from brachis.verify.motion import Given, States
+from brachis.verify.report import Check
 
 _WRITTEN = 1e-6
 """Rounding of postures in tasks, m or rad, which are written with so many digits."""
 
 
-def check_progress(
-    trajectory: Trajectory, t: np.ndarray, options: VerifyOptions
-) -> list[Check]:
+def check_progress(given: Given) -> list[Check]:
     """Check that the path is travelled once, forwards, from its beginning to its end.
 
-    ds/dt is checked at the times t, (K,), at knots, and where its derivative vanishes.
+    ds/dt is checked at the times of the states, at knots, and where its derivative vanishes.
     """
     from scipy.interpolate import PPoly
 
-    spline = trajectory.path_spline
-    allowed = options.progress_tolerance
+    spline = given.trajectory.path_spline
+    allowed = given.options.progress_tolerance
     curvature = PPoly.from_spline(spline.derivative(2).tck)
     turning = curvature.roots(discontinuity=True, extrapolate=False)
-    times = np.concatenate([t, np.unique(spline.t), turning[np.isfinite(turning)]])
+    times = np.concatenate(
+        [given.states.t, np.unique(spline.t), turning[np.isfinite(turning)]]
+    )
     velocity = spline(times, nu=1)
     backwards = float(np.maximum(0.0, -velocity).max())
     time = float(times[int(np.argmin(velocity))]) if backwards else None
-    ends = float(np.abs([spline(0.0), spline(trajectory.t_end) - 1.0]).max())
+    ends = float(np.abs([spline(0.0), spline(given.trajectory.t_end) - 1.0]).max())
     return [
         Check("ds/dt below zero", backwards, allowed, "1/s", time=time),
         Check("s at the ends", ends, allowed, "-"),
     ]
 
 
-def check_ends(
-    trajectory: Trajectory,
-    robot: Robot,
-    task_map: TaskMap,
-    path: Path,
-    options: VerifyOptions,
-) -> list[Check]:
+def check_ends(given: Given) -> list[Check]:
     """Check that the motion begins and ends as the task says."""
-    task = trajectory.task
+    trajectory = given.trajectory
+    options = given.options
+    task = given.task
     boundary = task.boundary
     ends = (
         ("start", 0.0, task.start, boundary.start_speed),
@@ -61,19 +56,20 @@ def check_ends(
     checks = []
     for name, time, posture, speed in ends:
         if posture != "free":
-            given = robot.posture(posture.joints, f"{name}.joints")
-            target = path.sample(np.array([time / trajectory.t_end])).target
-            miss = trajectory.position(time) - _move_onto(given, task_map, target)
+            wanted = given.robot.posture(posture.joints, f"{name}.joints")
+            target = given.path.sample(np.array([time / trajectory.t_end])).target
+            nearest = _move_onto(wanted, given.task_map, target)
+            miss = trajectory.position(time) - nearest
             allowed = options.posture_tolerance
             checks.append(
-                _check_joints(f"{name} posture", miss, allowed, "position", robot, time)
+                _check_joints(
+                    f"{name} posture", miss, allowed, "position", given.robot, time
+                )
             )
         if boundary.periodic:
             continue
         if speed:
-            checks += _check_speed(
-                name, trajectory, task_map, path, speed, time, options
-            )
+            checks += _check_speed(given, name, speed, time)
             continue
         for what, unit, allowed in derivatives[: max(task.spline.vanishing, 1)]:
             derivative = getattr(trajectory, what)
@@ -81,28 +77,22 @@ def check_ends(
             if unit == "relative":
                 miss = miss / (1.0 + np.abs(derivative(trajectory.times)).max())
             checks.append(
-                _check_joints(f"{name} {what}", miss, allowed, unit, robot, time)
+                _check_joints(f"{name} {what}", miss, allowed, unit, given.robot, time)
             )
     return checks
 
 
-def _check_speed(
-    name: str,
-    trajectory: Trajectory,
-    task_map: TaskMap,
-    path: Path,
-    wanted: float,
-    time: float,
-    options: VerifyOptions,
-) -> list[Check]:
+def _check_speed(given: Given, name: str, wanted: float, time: float) -> list[Check]:
     """Check that an end is passed at the speed that the task asks for; with full rest it is constant there."""
+    trajectory = given.trajectory
+    task_map = given.task_map
     jacobian = task_map.jacobian(task_map.twists(trajectory.position(time)[None]))[0]
     position, angle = task_map.norms(jacobian @ trajectory.velocity(time))
-    per_s, _ = task_map.norms(path.sample(trajectory.path_spline([time])).xi)
+    per_s, _ = task_map.norms(given.path.sample(trajectory.path_spline([time])).xi)
     moves = float(per_s[0]) > _WRITTEN
     unit = "m/s" if moves else "rad/s"
     off = abs(float(position if moves else angle) - wanted)
-    allowed = options.rest_velocity_tolerance * (1.0 + wanted)
+    allowed = given.options.rest_velocity_tolerance * (1.0 + wanted)
     checks = [Check(f"{name} speed", off, allowed, unit, time=time)]
     if trajectory.task.spline.vanishing > 1:
         rate = abs(float(trajectory.path_spline(time, nu=1)))
@@ -111,7 +101,7 @@ def _check_speed(
             Check(
                 f"{name} acceleration along the path",
                 wanted * bend / rate if rate else np.inf,
-                options.rest_acceleration_tolerance,
+                given.options.rest_acceleration_tolerance,
                 f"{unit}^2",
                 time=time,
             )
@@ -128,10 +118,11 @@ def _move_onto(given: np.ndarray, task_map: TaskMap, target: np.ndarray) -> np.n
     return np.asarray(given + np.linalg.lstsq(jacobian, miss, rcond=None)[0])
 
 
-def check_splines(
-    trajectory: Trajectory, robot: Robot, states: States, options: VerifyOptions
-) -> list[Check]:
+def check_splines(given: Given) -> list[Check]:
     """Check that the splines of the redundant joints are their motion."""
+    trajectory = given.trajectory
+    robot = given.robot
+    states = given.states
     if not trajectory.redundant_joints:
         return []
     joints = [robot.joint_names.index(name) for name in trajectory.redundant_joints]
@@ -142,7 +133,7 @@ def check_splines(
         _check_joints(
             "redundant joints' splines",
             misses[worst],
-            options.spline_tolerance,
+            given.options.spline_tolerance,
             "position",
             robot,
             float(states.t[worst]),
@@ -150,29 +141,28 @@ def check_splines(
     ]
 
 
-def check_continuity(
-    trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions
-) -> list[Check]:
+def check_continuity(given: Given) -> list[Check]:
     """Check jumps where polynomial pieces join, and where a periodic motion goes on from its end to its beginning."""
+    pieces = given.pieces
     last = len(pieces.lengths) - 1
     ends = np.arange(last)
     joins = {" jump": (ends, ends + 1)}
-    if trajectory.task.boundary.periodic:
+    if given.task.boundary.periodic:
         joins[" over the seam"] = (np.array([last]), np.array([0]))
     names = {"position": "q", "velocity": "qdot"}
-    if trajectory.degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
+    if given.trajectory.degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
         names |= {"acceleration": "qddot", "torque": "tau"}
     checks = []
     for what, (first, second) in joins.items():
-        before = States.at(pieces, robot, first, np.ones(len(first)))
-        after = States.at(pieces, robot, second, np.zeros(len(second)))
+        before = States.at(pieces, first, np.ones(len(first)))
+        after = States.at(pieces, second, np.zeros(len(second)))
         for name, part in names.items():
             left = getattr(before, part)
             scale = 1.0 + np.abs(left).max(initial=0.0)
             jumps = np.abs(getattr(after, part) - left).max(axis=1, initial=0.0)
             value = float(jumps.max(initial=0.0) / scale)
             time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
-            allowed = options.jump_tolerance
+            allowed = given.options.jump_tolerance
             checks.append(Check(f"{name}{what}", value, allowed, "relative", time=time))
     return checks
 

@@ -7,13 +7,16 @@ motion turns, peaks or crosses a value.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from brachis.robot import Robot
+from brachis.path import Path
+from brachis.robot import Robot, TaskMap
+from brachis.task import Task
 from brachis.trajectory import Trajectory
 from brachis.verify.mechanics import torques
+from brachis.verify.report import VerifyOptions
 
 
 def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -91,6 +94,7 @@ class Pieces:
     jerk : (3, L, n) ndarray
     path_coordinate : callable
         ``path_coordinate(t)`` returns s, (K,), at times t, (K,), s.
+    robot : Robot
     """
 
     times: np.ndarray
@@ -101,10 +105,11 @@ class Pieces:
     acceleration: np.ndarray
     jerk: np.ndarray
     path_coordinate: Callable[[np.ndarray], np.ndarray]
+    robot: Robot
 
     @classmethod
-    def of(cls, trajectory: Trajectory) -> Pieces:
-        """Take the pieces of a trajectory."""
+    def of(cls, trajectory: Trajectory, robot: Robot) -> Pieces:
+        """Take the pieces of a trajectory of a robot."""
         position = trajectory.pieces.c
         lengths = np.diff(trajectory.times)
         velocity = 5.0 * np.diff(position, axis=0) / lengths[:, None]
@@ -118,6 +123,7 @@ class Pieces:
             acceleration,
             trajectory.jerk_pieces.c,
             trajectory.path_spline,
+            robot,
         )
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -165,9 +171,7 @@ class States:
     tau: np.ndarray
 
     @classmethod
-    def at(
-        cls, pieces: Pieces, robot: Robot, piece: np.ndarray, u: np.ndarray
-    ) -> States:
+    def at(cls, pieces: Pieces, piece: np.ndarray, u: np.ndarray) -> States:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
         piece = piece[order]
@@ -183,7 +187,7 @@ class States:
             values_of(coefficients[:, piece], u)
             for coefficients in (pieces.velocity, pieces.acceleration, pieces.jerk)
         )
-        tau = torques(robot, q, qdot, qddot)
+        tau = torques(pieces.robot, q, qdot, qddot)
         s = pieces.path_coordinate(t)
         return cls(piece, u, t, s, q, qdot, qddot, qdddot, tau)
 
@@ -201,3 +205,47 @@ class States:
         both = States(*(np.concatenate(pair) for pair in pairs))
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What is verified, and against what.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    robot : Robot
+    task_map : TaskMap
+    path : Path
+    pieces : Pieces
+    states : States
+        The motion at all times at which it is checked.
+    options : VerifyOptions
+    """
+
+    trajectory: Trajectory
+    robot: Robot
+    task_map: TaskMap
+    path: Path
+    pieces: Pieces
+    states: States
+    options: VerifyOptions
+
+    @property
+    def task(self) -> Task:
+        """Task of the trajectory."""
+        return self.trajectory.task
+
+    def with_states_at(self, s: np.ndarray) -> Given:
+        """Return the same, with the states at further path coordinates, (P,)."""
+        places = self.pieces.place(self.pieces.times_of(s))
+        both, _ = self.states.merge(States.at(self.pieces, *places))
+        apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > SAME_PLACE)
+        return replace(self, states=both.only(np.append(True, apart)))
+
+    def within(self, begin: float, end: float) -> Given:
+        """Return the same with only the states in a part of the path, its ends included."""
+        more = self.with_states_at(np.array([begin, end]))
+        s = more.states.s
+        inside = (s >= begin - 1e-9) & (s <= end + 1e-9)
+        return replace(more, states=more.states.only(inside))

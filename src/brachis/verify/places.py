@@ -11,7 +11,6 @@ import numpy as np
 
 from brachis.errors import InputError
 from brachis.path import Path
-from brachis.robot import Robot
 from brachis.trajectory import Trajectory
 from brachis.verify.motion import Pieces, roots, turns
 from brachis.verify.report import VerifyOptions
@@ -28,11 +27,7 @@ Places = tuple[np.ndarray, np.ndarray]
 
 
 def all_places(
-    trajectory: Trajectory,
-    pieces: Pieces,
-    robot: Robot,
-    path: Path,
-    options: VerifyOptions,
+    trajectory: Trajectory, pieces: Pieces, path: Path, options: VerifyOptions
 ) -> Places:
     """List all places at which a motion is checked, in any order.
 
@@ -45,7 +40,7 @@ def all_places(
         _spread(trajectory, pieces, options),
         _within_path_pieces(pieces, path.breaks, options),
         _peaks(pieces),
-        _reversals(pieces, robot),
+        _reversals(pieces),
     )
     piece, u = (np.concatenate(part) for part in zip(*parts, strict=True))
     _check_count(len(piece))
@@ -110,14 +105,15 @@ def _peaks(pieces: Pieces) -> Places:
     return piece[turning], u
 
 
-def _reversals(pieces: Pieces, robot: Robot) -> Places:
+def _reversals(pieces: Pieces) -> Places:
     """Find where joints with Coulomb friction cross multiples of its width, or turn near zero velocity."""
     # Between these speeds, in widths, friction rises from 29 % to all but 2e-6 of its torque.
     speeds = np.array([0.3, 1.0, 2.0, 3.0, 4.5, 7.0])
     levels = np.concatenate([-speeds[::-1], [0.0], speeds])
     near = 10.0  # widths; a turn at a lower speed is nearly a reversal
-    rubbing = np.flatnonzero(robot.friction.coulomb > 0.0)
-    velocity = pieces.velocity[:, :, rubbing] / robot.friction.v_eps[rubbing]
+    friction = pieces.robot.friction
+    rubbing = np.flatnonzero(friction.coulomb > 0.0)
+    velocity = pieces.velocity[:, :, rubbing] / friction.v_eps[rubbing]
     least = velocity.min(axis=0)
     most = velocity.max(axis=0)
     # A joint that stands still crosses zero only by rounding.

@@ -13,20 +13,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.path import Path, path_of
-from brachis.robot import Robot, TaskMap, bind
+from brachis.path import path_of
+from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace
-from brachis.trajectory import Motion, Trajectory, motion_of
+from brachis.trajectory import Motion, motion_of
 from brachis.verify.checks import (
     check_continuity,
     check_ends,
     check_progress,
     check_splines,
 )
-from brachis.verify.limits import Given, check_limits
+from brachis.verify.limits import check_limits
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Pieces, States
+from brachis.verify.motion import Given, Pieces, States
 from brachis.verify.places import all_places
 from brachis.verify.report import Check, Verification, VerifyOptions
 
@@ -85,51 +85,42 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    pieces = Pieces.of(trajectory)
+    pieces = Pieces.of(trajectory, robot)
     path = path_of(task_map, trajectory.task)
-    piece, u = all_places(trajectory, pieces, robot, path, options)
-    states = States.at(pieces, robot, piece, u)
-    path_check = _check_path(trajectory, path, task_map, states, options)
-    given = Given(robot, trajectory.task, pieces, states)
-    ratios = check_limits(given, own_limits, options)
+    places = all_places(trajectory, pieces, path, options)
+    states = States.at(pieces, *places)
+    given = Given(trajectory, robot, task_map, path, pieces, states, options)
+    path_check = _check_path(given)
+    ratios = check_limits(given, own_limits)
     checks = [
         path_check,
         *ratios,
-        *check_progress(trajectory, states.t, options),
-        *check_ends(trajectory, robot, task_map, path, options),
-        *check_splines(trajectory, robot, states, options),
-        *check_continuity(trajectory, pieces, robot, options),
+        *check_progress(given),
+        *check_ends(given),
+        *check_splines(given),
+        *check_continuity(given),
     ]
     worst = max((check.value for check in ratios), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)
 
 
-def _check_path(
-    trajectory: Trajectory,
-    path: Path,
-    task_map: TaskMap,
-    states: States,
-    options: VerifyOptions,
-) -> Check:
+def _check_path(given: Given) -> Check:
     """Check the largest distance of the tool from the path at the saved s(t)."""
-    once = np.append(np.diff(states.t) > 0.0, True)  # not both sides of a node
-    q = states.q[once]
-    targets = path.sample(np.clip(states.s[once], 0.0, 1.0)).target
-    placements = tool_placements(task_map.robot, q)
+    once = np.append(np.diff(given.states.t) > 0.0, True)  # not both sides of a node
+    states = given.states.only(once)
+    task_map = given.task_map
+    targets = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
+    placements = tool_placements(task_map.robot, states.q)
     of_joints = isinstance(task_map, JointSpace)
-    found = q if of_joints else task_map.of_placements(*placements)
+    found = states.q if of_joints else task_map.of_placements(*placements)
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = int(np.argmax(errors))
-    tolerance = options.path_tolerance
+    tolerance = given.options.path_tolerance
     remark = ""
-    if trajectory.recovered is not None:
-        tolerance = max(tolerance, trajectory.recovered.tolerance)
+    recovered = given.trajectory.recovered
+    if recovered is not None:
+        tolerance = max(tolerance, recovered.tolerance)
         remark = "the path was recovered from the motion"
-    return Check(
-        "path error",
-        float(errors[worst]),
-        tolerance,
-        "m, rad",
-        time=float(states.t[once][worst]),
-        remark=remark,
-    )
+    error = float(errors[worst])
+    time = float(states.t[worst])
+    return Check("path error", error, tolerance, "m, rad", time=time, remark=remark)

@@ -18,10 +18,10 @@ from brachis.verify.limits.joint import (
     worst_torque_at_speed,
     worst_total_power,
 )
-from brachis.verify.limits.protocol import Given, LimitCheck, Worst, worst_between
+from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.limits.tool import TOOL_CHECKS
-from brachis.verify.motion import States
-from brachis.verify.report import Check, VerifyOptions
+from brachis.verify.motion import Given, States
+from brachis.verify.report import Check
 
 _BEHIND: dict[str, dict[str, LimitCheck]] = {
     "position": TOOL_CHECKS,
@@ -37,14 +37,12 @@ for _kind in LIMIT_KINDS:
     TABLE |= _BEHIND.get(_kind, {})
 
 
-def check_limits(
-    given: Given, user_limits: Sequence[LimitModel], options: VerifyOptions
-) -> list[Check]:
+def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]:
     """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the user's."""
     found = [(kind.replace("_", " "), find(given)) for kind, find in TABLE.items()]
     models = (*custom_limits(given.task), *user_limits)
     found += [_check_model(model, given) for model in models]
-    allowed = 1.0 + options.ratio_tolerance
+    allowed = 1.0 + given.options.ratio_tolerance
     return [
         Check(
             f"{name} ratio",
@@ -105,4 +103,4 @@ def _check_values(limit: Any, given: Given, subjects: Sequence[str]) -> Worst:
     return worst._replace(remark="checked by its own formula")
 
 
-__all__ = ["TABLE", "Given", "check_limits"]
+__all__ = ["TABLE", "check_limits"]

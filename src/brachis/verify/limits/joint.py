@@ -11,15 +11,9 @@ from functools import partial
 import numpy as np
 
 from brachis.robot import Robot
-from brachis.verify.limits.protocol import (
-    Given,
-    LimitCheck,
-    Worst,
-    largest,
-    worst_between,
-)
+from brachis.verify.limits.protocol import LimitCheck, Worst, largest, worst_between
 from brachis.verify.mechanics import torque_rates
-from brachis.verify.motion import States
+from brachis.verify.motion import Given, States
 
 
 def _worst_derivative(kind: str, given: Given) -> Worst | None:
@@ -88,7 +82,7 @@ def _worst_rms_torque(given: Given) -> Worst | None:
         return None
     steps = np.flatnonzero((np.diff(states.piece) == 0) & (np.diff(states.u) > 1e-8))
     middle = 0.5 * (states.u[steps] + states.u[steps + 1])
-    between = States.at(given.pieces, given.robot, states.piece[steps], middle)
+    between = States.at(given.pieces, states.piece[steps], middle)
     lengths = states.t[steps + 1] - states.t[steps]
     ends = states.tau[steps] ** 2 + states.tau[steps + 1] ** 2
     mean = lengths @ ((ends + 4.0 * between.tau**2) / 6.0) / lengths.sum()

@@ -3,47 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from brachis.robot import Robot
-from brachis.task import Task
-from brachis.verify.motion import SAME_PLACE, Pieces, States, turns
-
-
-@dataclass(frozen=True, eq=False)
-class Given:
-    """What is checked.
-
-    Attributes
-    ----------
-    robot : Robot
-    task : Task
-    pieces : Pieces
-    states : States
-        The motion at all times at which it is checked.
-    """
-
-    robot: Robot
-    task: Task
-    pieces: Pieces
-    states: States
-
-    def with_states_at(self, s: np.ndarray) -> Given:
-        """Return the same, with the states at further path coordinates, (P,)."""
-        places = self.pieces.place(self.pieces.times_of(s))
-        both, _ = self.states.merge(States.at(self.pieces, self.robot, *places))
-        apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > SAME_PLACE)
-        return replace(self, states=both.only(np.append(True, apart)))
-
-    def within(self, begin: float, end: float) -> Given:
-        """Return the same with only the states in a part of the path, its ends included."""
-        more = self.with_states_at(np.array([begin, end]))
-        s = more.states.s
-        inside = (s >= begin - 1e-9) & (s <= end + 1e-9)
-        return replace(more, states=more.states.only(inside))
+from brachis.verify.motion import Given, States, turns
 
 
 class Worst(NamedTuple):
@@ -105,7 +69,7 @@ def worst_between(
             time = float(states.t[steps[k]])
             return Worst(float(most[k]), subjects[column], time, remark)
         middle = 0.5 * (states.u[steps] + states.u[steps + 1])
-        new = States.at(given.pieces, given.robot, states.piece[steps], middle)
+        new = States.at(given.pieces, states.piece[steps], middle)
         states, order = states.merge(new)
         ratio = np.concatenate([ratio, ratio_at(new)])[order]
     k, column = map(int, np.unravel_index(int(np.argmax(ratio)), ratio.shape))

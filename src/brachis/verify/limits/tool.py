@@ -9,8 +9,8 @@ import pinocchio as pin
 
 from brachis.robot import ROLL_JOINT, Robot
 from brachis.task import ProcessSpeed, SpeedTable
-from brachis.verify.limits.protocol import Given, LimitCheck, Worst, worst_between
-from brachis.verify.motion import States
+from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
+from brachis.verify.motion import Given, States
 
 
 def _frame_motion(robot: Robot, states: States, vector: str) -> np.ndarray:
