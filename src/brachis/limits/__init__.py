@@ -28,6 +28,7 @@ from brachis.limits.process_speed import (
 )
 from brachis.limits.protocol import (
     Bound,
+    Description,
     Guarantee,
     HasLatticeWeights,
     HasPhasePlaneRows,
@@ -123,6 +124,7 @@ def describe_guarantees(limits: Iterable[Limit]) -> dict[str, str]:
 __all__ = [
     "TABLE",
     "Bound",
+    "Description",
     "Guarantee",
     "HasLatticeWeights",
     "HasPhasePlaneRows",

@@ -44,7 +44,7 @@ class Guarantee(Enum):
 
 
 class JointStates(Protocol):
-    """Joint motion at K moments; states of the optimiser and samples of a trajectory are such.
+    """Joint motion at K moments; for example states of the optimiser or samples of a trajectory.
 
     Attributes
     ----------
@@ -94,13 +94,13 @@ class Role(Enum):
     """Whose limit it is."""
 
     ROBOT = "robot"
-    """Of its drives and joints."""
+    """A limit of drives and joints."""
     PROCESS = "process"
-    """Of what the tool does."""
+    """A limit of what the tool does."""
     SCENE = "scene"
-    """Of what stands around."""
+    """A limit of what stands around the robot."""
     SAFEGUARD = "safeguard"
-    """Guards the computation alone: falling short of it harms nobody, and the verification does not know it."""
+    """Numerical, not physical: small violations are ignored, and the verification does not check it."""
 
 
 @dataclass(frozen=True)
