@@ -7,7 +7,7 @@ import numpy as np
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import UNITS
 from brachis.trajectory import CONTINUOUS_TORQUE
-from brachis.verify.motion import Given, States
+from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
 
 _WRITTEN = 1e-6
@@ -154,8 +154,8 @@ def check_continuity(given: Given) -> list[Check]:
         names |= {"acceleration": "qddot", "torque": "tau"}
     checks = []
     for what, (first, second) in joins.items():
-        before = States.at(pieces, first, np.ones(len(first)))
-        after = States.at(pieces, second, np.zeros(len(second)))
+        before = MotionStates.at(pieces, first, np.ones(len(first)))
+        after = MotionStates.at(pieces, second, np.zeros(len(second)))
         for name, part in names.items():
             left = getattr(before, part)
             scale = 1.0 + np.abs(left).max(initial=0.0)

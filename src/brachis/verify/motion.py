@@ -149,7 +149,7 @@ class Pieces:
 
 
 @dataclass(frozen=True, eq=False)
-class States:
+class MotionStates:
     """The motion at K places, ascending in time; where pieces join, both sides.
 
     Attributes
@@ -171,7 +171,7 @@ class States:
     tau: np.ndarray
 
     @classmethod
-    def at(cls, pieces: Pieces, piece: np.ndarray, u: np.ndarray) -> States:
+    def at(cls, pieces: Pieces, piece: np.ndarray, u: np.ndarray) -> MotionStates:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
         piece = piece[order]
@@ -195,14 +195,16 @@ class States:
         """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
         return self.tau
 
-    def only(self, chosen: np.ndarray | slice) -> States:
+    def only(self, chosen: np.ndarray | slice) -> MotionStates:
         """Return some of the states, in the order that is chosen."""
-        return States(*(getattr(self, field.name)[chosen] for field in fields(self)))
+        return MotionStates(
+            *(getattr(self, field.name)[chosen] for field in fields(self))
+        )
 
-    def merge(self, other: States) -> tuple[States, np.ndarray]:
+    def merge(self, other: MotionStates) -> tuple[MotionStates, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        both = States(*(np.concatenate(pair) for pair in pairs))
+        both = MotionStates(*(np.concatenate(pair) for pair in pairs))
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order
 
@@ -218,7 +220,7 @@ class Given:
     task_map : TaskMap
     path : Path
     pieces : Pieces
-    states : States
+    states : MotionStates
         The motion at all times at which it is checked.
     options : VerifyOptions
     """
@@ -228,7 +230,7 @@ class Given:
     task_map: TaskMap
     path: Path
     pieces: Pieces
-    states: States
+    states: MotionStates
     options: VerifyOptions
 
     @property
@@ -239,7 +241,7 @@ class Given:
     def with_states_at(self, s: np.ndarray) -> Given:
         """Return the same, with the states at further path coordinates, (P,)."""
         places = self.pieces.place(self.pieces.times_of(s))
-        both, _ = self.states.merge(States.at(self.pieces, *places))
+        both, _ = self.states.merge(MotionStates.at(self.pieces, *places))
         apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > SAME_PLACE)
         return replace(self, states=both.only(np.append(True, apart)))
 

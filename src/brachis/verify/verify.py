@@ -26,7 +26,7 @@ from brachis.verify.checks import (
 )
 from brachis.verify.limits import check_limits
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Given, Pieces, States
+from brachis.verify.motion import Given, MotionStates, Pieces
 from brachis.verify.places import all_places
 from brachis.verify.report import Check, Verification, VerifyOptions
 
@@ -88,7 +88,7 @@ def verify_trajectory(
     pieces = Pieces.of(trajectory, robot)
     path = path_of(task_map, trajectory.task)
     places = all_places(trajectory, pieces, path, options)
-    states = States.at(pieces, *places)
+    states = MotionStates.at(pieces, *places)
     given = Given(trajectory, robot, task_map, path, pieces, states, options)
     path_check = _check_path(given)
     ratios = check_limits(given, own_limits)

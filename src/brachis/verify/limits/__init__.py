@@ -20,7 +20,7 @@ from brachis.verify.limits.joint import (
 )
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.limits.tool import TOOL_CHECKS
-from brachis.verify.motion import Given, States
+from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
 
 _BEHIND: dict[str, dict[str, LimitCheck]] = {
@@ -71,7 +71,7 @@ def _check_model(model: LimitModel, given: Given) -> tuple[str, Worst]:
     if formula is None:
         return limit.name, _check_values(limit, given, subjects)
 
-    def ratios(states: States) -> np.ndarray:
+    def ratios(states: MotionStates) -> np.ndarray:
         motion = (states.q, states.qdot, states.qddot, states.tau)
         found = np.abs(formula(given.robot, *motion))
         shape = (len(states.t), len(subjects))
@@ -90,7 +90,7 @@ def _check_model(model: LimitModel, given: Given) -> tuple[str, Worst]:
 def _check_values(limit: Any, given: Given, subjects: Sequence[str]) -> Worst:
     """Find the worst ratio by the values of a `brachis.limits.Limit` itself."""
 
-    def ratios(states: States) -> np.ndarray:
+    def ratios(states: MotionStates) -> np.ndarray:
         return np.abs(limit.ratios(states, states.t))
 
     if limit.guarantee.is_mean:

@@ -13,7 +13,7 @@ import numpy as np
 from brachis.robot import Robot
 from brachis.verify.limits.protocol import LimitCheck, Worst, largest, worst_between
 from brachis.verify.mechanics import torque_rates
-from brachis.verify.motion import Given, States
+from brachis.verify.motion import Given, MotionStates
 
 
 def _worst_derivative(kind: str, given: Given) -> Worst | None:
@@ -55,7 +55,7 @@ def _worst_in_range(given: Given, scale: np.ndarray) -> Worst:
 
 
 def _worst_quantity(
-    kind: str, quantity: Callable[[Robot, States], np.ndarray], given: Given
+    kind: str, quantity: Callable[[Robot, MotionStates], np.ndarray], given: Given
 ) -> Worst | None:
     """Find the largest ratio of a quantity of the joints, (K, n), at the states and between them."""
     robot = given.robot
@@ -63,14 +63,14 @@ def _worst_quantity(
     if not np.isfinite(upper).any():
         return None
 
-    def ratios(states: States) -> np.ndarray:
+    def ratios(states: MotionStates) -> np.ndarray:
         values = quantity(robot, states)
         return np.maximum(values / upper, values / lower)
 
     return worst_between(given, ratios, robot.joint_names)
 
 
-def _torque_rate(robot: Robot, states: States) -> np.ndarray:
+def _torque_rate(robot: Robot, states: MotionStates) -> np.ndarray:
     return torque_rates(robot, states.q, states.qdot, states.qddot, states.qdddot)
 
 
@@ -82,7 +82,7 @@ def _worst_rms_torque(given: Given) -> Worst | None:
         return None
     steps = np.flatnonzero((np.diff(states.piece) == 0) & (np.diff(states.u) > 1e-8))
     middle = 0.5 * (states.u[steps] + states.u[steps + 1])
-    between = States.at(given.pieces, states.piece[steps], middle)
+    between = MotionStates.at(given.pieces, states.piece[steps], middle)
     lengths = states.t[steps + 1] - states.t[steps]
     ends = states.tau[steps] ** 2 + states.tau[steps + 1] ** 2
     mean = lengths @ ((ends + 4.0 * between.tau**2) / 6.0) / lengths.sum()
@@ -113,7 +113,7 @@ def worst_total_power(given: Given) -> Worst | None:
     if not np.isfinite(limit):
         return None
 
-    def ratios(states: States) -> np.ndarray:
+    def ratios(states: MotionStates) -> np.ndarray:
         return np.abs(np.einsum("ki,ki->k", states.tau, states.qdot))[:, None] / limit
 
     return worst_between(given, ratios, ("all joints",))
@@ -130,7 +130,7 @@ def worst_torque_at_speed(given: Given) -> Worst | None:
     if not joints:
         return None
 
-    def ratios(states: States) -> np.ndarray:
+    def ratios(states: MotionStates) -> np.ndarray:
         columns = []
         for joint in joints:
             speed, torque = np.array(curves[joint]).T

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brachis.verify.motion import Given, States, turns
+from brachis.verify.motion import Given, MotionStates, turns
 
 
 class Worst(NamedTuple):
@@ -35,7 +35,9 @@ LimitCheck = Callable[[Given], Worst | None]
 
 
 def worst_between(
-    given: Given, ratio_at: Callable[[States], np.ndarray], subjects: Sequence[str]
+    given: Given,
+    ratio_at: Callable[[MotionStates], np.ndarray],
+    subjects: Sequence[str],
 ) -> Worst:
     """Find the largest of ratios that are not polynomials, at the states and wherever between them it may lie.
 
@@ -69,7 +71,7 @@ def worst_between(
             time = float(states.t[steps[k]])
             return Worst(float(most[k]), subjects[column], time, remark)
         middle = 0.5 * (states.u[steps] + states.u[steps + 1])
-        new = States.at(given.pieces, states.piece[steps], middle)
+        new = MotionStates.at(given.pieces, states.piece[steps], middle)
         states, order = states.merge(new)
         ratio = np.concatenate([ratio, ratio_at(new)])[order]
     k, column = map(int, np.unravel_index(int(np.argmax(ratio)), ratio.shape))
@@ -77,7 +79,7 @@ def worst_between(
 
 
 def _may_hold_more(
-    states: States, lengths: np.ndarray, ratio: np.ndarray
+    states: MotionStates, lengths: np.ndarray, ratio: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the steps within which the largest ratio of all may lie, (S,), and the most that it may be there, (S,)."""
     inside = states.piece[1:] == states.piece[:-1]

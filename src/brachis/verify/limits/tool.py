@@ -10,10 +10,10 @@ import pinocchio as pin
 from brachis.robot import ROLL_JOINT, Robot
 from brachis.task import ProcessSpeed, SpeedTable
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
-from brachis.verify.motion import Given, States
+from brachis.verify.motion import Given, MotionStates
 
 
-def _frame_motion(robot: Robot, states: States, vector: str) -> np.ndarray:
+def _frame_motion(robot: Robot, states: MotionStates, vector: str) -> np.ndarray:
     """Sizes, (K, 1), of the tool frame's velocity (``linear``, m/s; ``angular``, rad/s), or ``acceleration``, m/s^2.
 
     The virtual joint of a free roll does not turn the tool.
@@ -44,7 +44,7 @@ def _worst_motion(key: str, vector: str, given: Given) -> Worst | None:
     if limit is None:
         return None
 
-    def ratios(states: States) -> np.ndarray:
+    def ratios(states: MotionStates) -> np.ndarray:
         return _frame_motion(given.robot, states, vector) / limit
 
     return worst_between(given, ratios, ("tool",))
@@ -64,7 +64,7 @@ def _worst_speed(given: Given) -> Worst | None:
     if not tables:
         return _worst_motion("speed", "linear", given)
 
-    def ratios(states: States) -> np.ndarray:
+    def ratios(states: MotionStates) -> np.ndarray:
         s = states.s
         limit = np.full(
             len(s), limits.speed if isinstance(limits.speed, float) else np.inf
@@ -98,7 +98,7 @@ def _worst_process_speed(side: float, given: Given) -> Worst | None:
     for part in parts:
         begin, end = part.s
 
-        def ratios(states: States, part: ProcessSpeed = part) -> np.ndarray:
+        def ratios(states: MotionStates, part: ProcessSpeed = part) -> np.ndarray:
             speeds = _frame_motion(given.robot, states, "linear")
             return 1.0 - part.tolerance + side * (speeds / part.speed - 1.0)
 
