@@ -64,9 +64,9 @@ def _spread(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> P
     steps = np.ceil(np.clip(wanted, _LEAST_STEPS, 10_000)).astype(int)
     count = steps + 1
     _check_count(int(count.sum()))
-    span = np.repeat(np.arange(len(steps)), count)
-    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    return first[span], low[span] + (high - low)[span] * number / steps[span]
+    spans = zip(low, high, count, strict=True)
+    u = np.concatenate([np.linspace(*span) for span in spans])
+    return np.repeat(first, count), u
 
 
 def _check_count(count: int) -> None:
