@@ -418,6 +418,22 @@ def test_inspect(run):
     assert data["joints"][0]["torque"] == "10 Nm"
 
 
+def test_inspect_says_where_every_limit_holds(run, tmp_path):
+    everywhere = "at all instants, which the verification checks on a dense grid."
+    data = json.loads(run("inspect", SCARA, "--task-space", "x,y", "--json").out)
+    assert data["guarantees"]["torque"] == f"It holds {everywhere}"
+    task = yaml.safe_load(
+        (SCARA.parents[2] / "examples/01_scara_line.yaml").read_text()
+    )
+    task["robot"] |= {"urdf": str(SCARA), "limits": {"rms_torque": 9}}
+    task["tool_limits"] = {"speed": 2}
+    path = tmp_path / "task.yaml"
+    path.write_text(yaml.safe_dump(task))
+    text = " ".join(run("inspect", path).out.split())
+    assert f"tool speed limit: It holds {everywhere}" in text
+    assert "rms torque limit: It holds as a mean over the whole motion." in text
+
+
 def test_inspect_of_a_task_shows_what_is_in_use(run, tmp_path):
     task = yaml.safe_load(
         (SCARA.parents[2] / "examples/01_scara_line.yaml").read_text()

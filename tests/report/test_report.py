@@ -19,6 +19,7 @@ from brachis.apps.report.figures import motion_figure
 from brachis.apps.report.motion import reported_motion
 from brachis.apps.report.page import _plotly
 from brachis.errors import NotInstalledError
+from brachis.limits import Role
 from brachis.robot.from_task import robot_from_settings
 from brachis.robot.plausibility import Issue
 
@@ -38,6 +39,13 @@ def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page
     assert f"{planar.t_end:.4f} s" in header
     assert re.search(r"At its limits longest: j\d torque \(\d+ % of the time\)", header)
     assert planar_page.verified
+
+
+def test_it_is_said_where_every_limit_holds(planar, planar_page):
+    for limit in planar.attempt.refined.program.limits:
+        row = f"<tr><th>{limit.name}</th><td>{limit.guarantee.value}</td></tr>"
+        assert (row in planar_page.html) == (limit.role is not Role.SAFEGUARD)
+    assert "It holds at all instants" in planar_page.html
 
 
 def test_everything_is_in_the_file(planar_page):

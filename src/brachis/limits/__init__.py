@@ -15,7 +15,7 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from brachis.limits.checks import build_user_limits
@@ -28,6 +28,7 @@ from brachis.limits.process_speed import (
 )
 from brachis.limits.protocol import (
     Bound,
+    Description,
     Guarantee,
     HasLatticeWeights,
     HasPhasePlaneRows,
@@ -109,9 +110,21 @@ def limits_of(
     return tuple(limits)
 
 
+def joint_limits_of(robot: Robot) -> tuple[Limit, ...]:
+    """List the limits of a robot without a task: those of its joints."""
+    built = [kind.build(robot) for kind in JOINT_LIMITS.values()]
+    return tuple(limit for limit in built if limit is not None)
+
+
+def describe_guarantees(limits: Iterable[Limit]) -> dict[str, str]:
+    """Say of each limit, by its name, where it holds."""
+    return {limit.name: limit.guarantee.value for limit in limits}
+
+
 __all__ = [
     "TABLE",
     "Bound",
+    "Description",
     "Guarantee",
     "HasLatticeWeights",
     "HasPhasePlaneRows",
@@ -123,5 +136,7 @@ __all__ = [
     "Partials",
     "PhasePlaneRows",
     "Role",
+    "describe_guarantees",
+    "joint_limits_of",
     "limits_of",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from brachis.errors import InputError
 from brachis.limits.protocol import Label, Limit, Moments, Partials
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
+
+_MOMENTS = 2
+"""Moments at which a limit is tried; two tell (K, c) from (c,)."""
 
 
 def build_user_limits(
@@ -57,8 +60,11 @@ def build_user_limits(
                 where=here,
                 found=type(limit).__name__,
             )
-        _check_data(limit, here)
-        _check_functions(limit, robot.n, here)
+        for part, shape, array in _parts_of(limit, robot.n, here):
+            _check_array(part, shape, np.asarray(array))
+        if not np.all(np.asarray(limit.lower) < limit.upper):
+            bounds = [limit.lower, limit.upper]
+            raise InputError("lower is not below upper", where=here, found=bounds)
         for label in limit.labels:
             if str(label) in taken:
                 problem = "the label is taken; subject and kind together name a value"
@@ -68,8 +74,32 @@ def build_user_limits(
     return limits
 
 
-def _check_data(limit: Limit, where: str) -> None:
-    """Refuse labels and bounds that do not fit together."""
+def _check_array(where: str, shape: tuple[int, ...], array: np.ndarray) -> None:
+    """Refuse a wrong shape; also numbers that are not finite, except in bounds, (c,)."""
+    is_bound = len(shape) == 1
+    if array.shape != shape:
+        moments = "" if is_bound else f" for {_MOMENTS} moments"
+        raise InputError(
+            "has the wrong shape",
+            where=where,
+            found=f"{array.shape}{moments}",
+            allowed=shape,
+        )
+    if not is_bound and not np.all(np.isfinite(array.astype(float))):
+        raise InputError(
+            "is not finite",
+            where=where,
+            found=array.ravel().tolist(),
+            allowed="finite numbers",
+        )
+
+
+_Part = tuple[str, tuple[int, ...], object]
+"""Where a part of a limit stands, the shape that it must have, and the part."""
+
+
+def _parts_of(limit: Limit, n: int, where: str) -> Iterator[_Part]:
+    """Go through the arrays of a limit, those of its functions last; refuse what is missing or of the wrong type."""
     parts = ("kind", "labels", "lower", "upper")
     missing = [name for name in parts if not hasattr(limit, name)]
     if missing:
@@ -85,19 +115,14 @@ def _check_data(limit: Limit, where: str) -> None:
             where=f"{where}.labels",
             allowed="at least one label",
         )
-    for name in ("lower", "upper"):
-        _check_shape(f"{where}.{name}", getattr(limit, name), (len(labels),))
-    if not np.all(np.asarray(limit.lower) < limit.upper):
-        bounds = [limit.lower, limit.upper]
-        raise InputError("lower is not below upper", where=where, found=bounds)
-
-
-def _check_functions(limit: Limit, n: int, where: str) -> None:
-    """Refuse values and partials at two moments that have the wrong shape, or are not finite."""
-    shape = (2, len(limit.labels))
-    q, qdot, qddot, qdddot = np.random.default_rng(0).uniform(-0.1, 0.1, (4, 2, n))
-    moments = Moments(q, qdot, qddot, qdddot, np.array([0.0, 0.5]))
-    _check_result(f"{where}.values", limit.values(moments), shape)
+    count = len(labels)
+    yield f"{where}.lower", (count,), limit.lower
+    yield f"{where}.upper", (count,), limit.upper
+    rng = np.random.default_rng(0)
+    q, qdot, qddot, qdddot = rng.uniform(-0.1, 0.1, (4, _MOMENTS, n))
+    moments = Moments(q, qdot, qddot, qdddot, np.linspace(0.0, 0.5, _MOMENTS))
+    shape = (_MOMENTS, count)
+    yield f"{where}.values", shape, limit.values(moments)
     where = f"{where}.partials"
     partials = limit.partials(moments)
     if not isinstance(partials, Partials):
@@ -108,27 +133,4 @@ def _check_functions(limit: Limit, n: int, where: str) -> None:
         allowed = "at least one of q, qdot, qddot, qdddot"
         raise InputError("are all None", where=where, allowed=allowed)
     for name, part in given.items():
-        by_joint = shape if name == "s" else (*shape, n)
-        _check_result(f"{where}.{name}", part, by_joint)
-
-
-def _check_shape(
-    where: str, array: object, shape: tuple[int, ...], aside: str = ""
-) -> None:
-    found = np.asarray(array).shape
-    if found != shape:
-        raise InputError(
-            "has the wrong shape", where=where, found=f"{found}{aside}", allowed=shape
-        )
-
-
-def _check_result(where: str, array: object, shape: tuple[int, ...]) -> None:
-    _check_shape(where, array, shape, " for 2 moments")
-    found = np.asarray(array, dtype=float)
-    if not np.all(np.isfinite(found)):
-        raise InputError(
-            "is not finite",
-            where=where,
-            found=found.ravel().tolist(),
-            allowed="finite numbers",
-        )
+        yield f"{where}.{name}", shape if name == "s" else (*shape, n), part

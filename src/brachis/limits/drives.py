@@ -26,6 +26,7 @@ of its ends is above the curve, which is straight there; so nowhere is it above.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,14 +64,8 @@ class TotalPowerLimit(Limit):
         return powers(self._robot, motion).sum(axis=1, keepdims=True) / self._figure
 
     def partials(self, motion: JointStates) -> Partials:
-        exact = power_partials(self._robot, motion)
-        parts = (exact.q, exact.qdot, exact.qddot)
-        return Partials(
-            *(
-                part.sum(axis=1, keepdims=True) / self._figure
-                for part in parts
-                if part is not None
-            )
+        return power_partials(self._robot, motion).map(
+            lambda part: part.sum(axis=1, keepdims=True) / self._figure
         )
 
 
@@ -199,13 +194,20 @@ class TorqueSpeedLimit(Limit):
             slack_text=f"{sign} {torque} all along the curve of {name}",
         )
 
+    def _by_curve(
+        self,
+        function: Callable[[RoundedCurve, np.ndarray], np.ndarray],
+        motion: JointStates,
+    ) -> np.ndarray:
+        """Evaluate a function of each curve and its joint's velocities, (K, c)."""
+        qdot = motion.qdot[:, self._joints[::2]].T
+        pairs = zip(self._curves, qdot, strict=True)
+        return np.repeat([function(*pair) for pair in pairs], 2, axis=0).T
+
     def values(self, motion: JointStates) -> np.ndarray:
         tau = motion.torque(self._robot)[:, self._joints]
-        qdot = motion.qdot[:, self._joints[::2]]
-        allowed = [
-            curve.values(part) for curve, part in zip(self._curves, qdot.T, strict=True)
-        ]
-        excess = self._signs * tau - np.repeat(allowed, 2, axis=0).T
+        allowed = self._by_curve(RoundedCurve.values, motion)
+        excess = self._signs * tau - allowed
         return np.asarray(excess / self._at_rest)
 
     def partials(self, motion: JointStates) -> Partials:
@@ -214,14 +216,9 @@ class TorqueSpeedLimit(Limit):
         by_q, by_qdot, by_qddot = (
             part[:, self._joints] * scale for part in (exact.q, exact.qdot, exact.qddot)
         )
-        qdot = motion.qdot[:, self._joints[::2]]
-        slopes = [
-            curve.slopes(part) for curve, part in zip(self._curves, qdot.T, strict=True)
-        ]
         every = np.arange(len(self._joints))
-        by_qdot[:, every, self._joints] -= (
-            np.repeat(slopes, 2, axis=0).T / self._at_rest
-        )
+        slopes = self._by_curve(RoundedCurve.slopes, motion)
+        by_qdot[:, every, self._joints] -= slopes / self._at_rest
         return Partials(by_q, by_qdot, by_qddot)
 
 

@@ -103,7 +103,7 @@ class JointLimit(Limit):
         return np.asarray(-self._middle * self._scale)
 
     @classmethod
-    def build(cls, robot: Robot, _task: Task) -> Self | None:
+    def build(cls, robot: Robot, _task: Task | None = None) -> Self | None:
         """Build the limit for the joints with a finite limit; None without such joints."""
         joints = np.flatnonzero(
             np.isfinite(robot.limits.both_ways(cls.kind)).any(axis=0)
@@ -122,11 +122,7 @@ class JointLimit(Limit):
         return self._normalise(self.quantity(motion))
 
     def partials(self, motion: JointStates) -> Partials:
-        exact = self.quantity_partials(motion)
-        parts = (exact.q, exact.qdot, exact.qddot, exact.qdddot)
-        return Partials(
-            *(None if part is None else self._scale_rows(part) for part in parts)
-        )
+        return self.quantity_partials(motion).map(self._scale_rows)
 
     def _normalise(self, quantity: np.ndarray) -> np.ndarray:
         """Values, (K, c), from a quantity of all joints, (K, n)."""
@@ -346,9 +342,7 @@ class RmsTorqueLimit(_TorqueLimit):
 
     def partials(self, motion: JointStates) -> Partials:
         factors = 2.0 * super().values(motion)[:, :, None]
-        exact = super().partials(motion)
-        parts = (exact.q, exact.qdot, exact.qddot)
-        return Partials(*(factors * part for part in parts if part is not None))
+        return super().partials(motion).map(lambda part: factors * part)
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """Measure the root mean square itself."""

@@ -185,11 +185,8 @@ class _ProcessSpeedLimit(Limit, HasPhasePlaneRows):
         speed, by_q, by_qdot = self._tool.derivatives(motion)
         share = (1.0 / self._speeds / (1.0 + relaxation))[:, :, None]
         by_relaxation = -(self._sign + self._values(speed, relaxation))
-        return Partials(
-            q=share * by_q[:, None],
-            qdot=share * by_qdot[:, None],
-            s=by_relaxation * slope / (1.0 + relaxation),
-        )
+        by_s = by_relaxation * slope / (1.0 + relaxation)
+        return Partials(share * by_q[:, None], share * by_qdot[:, None], s=by_s)
 
     def phase_plane_rows(
         self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray

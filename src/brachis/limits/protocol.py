@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -43,14 +44,14 @@ class Guarantee(Enum):
 
 
 class JointStates(Protocol):
-    """Joint motion at K moments; states of the optimiser and samples of a trajectory are such.
+    """Joint motion at K moments; for example states of the optimiser or samples of a trajectory.
 
     Attributes
     ----------
     q, qdot, qddot, qdddot : (K, n) ndarray
         rad or m, and per second.
     s : (K,) ndarray
-        Path coordinate; NaN where there is no path, or its place is not known.
+        Path coordinate; NaN without a path, or if it is not known.
     """
 
     @property
@@ -93,13 +94,13 @@ class Role(Enum):
     """Whose limit it is."""
 
     ROBOT = "robot"
-    """Of its drives and joints."""
+    """A limit of drives and joints."""
     PROCESS = "process"
-    """Of what the tool does."""
+    """A limit of what the tool does."""
     SCENE = "scene"
-    """Of what stands around."""
+    """A limit of what stands around the robot."""
     SAFEGUARD = "safeguard"
-    """Guards the computation alone: falling short of it harms nobody, and the verification does not know it."""
+    """Numerical, not physical: small violations are ignored, and the verification does not check it."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class Label:
     unit : str
         Of the limit that the user gives.
     key : str
-        Key of the task that sets it; empty where there is none.
+        Key of the task that sets it; empty without one.
     active_text, slack_text : str
         Text for "the limit is active", and for the slack that a wider bound provides. If empty, both are made of
         subject and kind.
@@ -178,6 +179,11 @@ class Partials:
     qddot: np.ndarray | None = None
     qdddot: np.ndarray | None = None
     s: np.ndarray | None = None
+
+    def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
+        """Return the partials by q and its derivatives, changed."""
+        parts = (self.q, self.qdot, self.qddot, self.qdddot)
+        return Partials(*(None if part is None else change(part) for part in parts))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ import numpy as np
 
 from brachis.kinematics import JointMap
 from brachis.limits.protocol import (
-    Bound,
     Guarantee,
     JointStates,
     Label,
@@ -47,10 +46,6 @@ class BranchMargin(Limit):
         self.labels = tuple(Label(name, "branch margin", "-") for name in names)
         self.lower = np.minimum(margin, 0.5 * at_start)
         self.upper = np.full(count, np.inf)
-        self.bounds = tuple(
-            Bound(column, least, least, 1.0, "lower")
-            for column, least in enumerate(self.lower.tolist())
-        )
 
     def values(self, motion: JointStates) -> np.ndarray:
         """Margins (K, c); the motion is a state of the joint map."""

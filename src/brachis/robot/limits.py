@@ -14,7 +14,7 @@ from brachis.errors import InputError, LimitError, UnknownNameError
 from brachis.task import FROM_URDF, LIMIT_KINDS, LimitScale, LimitSpec
 
 Curve = tuple[tuple[float, float], ...]
-"""Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty where there is no curve."""
+"""Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
 
 LEAST = 1e-6
 LARGEST = 1e12
@@ -160,7 +160,8 @@ def resolve_limits(
     names = list(joint_names)
     _check_scale(spec.scale)
     pairs = {
-        kind: _magnitudes(kind, getattr(spec, kind), names, urdf) for kind in MAGNITUDES
+        kind: _spread_magnitudes(kind, getattr(spec, kind), names, urdf)
+        for kind in MAGNITUDES
     }
     factor = spec.scale.torque
     curves = _resolve_curves(spec.torque_speed, names, factor)
@@ -174,7 +175,7 @@ def resolve_limits(
             joint=names[i],
             key=f"robot.limits.torque.{names[i]} or robot.limits.acceleration.{names[i]}",
         )
-    pairs["position"] = _ranges(spec.position, names, urdf)
+    pairs["position"] = _spread_ranges(spec.position, names, urdf)
     for kind in MAGNITUDES:
         pairs[kind] = _scale_limits(kind, pairs[kind], spec.scale, names)
     if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
@@ -188,7 +189,7 @@ def resolve_limits(
     arrays: dict[str, Any] = {}
     for kind, limits in pairs.items():
         arrays |= _arrays_of(kind, limits)
-    return Limits(**arrays, total_power=_total_power(spec), torque_speed=curves)
+    return Limits(**arrays, total_power=_resolve_total_power(spec), torque_speed=curves)
 
 
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
@@ -255,7 +256,7 @@ def _scale_limits(
     return scaled
 
 
-def _total_power(spec: LimitSpec) -> float:
+def _resolve_total_power(spec: LimitSpec) -> float:
     """Return the limit of the sum of the joints' powers, W; infinite without one."""
     given = spec.total_power
     if given is None:
@@ -313,7 +314,7 @@ def per_joint_values(
     return [value] * len(names)
 
 
-def _magnitudes(
+def _spread_magnitudes(
     kind: str, value: object, names: list[str], urdf: Sequence[UrdfLimit]
 ) -> np.ndarray:
     """Spread one kind of limit over the joints: lower and upper ones, (2, n); infinite where not limited."""
@@ -349,7 +350,9 @@ def _magnitudes(
     return limits
 
 
-def _ranges(value: object, names: list[str], urdf: Sequence[UrdfLimit]) -> np.ndarray:
+def _spread_ranges(
+    value: object, names: list[str], urdf: Sequence[UrdfLimit]
+) -> np.ndarray:
     """Spread the position ranges over the joints, (2, n); infinite where not limited."""
     ranges = np.tile([[-np.inf], [np.inf]], len(names))
     listed = per_joint_values("robot.limits.position", value, names, FROM_URDF)

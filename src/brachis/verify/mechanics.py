@@ -21,15 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.common.arrays import cross
+from brachis.common.arrays import cross, rates
 from brachis.robot import Robot
+from brachis.robot.urdf_bodies import Body
 from brachis.task import Placement
 
-_Z = np.array([0.0, 0.0, 1.0])
-_STEP = 1e-3
-"""Of the differences, in rad or m."""
-_FAR = 300.0
-"""Velocities, in widths of the Coulomb friction, beyond which its slope is zero."""
+_AXES = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,42 +38,43 @@ class _Weight:
     inertia: np.ndarray
 
     def resistance(
-        self, motion: tuple[np.ndarray, ...]
+        self, spin: np.ndarray, gain: np.ndarray, acceleration: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Force, and moment about the joint's origin, (3, K), that its motion takes: w, e and a of the frame."""
-        spin, gain, acceleration = motion
-        force = self.mass * (
-            acceleration + cross(gain, self.com) + cross(spin, cross(spin, self.com))
-        )
-        return force, self.inertia @ gain + cross(spin, self.inertia @ spin) + cross(
-            self.com, force
-        )
+        turning = cross(gain, self.com) + cross(spin, cross(spin, self.com))
+        force = self.mass * (acceleration + turning)
+        moment = self.inertia @ gain + cross(spin, self.inertia @ spin)
+        return force, moment + cross(self.com, force)
 
 
 def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n)."""
-    offset, count = _matrix(robot.settings.tool_offset), len(q)
-    tool = robot.urdf_dynamics.tool @ offset
-    roll = (
-        q[:, -1] if robot.rolls_freely else np.zeros(count)
-    )  # about the tool frame's z axis
-    x, y, z = (
-        tool[:3, :3] @ _turned(_Z, roll, np.tile(axis[:, None], count))
-        for axis in np.eye(3)
-    )
-    origin = np.tile(tool[:3, 3:], count)
-    for joint, body in reversed(list(enumerate(robot.urdf_dynamics.bodies))):
+    tool = robot.urdf_dynamics.tool @ _matrix(robot.settings.tool_offset)
+    roll = q[:, -1] if robot.rolls_freely else np.zeros(len(q))
+    axes = [_rotate(_AXES[2], roll, axis[:, None] + 0.0 * roll) for axis in _AXES]
+    # The tool's axes and its origin, (3, K) each, in the frame of one joint after the other.
+    vectors = [tool[:3, :3] @ axis for axis in axes]
+    vectors.append(np.tile(tool[:3, 3:], len(q)))
+    for body, position in reversed(
+        list(zip(robot.urdf_dynamics.bodies, q.T, strict=False))
+    ):
         if body.sliding:
-            origin = origin + body.axis[:, None] * q[:, joint]
-        else:
-            x, y, z, origin = (
-                _turned(body.axis, q[:, joint], part) for part in (x, y, z, origin)
-            )
-        x, y, z, origin = (body.placement[:3, :3] @ part for part in (x, y, z, origin))
-        origin = origin + body.placement[:3, 3, None]
+            vectors[3] = vectors[3] + body.axis[:, None] * position
+        vectors = _to_parent(body, position, *vectors)
+        vectors[3] = vectors[3] + body.placement[:3, 3, None]
     base = _matrix(robot.settings.mounting)
-    rotations = np.stack([base[:3, :3] @ part for part in (x, y, z)], axis=1)
-    return (base[:3, :3] @ origin + base[:3, 3, None]).T, np.moveaxis(rotations, 2, 0)
+    *turned, origin = (base[:3, :3] @ part for part in vectors)
+    rotations = np.moveaxis(np.stack(turned, axis=1), 2, 0)
+    return (origin + base[:3, 3, None]).T, rotations
+
+
+def _to_parent(
+    body: Body, position: np.ndarray, *vectors: np.ndarray
+) -> list[np.ndarray]:
+    """Return vectors (3, K) in a joint's frame in the frame of the joint before, at positions (K,)."""
+    if not body.sliding:
+        vectors = tuple(_rotate(body.axis, position, part) for part in vectors)
+    return [body.placement[:3, :3] @ part for part in vectors]
 
 
 def torques(
@@ -95,137 +93,111 @@ def torques(
 def torque_rates(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray
 ) -> np.ndarray:
-    """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s.
+    """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s."""
 
-    Differences of fourth order, over a step in which no joint goes far, nor changes its speed or acceleration much.
-    """
-    rates = [
-        np.abs(part).max(axis=1) ** (1.0 / order)
-        for order, part in enumerate((qdot, qddot, qdddot), 1)
-    ]
-    step = _STEP / np.maximum(np.max(rates, axis=0), 1.0)[:, None]
+    def rigid(*states: np.ndarray) -> tuple[np.ndarray]:
+        return (_rigid(robot, *states[:3]),)
 
-    def change(h: np.ndarray) -> np.ndarray:
-        ahead, behind = (
-            _rigid(
-                robot,
-                q + t * qdot + t**2 / 2.0 * qddot + t**3 / 6.0 * qdddot,
-                *_on(t, qdot, qddot, qdddot),
-            )
-            for t in (h, -h)
-        )
-        return (ahead - behind) / (2.0 * h)
-
+    (rate,) = rates(rigid, (q, qdot, qddot, qdddot))
     f = robot.friction
-    sliding = np.cosh(np.clip(qdot / f.v_eps, -_FAR, _FAR)) ** -2
-    friction = f.armature * qdddot + (f.viscous + f.coulomb / f.v_eps * sliding) * qddot
-    return (4.0 * change(step) - change(2.0 * step)) / 3.0 + friction
-
-
-def _on(
-    t: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity and acceleration after times t, (K, 1), s, under a jerk that stays."""
-    return qdot + t * qddot + t**2 / 2.0 * qdddot, qddot + t * qdddot
+    widths = np.clip(qdot / f.v_eps, -300.0, 300.0)  # farther the slope is zero
+    slope = f.viscous + f.coulomb / f.v_eps * np.cosh(widths) ** -2
+    return rate + f.armature * qdddot + slope * qddot
 
 
 def _rigid(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
     """Torques (K, n) without armature and friction."""
-    tau, bodies = np.zeros_like(q), robot.urdf_dynamics.bodies
+    tau = np.zeros_like(q)
+    bodies = robot.urdf_dynamics.bodies
     motions = _motions(robot, q, qdot, qddot)
-    force, moment = np.zeros((3, len(q))), np.zeros((3, len(q)))
+    force = np.zeros((3, len(q)))
+    moment = np.zeros((3, len(q)))
     for joint in reversed(range(len(bodies))):
         body = bodies[joint]
         for weight in _weights(robot, joint):
-            push, turn = weight.resistance(motions[joint])
-            force, moment = force + push, moment + turn
+            push, turn = weight.resistance(*motions[joint])
+            force = force + push
+            moment = moment + turn
         tau[:, joint] = body.axis @ (force if body.sliding else moment)
         if body.sliding:
             moment = moment + cross(body.axis[:, None] * q[:, joint], force)
-        else:
-            force, moment = (
-                _turned(body.axis, q[:, joint], part) for part in (force, moment)
-            )
-        force, moment = (body.placement[:3, :3] @ part for part in (force, moment))
+        force, moment = _to_parent(body, q[:, joint], force, moment)
         moment = moment + cross(body.placement[:3, 3, None], force)
     return tau
 
 
 def _motions(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-) -> list[tuple[np.ndarray, ...]]:
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Angular velocity, angular acceleration, and acceleration less gravity of every joint's frame, (3, K) each."""
-    still = np.zeros((3, len(q)))
-    upwards = _matrix(robot.settings.mounting)[:3, :3].T @ -np.array(
-        robot.model.gravity.linear
-    )
-    spin, gain, acceleration = still, still, np.tile(upwards[:, None], len(q))
-    motions: list[tuple[np.ndarray, ...]] = []
+    base = _matrix(robot.settings.mounting)[:3, :3]
+    upwards = base.T @ -np.array(robot.model.gravity.linear)
+    spin = np.zeros((3, len(q)))
+    gain = np.zeros((3, len(q)))
+    acceleration = np.tile(upwards[:, None], len(q))
+    motions = []
     for joint, body in enumerate(robot.urdf_dynamics.bodies):
-        way, axis = body.placement[:3, 3, None], body.axis[:, None]
-        acceleration = acceleration + cross(gain, way) + cross(spin, cross(spin, way))
-        spin, gain, acceleration = (
-            body.placement[:3, :3].T @ part for part in (spin, gain, acceleration)
-        )
-        rate, push = axis * qdot[:, joint], axis * qddot[:, joint]
+        axis = body.axis[:, None]
+        offset = body.placement[:3, 3, None]
+        rotation = body.placement[:3, :3].T
+        turning = cross(gain, offset) + cross(spin, cross(spin, offset))
+        spin = rotation @ spin
+        gain = rotation @ gain
+        acceleration = rotation @ (acceleration + turning)
+        rate = axis * qdot[:, joint]
+        push = axis * qddot[:, joint]
         if body.sliding:
-            way = axis * q[:, joint]
-            acceleration = (
-                acceleration
-                + cross(gain, way)
-                + cross(spin, cross(spin, way) + 2.0 * rate)
-                + push
-            )
+            offset = axis * q[:, joint]
+            coriolis = cross(spin, cross(spin, offset) + 2.0 * rate)
+            acceleration = acceleration + cross(gain, offset) + coriolis + push
         else:
             spin, gain, acceleration = (
-                _turned(body.axis, -q[:, joint], part)
+                _rotate(body.axis, -q[:, joint], part)
                 for part in (spin, gain, acceleration)
             )
-            gain, spin = gain + push + cross(spin, rate), spin + rate
+            gain = gain + push + cross(spin, rate)
+            spin = spin + rate
         motions.append((spin, gain, acceleration))
     return motions
 
 
 def _weights(robot: Robot, joint: int) -> list[_Weight]:
     """List what a joint carries: its own body and, at the end of the chain, the payload."""
-    body, payload = robot.urdf_dynamics.bodies[joint], robot.settings.payload
+    body = robot.urdf_dynamics.bodies[joint]
+    payload = robot.settings.payload
     weights = [_Weight(body.mass, body.com[:, None], body.inertia)]
     if payload is not None and joint == len(robot.urdf_dynamics.bodies) - 1:
-        tool, given = robot.urdf_dynamics.tool, payload.inertia
+        tool = robot.urdf_dynamics.tool
+        rotation = tool[:3, :3]
+        i = payload.inertia
         inertia = np.zeros((3, 3))
-        if given is not None:
-            inertia = np.diag([given.ixx, given.iyy, given.izz])
-            for (row, column), product in {
-                (0, 1): given.ixy,
-                (0, 2): given.ixz,
-                (1, 2): given.iyz,
-            }.items():
-                inertia[row, column] = inertia[column, row] = product
-        com = tool[:3, :3] @ payload.com + tool[:3, 3]
-        weights.append(
-            _Weight(payload.mass, com[:, None], tool[:3, :3] @ inertia @ tool[:3, :3].T)
-        )
+        if i is not None:
+            inertia = np.array(
+                [[i.ixx, i.ixy, i.ixz], [i.ixy, i.iyy, i.iyz], [i.ixz, i.iyz, i.izz]]
+            )
+        com = rotation @ payload.com + tool[:3, 3]
+        turned = rotation @ inertia @ rotation.T
+        weights.append(_Weight(payload.mass, com[:, None], turned))
     return weights
 
 
 def _matrix(placement: Placement) -> np.ndarray:
     """Placement as a (4, 4) matrix."""
     matrix = np.eye(4)
-    for axis, angle in zip(
-        np.eye(3), np.radians(placement.rpy_deg), strict=True
-    ):  # about fixed axes: x, y, z
-        matrix[:3, :3] = _turned(axis, np.full(3, angle), matrix[:3, :3])
+    angles = np.radians(placement.rpy_deg)  # about fixed axes: x, y, z
+    for axis, angle in zip(_AXES, angles, strict=True):
+        matrix[:3, :3] = _rotate(axis, angle, matrix[:3, :3])
     matrix[:3, 3] = placement.xyz
     return matrix
 
 
-def _turned(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Turn vectors (3, K) about a unit vector by angles (K,), rad (Rodrigues)."""
-    along, sine, cosine = axis[:, None], np.sin(angles), np.cos(angles)
+def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Rotate vectors (3, K) about a unit vector by angles (K,), rad (Rodrigues)."""
+    along = axis[:, None]
+    cosine = np.cos(angles)
+    parallel = along * (axis @ vectors) * (1.0 - cosine)
     return np.asarray(
-        vectors * cosine
-        + cross(along, vectors) * sine
-        + along * (axis @ vectors) * (1.0 - cosine)
+        vectors * cosine + cross(along, vectors) * np.sin(angles) + parallel
     )

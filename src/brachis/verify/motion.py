@@ -1,35 +1,31 @@
-"""The saved quintic pieces, evaluated by piece and place in it, so that a piece of a microsecond is as clear as any.
+"""The motion of a trajectory file, evaluated by polynomial piece and place in it.
 
-Roots of polynomials in Bernstein form, many at a time: where a motion turns, peaks or crosses a value.
-
-A polynomial of degree m is monotone between the roots of its derivative, which has degree m - 1; so the roots follow
-one degree after the other, from the linear case on, each between neighbouring ones of the degree below. A polynomial
-whose Bernstein coefficients do not change their sign has no root at all, which decides nearly every case.
+A piece of a microsecond is evaluated as exactly as any other. Roots of the polynomials, in Bernstein form, show where a
+motion turns, peaks or crosses a value.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from brachis.robot import Robot
+from brachis.path import Path
+from brachis.robot import Robot, TaskMap
+from brachis.task import Task
 from brachis.trajectory import Trajectory
 from brachis.verify.mechanics import torques
-
-_STEPS = 60
-_ROUNDING = 1e-14
+from brachis.verify.report import VerifyOptions
 
 
 def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,)."""
-    degree = len(coefficients) - 1
-    factors = np.array([math.comb(degree, k) for k in range(degree + 1)], dtype=float)
-    up, down = np.ones((degree + 1, len(u))), np.ones((degree + 1, len(u)))
-    np.cumprod(np.broadcast_to(u, (degree, len(u))), axis=0, out=up[1:])
-    np.cumprod(np.broadcast_to(1.0 - u, (degree, len(u))), axis=0, out=down[1:])
-    return np.einsum("k,kf,kf,kf...->f...", factors, up, down[::-1], coefficients)
+    """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,), by de Casteljau's algorithm."""
+    values = coefficients
+    u = u.reshape(-1, *[1] * (values.ndim - 2))
+    while len(values) > 1:
+        values = (1.0 - u) * values[:-1] + u * values[1:]
+    return np.asarray(values[0])
 
 
 def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -47,68 +43,20 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u : (Z,) ndarray
         Root; ascending within a polynomial.
     """
-    kept = np.flatnonzero(
-        (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
-    )
-    c = coefficients[:, kept]
-    if len(c) == 2:
-        return kept, c[0] / (c[0] - c[1])
-    turns, at = roots(np.diff(c, axis=0))
-    every = np.arange(len(kept))
-    column = np.concatenate([every, turns, every])
-    u = np.concatenate([np.zeros(len(kept)), at, np.ones(len(kept))])
-    order = np.lexsort((u, column))
-    column, u = column[order], u[order]
-    value = values_of(c[:, column], u)
-    crossing = np.flatnonzero(
-        (column[1:] == column[:-1]) & (value[1:] * value[:-1] < 0.0)
-    )
-    found = _between(
-        c[:, column[crossing]],
-        u[crossing],
-        u[crossing + 1],
-        value[crossing],
-        value[crossing + 1],
-    )
-    exact = (value == 0.0) & (u > 0.0) & (u < 1.0)
-    column, u = (
-        np.concatenate([column[crossing], column[exact]]),
-        np.concatenate([found, u[exact]]),
-    )
-    order = np.lexsort((u, column))
-    return kept[column[order]], u[order]
+    from scipy.interpolate import BPoly, PPoly
 
-
-def _between(
-    c: np.ndarray, a: np.ndarray, b: np.ndarray, at_a: np.ndarray, at_b: np.ndarray
-) -> np.ndarray:
-    """Find the root between a and b, where monotone polynomials have values of opposite sign (the Illinois method)."""
-    enough = _ROUNDING * np.abs(c).max(axis=0, initial=0.0)
-    powers = _powers(c)
-    u = a
-    for _ in range(_STEPS if len(a) else 0):
-        u = np.clip((a * at_b - b * at_a) / (at_b - at_a), a, b)
-        value = powers[-1]
-        for coefficient in powers[-2::-1]:
-            value = value * u + coefficient
-        if np.all((np.abs(value) <= enough) | (b - a <= _ROUNDING)):
-            break
-        left = (
-            value * at_a > 0.0
-        )  # the root lies right of u; the value that stays is halved
-        a, b = np.where(left, u, a), np.where(left, b, u)
-        at_a, at_b = (
-            np.where(left, value, 0.5 * at_a),
-            np.where(left, 0.5 * at_b, value),
-        )
-    return u
-
-
-def _powers(c: np.ndarray) -> np.ndarray:
-    """Coefficients of the powers of u, (m + 1, F), of polynomials in Bernstein form."""
-    return np.array(
-        [math.comb(len(c) - 1, k) * np.diff(c, n=k, axis=0)[0] for k in range(len(c))]
-    )
+    # Coefficients that do not change their sign have no root, which decides nearly every case.
+    changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
+    kept = np.flatnonzero(changing)
+    if not len(kept):
+        return kept, np.empty(0)
+    side_by_side = BPoly(coefficients[:, kept], np.arange(len(kept) + 1.0))
+    polynomials = PPoly.from_bernstein_basis(side_by_side)
+    places = np.sort(polynomials.roots(discontinuity=False, extrapolate=False))
+    number = np.floor(places).astype(int)
+    u = places - number
+    inside = (u > 0.0) & (number < len(kept))
+    return kept[number[inside]], u[inside]
 
 
 def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -123,7 +71,8 @@ def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return column, u, values_of(coefficients[:, column], u)
 
 
-_SAME_PLACE = 1e-9
+SAME_PLACE = 1e-9
+"""Places in a piece that are nearer to each other, as parts of the piece, are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +92,9 @@ class Pieces:
     velocity : (5, L, n) ndarray
     acceleration : (4, L, n) ndarray
     jerk : (3, L, n) ndarray
+    path_coordinate : callable
+        ``path_coordinate(t)`` returns s, (K,), at times t, (K,), s.
+    robot : Robot
     """
 
     times: np.ndarray
@@ -152,14 +104,16 @@ class Pieces:
     velocity: np.ndarray
     acceleration: np.ndarray
     jerk: np.ndarray
+    path_coordinate: Callable[[np.ndarray], np.ndarray]
+    robot: Robot
 
     @classmethod
-    def of(cls, trajectory: Trajectory) -> Pieces:
-        """Take the pieces of a trajectory."""
-        position, lengths = trajectory.pieces.c, np.diff(trajectory.times)
+    def of(cls, trajectory: Trajectory, robot: Robot) -> Pieces:
+        """Take the pieces of a trajectory of a robot."""
+        position = trajectory.pieces.c
+        lengths = np.diff(trajectory.times)
         velocity = 5.0 * np.diff(position, axis=0) / lengths[:, None]
         acceleration = 4.0 * np.diff(velocity, axis=0) / lengths[:, None]
-        jerk = trajectory.jerk_pieces.c
         return cls(
             trajectory.times,
             lengths,
@@ -167,7 +121,9 @@ class Pieces:
             position,
             velocity,
             acceleration,
-            jerk,
+            trajectory.jerk_pieces.c,
+            trajectory.path_spline,
+            robot,
         )
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -176,27 +132,38 @@ class Pieces:
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
-        piece = np.clip(
-            np.searchsorted(self.times, t, side="right") - 1, 0, len(self.lengths) - 1
-        )
+        piece = np.searchsorted(self.times, t, side="right") - 1
+        piece = np.clip(piece, 0, len(self.lengths) - 1)
         return piece, np.clip((t - self.times[piece]) / self.lengths[piece], 0.0, 1.0)
+
+    def times_of(self, s: np.ndarray) -> np.ndarray:
+        """Find the times, (P,), s, at which path coordinates, (P,), are reached; s(t) does not decrease."""
+        low = np.zeros(len(s))
+        high = np.full(len(s), self.times[-1])
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            before = self.path_coordinate(middle) < s
+            low = np.where(before, middle, low)
+            high = np.where(before, high, middle)
+        return 0.5 * (low + high)
 
 
 @dataclass(frozen=True, eq=False)
-class States:
+class MotionStates:
     """The motion at K places, ascending in time; where pieces join, both sides.
 
     Attributes
     ----------
     piece : (K,) int ndarray
-    u, t : (K,) ndarray
-        Place in the piece; time, s.
+    u, t, s : (K,) ndarray
+        Place in the piece; time, s; path coordinate.
     q, qdot, qddot, qdddot, tau : (K, n) ndarray
     """
 
     piece: np.ndarray
     u: np.ndarray
     t: np.ndarray
+    s: np.ndarray
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
@@ -204,46 +171,83 @@ class States:
     tau: np.ndarray
 
     @classmethod
-    def at(
-        cls, pieces: Pieces, robot: Robot, piece: np.ndarray, u: np.ndarray
-    ) -> States:
+    def at(cls, pieces: Pieces, piece: np.ndarray, u: np.ndarray) -> MotionStates:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
-        piece, u = piece[order], u[order]
-        again = (
-            (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0)
-        )
+        piece = piece[order]
+        u = u[order]
+        near = (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= SAME_PLACE)
+        again = near & ((u[1:] < 1.0) | (u[:-1] == 1.0))  # an end stays
         first = np.append(True, ~again)[: len(piece)]
-        piece, u = piece[first], u[first]
+        piece = piece[first]
+        u = u[first]
+        t = pieces.time(piece, u)
         q = pieces.nodes[piece] + values_of(pieces.position[:, piece], u)
-        qdot, qddot = (
-            values_of(pieces.velocity[:, piece], u),
-            values_of(pieces.acceleration[:, piece], u),
+        qdot, qddot, qdddot = (
+            values_of(coefficients[:, piece], u)
+            for coefficients in (pieces.velocity, pieces.acceleration, pieces.jerk)
         )
-        qdddot = values_of(pieces.jerk[:, piece], u)
-        return cls(
-            piece,
-            u,
-            pieces.time(piece, u),
-            q,
-            qdot,
-            qddot,
-            qdddot,
-            torques(robot, q, qdot, qddot),
-        )
+        tau = torques(pieces.robot, q, qdot, qddot)
+        s = pieces.path_coordinate(t)
+        return cls(piece, u, t, s, q, qdot, qddot, qdddot, tau)
 
-    def only(self, chosen: np.ndarray | slice) -> States:
+    def torque(self, _robot: Robot) -> np.ndarray:
+        """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
+        return self.tau
+
+    def only(self, chosen: np.ndarray | slice) -> MotionStates:
         """Return some of the states, in the order that is chosen."""
-        return States(*(getattr(self, field.name)[chosen] for field in fields(self)))
-
-    def merged(self, other: States) -> tuple[States, np.ndarray]:
-        """Return these states and others, ascending, and where each one was among those put one after the other."""
-        names = [field.name for field in fields(self)]
-        both = States(
-            *(
-                np.concatenate([getattr(self, name), getattr(other, name)])
-                for name in names
-            )
+        return MotionStates(
+            *(getattr(self, field.name)[chosen] for field in fields(self))
         )
+
+    def merge(self, other: MotionStates) -> tuple[MotionStates, np.ndarray]:
+        """Return these states and others, ascending, and where each one was among those put one after the other."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        both = MotionStates(*(np.concatenate(pair) for pair in pairs))
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What is verified, and against what.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    robot : Robot
+    task_map : TaskMap
+    path : Path
+    pieces : Pieces
+    states : MotionStates
+        The motion at all times at which it is checked.
+    options : VerifyOptions
+    """
+
+    trajectory: Trajectory
+    robot: Robot
+    task_map: TaskMap
+    path: Path
+    pieces: Pieces
+    states: MotionStates
+    options: VerifyOptions
+
+    @property
+    def task(self) -> Task:
+        """Task of the trajectory."""
+        return self.trajectory.task
+
+    def with_states_at(self, s: np.ndarray) -> Given:
+        """Return the same, with the states at further path coordinates, (P,)."""
+        places = self.pieces.place(self.pieces.times_of(s))
+        both, _ = self.states.merge(MotionStates.at(self.pieces, *places))
+        apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > SAME_PLACE)
+        return replace(self, states=both.only(np.append(True, apart)))
+
+    def within(self, begin: float, end: float) -> Given:
+        """Return the same with only the states in a part of the path, its ends included."""
+        more = self.with_states_at(np.array([begin, end]))
+        s = more.states.s
+        inside = (s >= begin - 1e-9) & (s <= end + 1e-9)
+        return replace(more, states=more.states.only(inside))

@@ -1,12 +1,9 @@
-"""The outcome of a verification, as data.
-
-What passes a verification.
-"""
+"""The outcome of a verification, as data, and what passes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from brachis.common.summary import Summary
@@ -29,12 +26,13 @@ class Check:
     unit : str
         ``-`` for ratios.
     passed : bool
+        Whether the value is at most the allowed one.
     subject : str or None
-        Where a joint, or the tool, is to blame.
+        The joint with the worst value, or the tool.
     time : float or None
         When, s.
     remark : str
-        What there is to know of the check itself; empty where there is nothing.
+        Note on the check itself; often empty.
     of_limit : bool
         Whether it compares the motion with a limit, so that `value` is a ratio.
     """
@@ -43,11 +41,15 @@ class Check:
     value: float
     allowed: float
     unit: str
-    passed: bool
+    passed: bool = field(init=False)
     subject: str | None = None
     time: float | None = None
     remark: str = ""
     of_limit: bool = False
+
+    def __post_init__(self) -> None:
+        """Compare."""
+        object.__setattr__(self, "passed", bool(self.value <= self.allowed))
 
     def figures(self, *, degrees: bool) -> tuple[str, str, str]:
         """Write what was found, what is allowed, and the unit of both; ratios to a limit with six decimals.
@@ -66,12 +68,11 @@ class Check:
     def in_words(self) -> str:
         """Say what was found, and what is allowed."""
         unit = "" if self.unit == "-" else f" {self.unit}"
-        blame = f", {self.subject}" if self.subject else ""
-        found, most = write_apart(self.value, self.allowed)
-        allowed = f"{'<=' if self.passed else 'FAILED, allowed'} {most}{unit}"
-        return f"{found}{unit} {allowed}{blame}" + (
-            f" at {self.time:.4g} s" if self.time is not None else ""
-        )
+        found, allowed = write_apart(self.value, self.allowed)
+        verdict = "<=" if self.passed else "FAILED, allowed"
+        subject = f", {self.subject}" if self.subject else ""
+        time = f" at {self.time:.4g} s" if self.time is not None else ""
+        return f"{found}{unit} {verdict} {allowed}{unit}{subject}{time}"
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,8 +1,9 @@
-"""Re-checks a trajectory on a dense grid with Pinocchio, sharing no code with the optimiser.
+"""Verification of a trajectory on a dense grid, which shares no code with the optimiser.
 
-Position errors come from forward kinematics of the saved joint polynomials against the path at the saved s(t), torques
-from Pinocchio's rnea and the friction formula written out again, velocities and accelerations from differentiating the
-polynomials. What is judged is the file that a controller would execute, not the optimiser's idea of it.
+Positions come from the saved joint polynomials and the kinematics of the URDF, and are compared with the path at the
+saved s(t). Torques come from Newton's and Euler's equations and the friction formula written out again, velocities and
+accelerations from differentiating the polynomials. So the file is verified that a controller would execute, not the
+optimiser's idea of it.
 """
 
 from __future__ import annotations
@@ -12,26 +13,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.path import Path, path_of
-from brachis.robot import Robot, TaskMap, bind
+from brachis.path import path_of
+from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace
-from brachis.trajectory import Motion, Trajectory, motion_of
+from brachis.trajectory import Motion, motion_of
 from brachis.verify.checks import (
-    check_instants,
-    continuity_checks,
-    end_checks,
-    progress_checks,
-    reversals,
-    seam_checks,
-    sharpest,
-    spline_checks,
-    spread_out,
-    within_path_pieces,
+    check_continuity,
+    check_ends,
+    check_progress,
+    check_splines,
 )
-from brachis.verify.limits import Given, limit_checks
+from brachis.verify.limits import check_limits
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Pieces, States
+from brachis.verify.motion import Given, MotionStates, Pieces
+from brachis.verify.places import all_places
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 
@@ -89,59 +85,42 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    pieces, path = Pieces.of(trajectory), path_of(task_map, trajectory.task)
-    parts = (
-        spread_out(trajectory, pieces, options),
-        within_path_pieces(trajectory, pieces, path.breaks, options),
-        sharpest(pieces),
-        reversals(pieces, robot),
-    )
-    places = [np.concatenate(part) for part in zip(*parts, strict=True)]
-    check_instants(len(places[0]))
-    states = States.at(pieces, robot, *places)
-    path_check = _path_error(trajectory, path, task_map, states, options)
-    ratios = limit_checks(Given(robot, trajectory, pieces, states), own_limits, options)
+    pieces = Pieces.of(trajectory, robot)
+    path = path_of(task_map, trajectory.task)
+    places = all_places(trajectory, pieces, path, options)
+    states = MotionStates.at(pieces, *places)
+    given = Given(trajectory, robot, task_map, path, pieces, states, options)
+    path_check = _check_path(given)
+    ratios = check_limits(given, own_limits)
     checks = [
         path_check,
         *ratios,
-        *progress_checks(trajectory, states.t, options),
-        *end_checks(trajectory, robot, task_map, path, options),
-        *spline_checks(trajectory, robot, states, options),
-        *continuity_checks(trajectory, pieces, robot, options),
-        *seam_checks(trajectory, pieces, robot, options),
+        *check_progress(given),
+        *check_ends(given),
+        *check_splines(given),
+        *check_continuity(given),
     ]
     worst = max((check.value for check in ratios), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)
 
 
-def _path_error(
-    trajectory: Trajectory,
-    path: Path,
-    task_map: TaskMap,
-    states: States,
-    options: VerifyOptions,
-) -> Check:
-    """Largest distance of the tool from the path at the saved s(t)."""
-    once = np.append(np.diff(states.t) > 0.0, True)  # not both sides of a node
-    t, q = states.t[once], states.q[once]
-    targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
+def _check_path(given: Given) -> Check:
+    """Check the largest distance of the tool from the path at the saved s(t)."""
+    once = np.append(np.diff(given.states.t) > 0.0, True)  # not both sides of a node
+    states = given.states.only(once)
+    task_map = given.task_map
+    targets = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
+    placements = tool_placements(task_map.robot, states.q)
     of_joints = isinstance(task_map, JointSpace)
-    found = (
-        q if of_joints else task_map.of_placements(*tool_placements(task_map.robot, q))
-    )
+    found = states.q if of_joints else task_map.of_placements(*placements)
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = int(np.argmax(errors))
-    tolerance, remark = options.path_tolerance, ""
-    if trajectory.recovered is not None:
-        tolerance = max(tolerance, trajectory.recovered.tolerance)
+    tolerance = given.options.path_tolerance
+    remark = ""
+    recovered = given.trajectory.recovered
+    if recovered is not None:
+        tolerance = max(tolerance, recovered.tolerance)
         remark = "the path was recovered from the motion"
-    passed = bool(errors[worst] <= tolerance)
-    return Check(
-        "path error",
-        float(errors[worst]),
-        tolerance,
-        "m, rad",
-        passed,
-        time=float(t[worst]),
-        remark=remark,
-    )
+    error = float(errors[worst])
+    time = float(states.t[worst])
+    return Check("path error", error, tolerance, "m, rad", time=time, remark=remark)

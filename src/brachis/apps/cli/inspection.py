@@ -71,6 +71,7 @@ def inspect(
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
+    from brachis.limits import describe_guarantees, joint_limits_of, limits_of
     from brachis.problem.plausibility import of_robot
     from brachis.robot import bind
     from brachis.robot.from_task import in_use, robot_from_settings
@@ -112,6 +113,7 @@ def inspect(
         remarks.append(missing)
     if posture is not None:
         remarks.append(_tool_pose(robot, posture))
+    limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     data = {
         "robot": str(source),
         "tool_frame": robot.tool_frame,
@@ -121,6 +123,7 @@ def inspect(
         "remarks": remarks,
         "in_use": in_use(robot),
         "joints": _joint_rows(robot),
+        "guarantees": describe_guarantees(limits),
         "decompositions": [_decomposition(candidate) for candidate in candidates],
         "fits": [fit.to_dict() for fit in task.fits] if task else [],
     }
@@ -145,6 +148,8 @@ def _print_robot(
     print_table("joints", shown, cells, numbers={*shown} - {"joint", "type"})
     for name, text in data["in_use"].items():
         console.print(f"{name}: {text}")
+    for name, text in data["guarantees"].items():
+        console.print(f"{name} limit: {text}")
     if task is not None and not task.fits:
         console.print("no part of the path comes from points")
     for fit in task.fits if task is not None else ():

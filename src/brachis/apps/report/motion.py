@@ -10,9 +10,10 @@ from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
 from brachis.apps.bottleneck.report import write_active
 from brachis.apps.bottleneck.saturation import dense_samples, saturations
 from brachis.errors import BrachisError
-from brachis.limits import Limit, Role
+from brachis.limits import Limit, Role, describe_guarantees, limits_of
 from brachis.optimise.candidate import Candidate
 from brachis.problem.plausibility import of_robot, of_task
+from brachis.robot import bind
 from brachis.robot.plausibility import Issue
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
@@ -42,6 +43,8 @@ class ReportedMotion:
         What the search did not complete.
     candidates : tuple of Candidate
         What the search looked at; none for a saved motion.
+    guarantees : dict of str to str
+        Where each limit holds, by its name.
     planned : dict of str to str
         How the motion was planned, if that is known.
     degrees : bool
@@ -57,6 +60,7 @@ class ReportedMotion:
     remarks: tuple[Issue, ...]
     not_completed: tuple[str, ...]
     candidates: tuple[Candidate, ...]
+    guarantees: dict[str, str]
     planned: dict[str, str]
     degrees: bool
 
@@ -65,7 +69,7 @@ def reported_motion(
     motion: PlannedMotion | Trajectory, *, degrees: bool = False
 ) -> ReportedMotion:
     """Gather what there is to say of a motion; a saved one is verified again."""
-    limits: list[Limit] | None = None
+    limits: list[Limit] = []
     not_completed: tuple[str, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     planned = {}
@@ -87,6 +91,9 @@ def reported_motion(
         if motion.interrupted:
             early = "the search was ended early: a faster motion may have been missed"
             not_completed = (early, *not_completed)
+    if not limits:
+        robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+        limits += limits_of(robot, trajectory.task)
     ratios = limit_ratios(trajectory, limits)
     found = saturations(ratios)
     return ReportedMotion(
@@ -99,6 +106,7 @@ def reported_motion(
         remarks=remarks,
         not_completed=not_completed,
         candidates=candidates,
+        guarantees=describe_guarantees(limits),
         planned=planned,
         degrees=degrees,
     )

@@ -120,6 +120,7 @@ def make_report(
         held_back=reported.held_back,
         remarks=reported.remarks,
         not_completed=reported.not_completed,
+        guarantees=reported.guarantees,
         identity=tables.identity(reported),
         kinds=joint_rows_of(reported.trajectory),
         pictures=list(_pictures(reported)),

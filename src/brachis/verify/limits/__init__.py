@@ -1,85 +1,106 @@
-"""Ratios to limits by formulas of the verification's own, which share nothing with `brachis.limits`: a kind a file.
+"""Ratios to limits by formulas of the verification's own, which share nothing with `brachis.limits`.
 
-Only limits of a user's own that bring no check along are looked at by their own values (`own`), and marked so.
+Only a user's own limit without a check is verified by its own values, and marked so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
+
+from brachis.errors import InputError
 from brachis.robot.custom_limits import LimitModel, custom_limits
-from brachis.verify.limits.custom import check_own
+from brachis.task import LIMIT_KINDS
 from brachis.verify.limits.joint import (
-    worst_acceleration,
-    worst_jerk,
-    worst_position,
-    worst_velocity,
-)
-from brachis.verify.limits.protocol import Given, LimitCheck, Worst
-from brachis.verify.limits.tool import (
-    worst_least_process_speed,
-    worst_process_speed,
-    worst_tool_acceleration,
-    worst_tool_angular_speed,
-    worst_tool_speed,
-)
-from brachis.verify.limits.torque import (
-    worst_power,
-    worst_rms_torque,
-    worst_torque,
+    JOINT_CHECKS,
     worst_torque_at_speed,
-    worst_torque_rate,
     worst_total_power,
 )
-from brachis.verify.report import Check, VerifyOptions
+from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
+from brachis.verify.limits.tool import TOOL_CHECKS
+from brachis.verify.motion import Given, MotionStates
+from brachis.verify.report import Check
 
-TABLE: dict[str, LimitCheck] = {
-    "torque": worst_torque,
-    "velocity": worst_velocity,
-    "acceleration": worst_acceleration,
-    "position": worst_position,
-    "tool_speed": worst_tool_speed,
-    "tool_acceleration": worst_tool_acceleration,
-    "tool_angular_speed": worst_tool_angular_speed,
-    "process_speed": worst_process_speed,
-    "least_process_speed": worst_least_process_speed,
-    "power": worst_power,
-    "total_power": worst_total_power,
-    "torque_speed": worst_torque_at_speed,
-    "rms_torque": worst_rms_torque,
-    "jerk": worst_jerk,
-    "torque_rate": worst_torque_rate,
+_BEHIND: dict[str, dict[str, LimitCheck]] = {
+    "position": TOOL_CHECKS,
+    "power": {
+        "total_power": worst_total_power,
+        "torque_speed": worst_torque_at_speed,
+    },
 }
+TABLE: dict[str, LimitCheck] = {}
+"""By kind, in the order in which limits are checked: joint limits, with the others behind some of them."""
+for _kind in LIMIT_KINDS:
+    TABLE[_kind] = JOINT_CHECKS[_kind]
+    TABLE |= _BEHIND.get(_kind, {})
 
 
-def limit_checks(
-    given: Given, further: Sequence[LimitModel], options: VerifyOptions
-) -> list[Check]:
-    """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the `further` ones."""
-    found = [
-        (kind.replace("_", " "), worst)
-        for kind, find in TABLE.items()
-        if (worst := find(given)) is not None
-    ]
-    found += [
-        check_own(model, given)
-        for model in (*custom_limits(given.trajectory.task), *further)
-    ]
-    allowed = 1.0 + options.ratio_tolerance
+def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]:
+    """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the user's."""
+    found = [(kind.replace("_", " "), find(given)) for kind, find in TABLE.items()]
+    models = (*custom_limits(given.task), *user_limits)
+    found += [_check_model(model, given) for model in models]
+    allowed = 1.0 + given.options.ratio_tolerance
     return [
         Check(
             f"{name} ratio",
-            ratio,
+            worst.ratio,
             allowed,
             "-",
-            ratio <= allowed,
-            subject,
-            time,
-            remark,
+            worst.subject,
+            worst.time,
+            worst.remark,
             of_limit=True,
         )
-        for name, (ratio, subject, time, remark) in found
+        for name, worst in found
+        if worst is not None
     ]
 
 
-__all__ = ["TABLE", "Given", "LimitCheck", "Worst", "limit_checks"]
+def _check_model(model: LimitModel, given: Given) -> tuple[str, Worst]:
+    """Find the worst ratio to a limit of the user's, and its name.
+
+    A model may have a method ``check(robot, q, qdot, qddot, tau)`` that returns ratios, (K, c), by a formula other
+    than the limit's. Without one, the limit's own values are checked densely.
+    """
+    limit = model.bind(given.robot)
+    subjects = [label.subject for label in limit.labels]
+    formula = getattr(model, "check", None)
+    if formula is None:
+        return limit.name, _check_values(limit, given, subjects)
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        motion = (states.q, states.qdot, states.qddot, states.tau)
+        found = np.abs(formula(given.robot, *motion))
+        shape = (len(states.t), len(subjects))
+        if found.shape != shape:
+            raise InputError(
+                "has the wrong shape",
+                where=f"{type(model).__name__}.check",
+                found=found.shape,
+                allowed=f"{shape}, a ratio for every moment and label",
+            )
+        return found
+
+    return limit.name, worst_between(given, ratios, subjects)
+
+
+def _check_values(limit: Any, given: Given, subjects: Sequence[str]) -> Worst:
+    """Find the worst ratio by the values of a `brachis.limits.Limit` itself."""
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        return np.abs(limit.ratios(states, states.t))
+
+    if limit.guarantee.is_mean:
+        means = ratios(given.states)[0]
+        column = int(np.argmax(means))
+        time = float(given.states.t[-1])
+        worst = Worst(float(means[column]), subjects[column], time)
+    else:
+        worst = worst_between(given, ratios, subjects)
+    return worst._replace(remark="checked by its own formula")
+
+
+__all__ = ["TABLE", "check_limits"]

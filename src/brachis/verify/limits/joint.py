@@ -1,72 +1,144 @@
-"""v_min <= qdot <= v_max, |qddot| <= a_max and |qdddot| <= j_max, exactly: the saved motion is polynomial.
+"""Ratios of the joints' motion to their limits. Positions and their derivatives are exact: they are polynomials.
 
-q_min <= q <= q_max, exactly: the saved motion is polynomial.
+Torques and what follows from them are checked densely.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
-from brachis.verify.limits.protocol import Given, Worst, largest
+from brachis.robot import Robot
+from brachis.verify.limits.protocol import LimitCheck, Worst, largest, worst_between
+from brachis.verify.mechanics import torque_rates
+from brachis.verify.motion import Given, MotionStates
 
 
-def worst_velocity(given: Given) -> Worst | None:
-    """Find the largest velocity ratio, anywhere."""
-    limits = given.robot.limits
-    return _worst(
-        given, given.pieces.velocity, limits.velocity_lower, limits.velocity_upper
-    )
-
-
-def worst_acceleration(given: Given) -> Worst | None:
-    """Find the largest acceleration ratio, anywhere."""
-    limit = given.robot.limits.acceleration
-    return _worst(given, given.pieces.acceleration, -limit, limit)
-
-
-def worst_jerk(given: Given) -> Worst | None:
-    """Find the largest jerk ratio, anywhere."""
-    limit = given.robot.limits.jerk
-    return _worst(given, given.pieces.jerk, -limit, limit)
-
-
-def _worst(
-    given: Given, rates: np.ndarray, lower: np.ndarray, upper: np.ndarray
-) -> Worst | None:
-    """Compare polynomials in Bernstein form, (m + 1, L, n), with limits below and above zero, (n,) each."""
+def _worst_derivative(kind: str, given: Given) -> Worst | None:
+    """Find the largest ratio of a derivative of the positions, anywhere; the kind names it in `Pieces`."""
+    lower, upper = given.robot.limits.both_ways(kind)
     if not np.isfinite(upper).any():
         return None
+    rates = getattr(given.pieces, kind)
     return largest(given, rates / upper, rates / lower)
 
 
-_LEAST_HALF, _LARGEST_HALF = 1e-5, 1.0
-"""A position ratio of 2 is beyond the end by half the range, but by no less and no more than this, rad or m."""
-
-_REMARK = "0: the middle of the range, 1: an end"
-
-
-def worst_position(given: Given) -> Worst | None:
+def _worst_position(given: Given) -> Worst | None:
     """Find the position that is nearest to an end of its range, or furthest beyond, anywhere.
 
     Inside, the ratio is the place in the range: 0 in its middle, 1 at its ends. Of a range with one end it is
-    1 minus the distance from it, rad or m, and 0 farther away.
+    1 minus the distance from it, rad or m, and 0 farther away. Beyond an end, a ratio of 2 is half the range away, but
+    from 1e-5 to 1 rad or m.
     """
-    lower, upper = given.robot.limits.position_lower, given.robot.limits.position_upper
-    if not (np.isfinite(lower) | np.isfinite(upper)).any():
+    lower, upper = given.robot.limits.both_ways("position")
+    if np.isinf(lower).all() and np.isinf(upper).all():
         return None
     half = 0.5 * upper - 0.5 * lower
-    beyond = _worst_position(given, np.clip(half, _LEAST_HALF, _LARGEST_HALF))
+    beyond = _worst_in_range(given, np.clip(half, 1e-5, 1.0))
     if beyond.ratio > 1.0:
         return beyond
-    inside = _worst_position(
-        given, np.where(np.isfinite(half), np.maximum(half, _LEAST_HALF), 1.0)
-    )
-    return inside._replace(ratio=max(inside.ratio, 0.0), remark=_REMARK)
+    scale = np.where(np.isfinite(half), np.maximum(half, 1e-5), 1.0)
+    inside = _worst_in_range(given, scale)
+    remark = "0: the middle of the range, 1: an end"
+    return inside._replace(ratio=max(inside.ratio, 0.0), remark=remark)
 
 
-def _worst_position(given: Given, scale: np.ndarray) -> Worst:
-    """Find the largest ratio, where a way of `scale`, (n,), from an end changes it by 1."""
-    limits, pieces = given.robot.limits, given.pieces
-    above = 1.0 + (pieces.nodes - limits.position_upper + pieces.position) / scale
-    below = 1.0 + (limits.position_lower - pieces.nodes - pieces.position) / scale
+def _worst_in_range(given: Given, scale: np.ndarray) -> Worst:
+    """Find the largest ratio, where a distance of `scale`, (n,), from an end changes it by 1."""
+    lower, upper = given.robot.limits.both_ways("position")
+    pieces = given.pieces
+    above = 1.0 + (pieces.nodes - upper + pieces.position) / scale
+    below = 1.0 + (lower - pieces.nodes - pieces.position) / scale
     return largest(given, above, below)
+
+
+def _worst_quantity(
+    kind: str, quantity: Callable[[Robot, MotionStates], np.ndarray], given: Given
+) -> Worst | None:
+    """Find the largest ratio of a quantity of the joints, (K, n), at the states and between them."""
+    robot = given.robot
+    lower, upper = robot.limits.both_ways(kind)
+    if not np.isfinite(upper).any():
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        values = quantity(robot, states)
+        return np.maximum(values / upper, values / lower)
+
+    return worst_between(given, ratios, robot.joint_names)
+
+
+def _torque_rate(robot: Robot, states: MotionStates) -> np.ndarray:
+    return torque_rates(robot, states.q, states.qdot, states.qddot, states.qdddot)
+
+
+def _worst_rms_torque(given: Given) -> Worst | None:
+    """Find the largest ratio of a root mean square of torques, by Simpson's rule between all states of each piece."""
+    limit = given.robot.limits.rms_torque
+    states = given.states
+    if not np.isfinite(limit).any():
+        return None
+    steps = np.flatnonzero((np.diff(states.piece) == 0) & (np.diff(states.u) > 1e-8))
+    middle = 0.5 * (states.u[steps] + states.u[steps + 1])
+    between = MotionStates.at(given.pieces, states.piece[steps], middle)
+    lengths = states.t[steps + 1] - states.t[steps]
+    ends = states.tau[steps] ** 2 + states.tau[steps + 1] ** 2
+    mean = lengths @ ((ends + 4.0 * between.tau**2) / 6.0) / lengths.sum()
+    ratios = np.sqrt(mean) / limit
+    joint = int(np.argmax(ratios))
+    name = given.robot.joint_names[joint]
+    return Worst(float(ratios[joint]), name, float(states.t[-1]))
+
+
+JOINT_CHECKS: dict[str, LimitCheck] = {
+    "torque": partial(_worst_quantity, "torque", lambda _, states: states.tau),
+    "velocity": partial(_worst_derivative, "velocity"),
+    "acceleration": partial(_worst_derivative, "acceleration"),
+    "position": _worst_position,
+    "power": partial(
+        _worst_quantity, "power", lambda _, states: states.tau * states.qdot
+    ),
+    "rms_torque": _worst_rms_torque,
+    "jerk": partial(_worst_derivative, "jerk"),
+    "torque_rate": partial(_worst_quantity, "torque_rate", _torque_rate),
+}
+"""The check of every row of `LIMIT_KINDS`."""
+
+
+def worst_total_power(given: Given) -> Worst | None:
+    """Find the largest ratio of the sum of all joints' powers."""
+    limit = given.robot.limits.total_power
+    if not np.isfinite(limit):
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        return np.abs(np.einsum("ki,ki->k", states.tau, states.qdot))[:, None] / limit
+
+    return worst_between(given, ratios, ("all joints",))
+
+
+def worst_torque_at_speed(given: Given) -> Worst | None:
+    """Find the torque that is furthest beyond what its joint's curve allows at its speed.
+
+    The ratio is 1 on the curve; differences count as parts of the torque at rest.
+    """
+    robot = given.robot
+    curves = robot.limits.torque_speed
+    joints = [joint for joint, curve in enumerate(curves) if curve]
+    if not joints:
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        columns = []
+        for joint in joints:
+            speed, torque = np.array(curves[joint]).T
+            moving = np.abs(states.qdot[:, joint])
+            last_slope = (torque[-1] - torque[-2]) / (speed[-1] - speed[-2])
+            beyond = last_slope * np.maximum(moving - speed[-1], 0.0)
+            limit = np.maximum(np.interp(moving, speed, torque) + beyond, 0.0)
+            columns.append(1.0 + (np.abs(states.tau[:, joint]) - limit) / torque[0])
+        return np.column_stack(columns)
+
+    return worst_between(given, ratios, [robot.joint_names[joint] for joint in joints])
