@@ -19,7 +19,7 @@ from brachis.apps.cli.output import (
     json_text,
     print_error,
     print_json,
-    result_console,
+    print_lines,
 )
 from brachis.common.files import (
     atomic_write,
@@ -87,7 +87,8 @@ def check_output(
                     found="the same file",
                     allowed="another file name",
                 )
-    suffix, allowed = out.suffix.lower(), tuple(suffixes)
+    suffix = out.suffix.lower()
+    allowed = tuple(suffixes)
     if suffix not in allowed:
         raise InputError(
             "the file exists and is of another kind",
@@ -311,8 +312,7 @@ def finish(
         print_json(data)
     else:
         show()
-        for name in data.get("files", ()):
-            result_console().print(f"wrote {name}")
+        print_lines(*(f"wrote {name}" for name in data.get("files", ())))
     if result is not None and result.interrupted:
         print_error("the search was ended early; this is the best motion so far")
     for each in result.not_completed if result is not None else ():

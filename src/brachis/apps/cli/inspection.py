@@ -12,7 +12,7 @@ import typer
 
 import brachis
 from brachis.apps.cli.app import BaseFrame, Changes, Degrees, Json, ToolFrame
-from brachis.apps.cli.output import print_json, print_table, result_console
+from brachis.apps.cli.output import print_json, print_lines, print_table
 from brachis.apps.cli.settings import changed_task, task_space_of, urdf_of
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
 from brachis.errors import InputError, write_count
@@ -134,26 +134,24 @@ def _print_robot(
     robot: Robot, task: Task | None, data: dict[str, Any], *, degrees: bool
 ) -> None:
     """Print all for a person."""
-    console = result_console()
     chain = f"{robot.base_frame} -> {robot.tool_frame}"
-    console.print(f"{data['robot']}: {chain}, {write_count(robot.n, 'joint')}")
-    for remark in data["remarks"]:
-        console.print(remark)
+    print_lines(
+        f"{data['robot']}: {chain}, {write_count(robot.n, 'joint')}", *data["remarks"]
+    )
     rows = _joint_rows(robot, degrees=degrees)
     shown = [key for key in rows[0] if any(row[key] != _NONE for row in rows)]
     cells = [[row[key] for key in shown] for row in rows]
     print_table("joints", shown, cells, numbers={*shown} - {"joint", "type"})
-    for name, text in data["in_use"].items():
-        console.print(f"{name}: {text}")
+    print_lines(*(f"{name}: {text}" for name, text in data["in_use"].items()))
     if task is not None and not task.fits:
-        console.print("no part of the path comes from points")
+        print_lines("no part of the path comes from points")
     for fit in task.fits if task is not None else ():
         _print_fit(fit)
     redundancy = data["degree_of_redundancy"]
     space = ", ".join(data["task_space"])
-    console.print(f"task space [{space}]: degree of redundancy {redundancy}")
+    print_lines(f"task space [{space}]: degree of redundancy {redundancy}")
     if redundancy < 0:
-        console.print(
+        print_lines(
             "The robot has fewer joints than the task space has rows; prescribe fewer rows."
         )
     else:
@@ -316,7 +314,6 @@ def _decomposition(candidate: Candidate) -> dict[str, Any]:
 
 def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     """Print the choices that have a solver as a table, their branches, and the reasons against the others."""
-    console = result_console()
     solved = [row for row in rows if row["solver"] != "-"]
     refused = [row for row in rows if row["solver"] == "-"]
     columns = ["redundant joints", "solver", "branches"]
@@ -329,16 +326,16 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     for row in solved:
         choices.setdefault(row["labels"], []).append(row["redundant joints"])
     for labels, joints in choices.items():
-        console.print(f"branches with {'; '.join(joints)} redundant: {labels}")
+        print_lines(f"branches with {'; '.join(joints)} redundant: {labels}")
     if refused:
-        console.print(
+        print_lines(
             f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
         )
     for row in refused[:_MOST_REFUSED]:
-        console.print(f"  {row['redundant joints']}: {row['why not']}")
+        print_lines(f"  {row['redundant joints']}: {row['why not']}")
     if len(refused) > _MOST_REFUSED:
         more = len(refused) - _MOST_REFUSED
-        console.print(f"  ... and {more} more, which --json lists")
+        print_lines(f"  ... and {more} more, which --json lists")
 
 
 def _tool_pose(robot: Robot, text: str) -> str:

@@ -20,8 +20,8 @@ from brachis.apps.cli.output import (
     json_text,
     print_error,
     print_json,
+    print_lines,
     print_verification,
-    result_console,
     show_warnings,
 )
 from brachis.apps.cli.settings import motion_file
@@ -125,7 +125,7 @@ def export(
         print_error(
             f"the period of {period:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s"
         )
-    result_console().print(f"wrote {out}")
+    print_lines(f"wrote {out}")
 
 
 def plot(
@@ -152,7 +152,7 @@ def plot(
 
     suffixes = [f".{suffix}" for suffix in SUFFIXES]
     _write_motion(out, write, suffixes, result, trajectory)
-    result_console().print(f"wrote {out}")
+    print_lines(f"wrote {out}")
 
 
 def report(
@@ -178,7 +178,7 @@ def report(
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
     page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
     _write_motion(out, page.save, (".html",), result, trajectory)
-    result_console().print(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
+    print_lines(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
         print_error(
             "the motion did not pass the verification; the report says so, and what failed"
@@ -313,4 +313,4 @@ def schema(
         sys.stdout.write(text)
         return
     write_one(out, lambda path: write_text(text, path), (".json",))
-    result_console().print(f"wrote {out}")
+    print_lines(f"wrote {out}")

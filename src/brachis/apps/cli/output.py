@@ -267,6 +267,12 @@ def result_console() -> Console:
     )
 
 
+def print_lines(*lines: str) -> None:
+    """Print lines of a result."""
+    for line in lines:
+        result_console().print(line)
+
+
 @contextmanager
 def show_warnings() -> Iterator[None]:
     """Print warnings of brachis as messages on standard error; a quiet command prints none."""

@@ -13,9 +13,9 @@ from brachis.apps.cli.app import Changes, Degrees, Json, Strict, Urdf
 from brachis.apps.cli.folder import Writer, finish, make_folder
 from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
+    print_lines,
     print_table,
     print_verification,
-    result_console,
     show_progress,
     show_warnings,
 )
@@ -132,8 +132,7 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
             f"{100.0 * (attempt.time_scaled - 1.0):.2g} % to meet the limits between collocation points"
         )
     print_table("plan", ("", ""), rows.items())
-    for fit in result.fits:
-        result_console().print(f"path from {fit}")
+    print_lines(*(f"path from {fit}" for fit in result.fits))
     if len(data["candidates"]) > 1:
         _print_candidates(data["candidates"])
     print_verification(result.verification, degrees=degrees)
@@ -238,9 +237,9 @@ def bottleneck(
     def show_report() -> None:
         redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
         end_time = f"end time t_E: {trajectory.t_end:.4f} s"
-        console = result_console()
-        console.print(f"{end_time}, redundant joints: {redundant}")
-        console.print(report.text(degrees=degrees))
+        print_lines(
+            f"{end_time}, redundant joints: {redundant}", report.text(degrees=degrees)
+        )
 
     code = finish(
         data,

@@ -12,9 +12,9 @@ from brachis.apps.cli.app import Degrees, Json
 from brachis.apps.cli.folder import finish, make_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
+    print_lines,
     print_table,
     print_verification,
-    result_console,
     show_progress,
     show_warnings,
 )
@@ -119,18 +119,15 @@ def import_(
             }
         )
         return
-    console = result_console()
-    console.print(f"end time t_E: {trajectory.t_end:.4f} s")
-    for line in recovered.told:
-        console.print(line)
+    print_lines(f"end time t_E: {trajectory.t_end:.4f} s", *recovered.told)
     print_verification(verification, degrees=degrees)
-    console.print(
+    print_lines(
         "these ratios are of the motion interpolated from the rows; the rows alone prove:"
     )
     for proven in bound_ratios(trajectory):
         ratio, subject, instant = proven.worst
-        console.print(f"{proven.limit} ratio {ratio:.4f}, {subject} at {instant:.4f} s")
-    console.print(f"wrote {out}")
+        print_lines(f"{proven.limit} ratio {ratio:.4f}, {subject} at {instant:.4f} s")
+    print_lines(f"wrote {out}")
 
 
 def compare(
@@ -209,8 +206,7 @@ def _load(
 
 def _print_comparison(found: Comparison) -> None:
     """Print the comparison for a person."""
-    console = result_console()
-    console.print(found.verdict)
+    print_lines(found.verdict)
     kept = "kept, as far as rows tell"
     if found.exceeded:
         kept = f"{len(found.exceeded)} exceeded"
@@ -232,5 +228,4 @@ def _print_comparison(found: Comparison) -> None:
     columns = ("", "recorded", "between its rows up to", "planned")
     print_table("", columns, rows, numbers=columns[1:])
     assert found.recorded.recovered is not None
-    for line in (*found.remarks, *found.recorded.recovered.told):
-        console.print(line)
+    print_lines(*found.remarks, *found.recorded.recovered.told)

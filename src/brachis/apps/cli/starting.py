@@ -16,8 +16,8 @@ from brachis.apps.cli.app import BaseFrame, Json, ToolFrame
 from brachis.apps.cli.folder import write_one, write_text
 from brachis.apps.cli.output import (
     print_json,
+    print_lines,
     print_table,
-    result_console,
     show_progress,
     show_warnings,
 )
@@ -41,17 +41,15 @@ def list_robots(json: Json = False) -> None:
     if json:
         print_json({"robots": listed})
         return
-    console = result_console()
     columns = ("name", "what it is", "joints", "their names")
     rows = [
         (each["name"], each["what"], len(each["joints"]), ", ".join(each["joints"]))
         for each in listed
     ]
     print_table("robots that come with brachis", columns, rows, numbers=("joints",))
-    for each in listed:
-        console.print(f"{each['name']}: {each['urdf']}")
-    console.print(
-        "A name may stand for the URDF: brachis inspect scara3, brachis new scara3"
+    print_lines(
+        *(f"{each['name']}: {each['urdf']}" for each in listed),
+        "A name may stand for the URDF: brachis inspect scara3, brachis new scara3",
     )
 
 
@@ -99,7 +97,8 @@ def new(
             listener=listener,
         )
     write_text(starter.text, out)
-    result, robot = starter.result, starter.robot
+    result = starter.result
+    robot = starter.robot
     if json:
         print_json(
             {
@@ -111,11 +110,10 @@ def new(
             }
         )
         return
-    console = result_console()
-    console.print(
+    print_lines(
         f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}"
     )
-    console.print(
+    print_lines(
         f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out"
     )
 
@@ -216,4 +214,4 @@ def compose(
     if json:
         print_json({"urdf": str(out), "arm": str(arm), "joint": name, "root": root})
     else:
-        result_console().print(f"wrote {out}")
+        print_lines(f"wrote {out}")

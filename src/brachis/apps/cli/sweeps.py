@@ -17,8 +17,8 @@ from brachis.apps.cli.folder import Writer, end_cleanly, exit_code, write_files
 from brachis.apps.cli.output import (
     print_error,
     print_json,
+    print_lines,
     print_table,
-    result_console,
     show_progress,
 )
 from brachis.errors import write_count
@@ -99,7 +99,6 @@ def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
     from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
     from brachis.apps.sweeps.run import write_duration
 
-    console = result_console()
     found = result.summary()
     counts = ", ".join(
         f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
@@ -113,16 +112,15 @@ def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
             rows.append((heading, *(_write_value(found[name][key]) for name in shown)))
         print_table(title, ("", *shown), rows, numbers=shown)
     else:
-        console.print(title)
+        print_lines(title)
     for error, cause in found["failures"].items():
-        console.print(
+        print_lines(
             f"{cause['plans']} failed with {error}, for example: {cause['message']}"
         )
-    console.print(
+    print_lines(
         f"planning took {write_duration(found['wall_time_s'])} in all processes together"
     )
-    for name in files:
-        console.print(f"wrote {name}")
+    print_lines(*(f"wrote {name}" for name in files))
 
 
 def _write_value(value: object) -> str:

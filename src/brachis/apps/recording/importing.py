@@ -16,7 +16,11 @@ import numpy as np
 
 from brachis import ik
 from brachis.apps.recording.nodes import Nodes, nodes_of
-from brachis.apps.recording.recording import Recording, Units, read_recording
+from brachis.apps.recording.recording import (
+    Recording,
+    check_units,
+    read_recording,
+)
 from brachis.common.arguments import check_keywords, file_name, numbers
 from brachis.common.arrays import with_like_signs
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
@@ -118,7 +122,7 @@ def import_motion(
     space = task_space
     if not space:
         space = settings.task_space if settings else ik.default_task_space(given_robot)
-    recording = read_recording(path, given_robot, _read_units(units))
+    recording = read_recording(path, given_robot, check_units(units or {}))
     bound, task_map = bind(given_robot, space)
     deviation = _deviations(recording, noise)
     nodes = nodes_of(recording, deviation)
@@ -342,23 +346,6 @@ def _is_task(given: object) -> bool:
         return isinstance(given, Task | Mapping)
     suffix = pathlib.Path(given).suffix.lower()
     return suffix in TASK_SUFFIXES or kind_of(given) is Kind.TASK
-
-
-def _read_units(given: Mapping[str, str] | None) -> Units:
-    """Read units by the quantities that have them.
-
-    Raises
-    ------
-    InputError
-    """
-    if given is not None and not isinstance(given, Mapping):
-        raise InputError(
-            "wrong type",
-            where="units",
-            found=repr(given),
-            allowed='{"angle": "deg", "length": "mm", "time": "ms"}, or some of them',
-        )
-    return check_keywords(Units, "units")(**dict(given or {}))
 
 
 def _deviations(
