@@ -8,12 +8,20 @@ from math import degrees as in_degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import BaseFrame, Changes, Degrees, Json, ToolFrame
+from brachis.apps.cli.app import (
+    BaseFrame,
+    Changes,
+    Degrees,
+    Json,
+    ToolFrame,
+    changed_task,
+    task_space_of,
+    urdf_of,
+)
 from brachis.apps.cli.output import print_json, print_lines, print_table
-from brachis.apps.cli.settings import changed_task, task_space_of, urdf_of
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
 from brachis.errors import InputError, write_count
 
@@ -38,7 +46,7 @@ _OTHER_TASKS = (
 def inspect(
     source: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the "
             "points that its path follows.",
             metavar="URDF|TASK",
@@ -46,7 +54,7 @@ def inspect(
     ],
     task_space: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
             "Default: the task's, or all that the robot can."
         ),
@@ -55,13 +63,13 @@ def inspect(
     base_frame: BaseFrame = None,
     posture: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
         ),
     ] = None,
     lock: Annotated[
         list[str] | None,
-        typer.Option(help="Joint held at a position: name=value, repeatable."),
+        Option(help="Joint held at a position: name=value, repeatable."),
     ] = None,
     degrees: Degrees = False,
     changes: Changes = None,

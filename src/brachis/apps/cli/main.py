@@ -23,7 +23,6 @@ from brachis.apps.cli import (
     planning,
     recordings,
     starting,
-    sweeps,
 )
 from brachis.apps.cli.app import Verbosity, app, get_verbosity
 from brachis.apps.cli.output import (
@@ -52,7 +51,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "compose": starting.compose,
     "import": recordings.import_,
     "compare": recordings.compare,
-    "sweep": sweeps.sweep,
+    "sweep": planning.sweep,
     "schema": motions.schema,
 }
 """Commands by name, in the order of the help."""

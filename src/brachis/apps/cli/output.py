@@ -273,6 +273,14 @@ def print_lines(*lines: str) -> None:
         result_console().print(line)
 
 
+def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None:
+    """Print an answer as JSON, or as lines for a person."""
+    if as_json:
+        print_json(data)
+    else:
+        print_lines(*lines)
+
+
 @contextmanager
 def show_warnings() -> Iterator[None]:
     """Print warnings of brachis as messages on standard error; a quiet command prints none."""

@@ -1,28 +1,52 @@
-"""``brachis plan | bottleneck``: plan a task, show the motion and what holds it back."""
+"""``brachis plan | bottleneck | sweep``: plan a task, say what holds the motion back, plan a task many times."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Changes, Degrees, Json, Strict, Urdf
-from brachis.apps.cli.folder import Writer, finish, make_folder
+from brachis.apps.cli.app import (
+    Changes,
+    Degrees,
+    Json,
+    Strict,
+    Urdf,
+    Verbosity,
+    changed_task,
+    get_verbosity,
+    motion_file,
+    urdf_of,
+)
+from brachis.apps.cli.folder import (
+    Writer,
+    end_cleanly,
+    exit_code,
+    finish,
+    make_folder,
+    write_files,
+)
 from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
+    print_error,
+    print_json,
     print_lines,
     print_table,
     print_verification,
     show_progress,
     show_warnings,
 )
-from brachis.apps.cli.settings import changed_task, motion_file, urdf_of
 from brachis.errors import InputError, write_count
 
 if TYPE_CHECKING:
+    from brachis.apps.sweeps import SweepResult
     from brachis.result import Result
     from brachis.trajectory import Trajectory
 
@@ -39,10 +63,10 @@ _MOST_CANDIDATES = 40
 
 
 def plan(
-    task: Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")],
+    task: Annotated[Path, Argument(help="Task file (YAML).", metavar="TASK")],
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Folder for result.npz, result.json, overview.png and candidates.png (and fit.png, where the path was "
             "fitted to points); of a motion that fails the verification the names begin with unverified."
         ),
@@ -51,14 +75,14 @@ def plan(
     changes: Changes = None,
     view: Annotated[
         bool,
-        typer.Option("--view", help="Show the motion in the browser, until Ctrl-C."),
+        Option("--view", help="Show the motion in the browser, until Ctrl-C."),
     ] = False,
     strict: Strict = None,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
-    from brachis.apps.view import require_viser
+    from brachis.apps.view import Viewer, require_viser
 
     if view:
         require_viser()
@@ -96,7 +120,10 @@ def plan(
         complaint="the motion found did not pass the verification; it is marked unverified",
     )
     if view:
-        show(trajectory, data["candidates"], verified=result.verified, degrees=degrees)
+        viewer = Viewer(
+            trajectory, data["candidates"], verified=result.verified, degrees=degrees
+        )
+        show(viewer)
     raise typer.Exit(code)
 
 
@@ -165,20 +192,20 @@ def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
 def bottleneck(
     task: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="Task file (YAML), or result file (npz) of a motion planned before.",
             metavar="TASK|RESULT",
         ),
     ],
     check: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--check", help="Solve again with every limit raised by 1 %, and compare."
         ),
     ] = False,
     reference: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--reference",
             help="Compare with the best value known: the same problem with discontinuous torque allowed, on a fine "
             "mesh; not a proven bound. Takes seconds.",
@@ -186,7 +213,7 @@ def bottleneck(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Folder for bottleneck.json and timeline.png; of a motion that fails the verification the names "
             "begin with unverified_."
         ),
@@ -270,3 +297,105 @@ def _verify_again(trajectory: Trajectory) -> dict[str, Any]:
         "worst_ratio": verification.worst_ratio,
         "path_error": verification.path_error,
     }
+
+
+def sweep(
+    source: Annotated[Path, Argument(help="Sweep file (YAML).", metavar="SWEEP")],
+    out: Annotated[
+        Path | None,
+        Option(
+            help="Folder for plans, table.parquet, table.csv and sweep.png. Default: one in the current folder, named "
+            "as the file. A sweep that was ended continues with what is missing there."
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        Option(help="Processes. Default and largest: the number of processors."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        Option(
+            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file."
+        ),
+    ] = None,
+    retry: Annotated[
+        bool, Option("--retry", help="Plan stored failures again.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Plan a task many times, with its keys varied."""
+    from brachis.apps.sweeps.plans import VERIFIED
+
+    with end_cleanly(), _progress() as listener:
+        result = brachis.sweep(
+            source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
+        )
+    verified = result.count(VERIFIED) > 0
+    figures: dict[str, Writer] = {}
+    if result.varied and verified:
+        figures["sweep.png"] = lambda path: brachis.plots.save_figure(
+            result.plot(), path
+        )
+    drawn, failures = write_files(result.folder, {}, figures, stale=("sweep.png",))
+    files = [*map(str, result.files), *drawn]
+    if json:
+        print_json({**result.summary(), "keys": list(result.keys), "files": files})
+    else:
+        _print_sweep(result, files)
+    raise typer.Exit(exit_code(verified, failures))
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """Show how far the sweep is: in place on a terminal, otherwise one line on standard error for every 5 %."""
+    with show_progress() as status:
+        if sys.stderr.isatty() or get_verbosity() is not Verbosity.NORMAL:
+            yield status
+            return
+        last_step = -1
+
+        def listener(text: str) -> None:
+            nonlocal last_step
+            status(text)
+            done = re.match(r"(\d+) of (\d+)", text)
+            step = int(done[1]) * 20 // max(1, int(done[2])) if done else -1
+            if step != last_step:
+                print_error(text)
+            last_step = step
+
+        yield listener
+
+
+def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
+    """Print the sweep for a person."""
+    from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
+    from brachis.apps.sweeps.run import write_duration
+
+    found = result.summary()
+    counts = ", ".join(
+        f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
+    )
+    title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
+    shown = [name for name in ("best", "median", "worst") if name in found]
+    if shown:
+        rows = []
+        for key in ("t_end_s", "plan", *result.keys):
+            heading = "t_end [s]" if key == "t_end_s" else key
+            rows.append((heading, *(_write_value(found[name][key]) for name in shown)))
+        print_table(title, ("", *shown), rows, numbers=shown)
+    else:
+        print_lines(title)
+    for error, cause in found["failures"].items():
+        print_lines(
+            f"{cause['plans']} failed with {error}, for example: {cause['message']}"
+        )
+    print_lines(
+        f"planning took {write_duration(found['wall_time_s'])} in all processes together"
+    )
+    print_lines(*(f"wrote {name}" for name in files))
+
+
+def _write_value(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "" if value is None else str(value)

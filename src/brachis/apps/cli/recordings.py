@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Json
+from brachis.apps.cli.app import Degrees, Json, task_space_of
 from brachis.apps.cli.folder import finish, make_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
@@ -18,7 +19,6 @@ from brachis.apps.cli.output import (
     show_progress,
     show_warnings,
 )
-from brachis.apps.cli.settings import task_space_of
 
 if TYPE_CHECKING:
     from brachis.apps.comparison import Comparison
@@ -29,7 +29,7 @@ _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")
 
 RecordedFile = Annotated[
     Path,
-    typer.Argument(
+    Argument(
         help="CSV file: time (t, time_ms, ...), joint positions (j1, q_j1, j1_pos [deg], ...), and velocities (qd_j1, "
         "...) and accelerations (qdd_j1, ...) if known.",
         metavar="CSV",
@@ -38,7 +38,7 @@ RecordedFile = Annotated[
 
 RobotFile = Annotated[
     Path,
-    typer.Option(
+    Option(
         "--robot",
         help="URDF file; or a task file (.yaml), whose robot, limits and settings are used.",
     ),
@@ -46,43 +46,40 @@ RobotFile = Annotated[
 
 RecordedSpace = Annotated[
     str | None,
-    typer.Option(
+    Option(
         help="Task space of the path: rows such as x,y, or position, pose, pose_free_roll, joints. Default: that of "
         "the task, or the most that the robot can prescribe.",
-        show_default=False,
     ),
 ]
 
 AngleUnit = Annotated[
     str | None,
-    typer.Option("--angle", help="Unit of angles in columns without a unit: rad, deg."),
+    Option("--angle", help="Unit of angles in columns without a unit: rad, deg."),
 ]
 
 LengthUnit = Annotated[
     str | None,
-    typer.Option("--length", help="Unit of lengths in columns without a unit: m, mm."),
+    Option("--length", help="Unit of lengths in columns without a unit: m, mm."),
 ]
 
 TimeUnit = Annotated[
     str | None,
-    typer.Option("--time", help="Unit of times in a column without a unit: s, ms."),
+    Option("--time", help="Unit of times in a column without a unit: s, ms."),
 ]
 
 PathTolerance = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="Largest deviation of the recovered path, m and rad. Default: 1e-6, or more if the file's last digits or "
         "the noise are coarser.",
-        show_default=False,
     ),
 ]
 
 Noise = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="Standard deviation of measured positions, rad or m, which are then smoothed. Default: that of rounding "
         "to the file's digits.",
-        show_default=False,
     ),
 ]
 
@@ -90,7 +87,7 @@ Noise = Annotated[
 def import_(
     csv: RecordedFile,
     robot: RobotFile,
-    out: Annotated[Path, typer.Option(help="Result file (npz) to write.")],
+    out: Annotated[Path, Option(help="Result file (npz) to write.")],
     task_space: RecordedSpace = None,
     angle: AngleUnit = None,
     length: LengthUnit = None,
@@ -135,14 +132,14 @@ def compare(
     robot: RobotFile,
     keep_end: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--keep-end",
             help="End in the recorded end posture, not in any posture with the tool there.",
         ),
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Folder for today.npz, result.npz, comparison.json and comparison.png."
         ),
     ] = None,

@@ -9,19 +9,20 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 from typer.core import TyperCommand
 
 import brachis
-from brachis.apps.cli.app import BaseFrame, Json, ToolFrame
+from brachis.apps.cli.app import BaseFrame, Json, ToolFrame, urdf_of
 from brachis.apps.cli.folder import write_one, write_text
 from brachis.apps.cli.output import (
+    print_answer,
     print_json,
     print_lines,
     print_table,
     show_progress,
     show_warnings,
 )
-from brachis.apps.cli.settings import urdf_of
 from brachis.common.files import status_of, writing_errors
 from brachis.errors import InputError
 
@@ -62,11 +63,11 @@ def _describe_robot(urdf: Path) -> str:
 def new(
     urdf: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="URDF file, or the name of a robot that comes along.", metavar="URDF"
         ),
     ],
-    out: Annotated[Path, typer.Option(help="Task file to write, a new one.")] = Path(
+    out: Annotated[Path, Option(help="Task file to write, a new one.")] = Path(
         "task.yaml"
     ),
     tool_frame: ToolFrame = None,
@@ -99,22 +100,18 @@ def new(
     write_text(starter.text, out)
     result = starter.result
     robot = starter.robot
-    if json:
-        print_json(
-            {
-                "file": str(out),
-                "joint_names": list(robot.joint_names),
-                "tool_frame": robot.tool_frame,
-                "t_end": result.t_end,
-                "verified": result.verified,
-            }
-        )
-        return
-    print_lines(
-        f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}"
-    )
-    print_lines(
-        f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out"
+    joints = list(robot.joint_names)
+    print_answer(
+        {
+            "file": str(out),
+            "joint_names": joints,
+            "tool_frame": robot.tool_frame,
+            "t_end": result.t_end,
+            "verified": result.verified,
+        },
+        f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(joints)}",
+        f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out",
+        as_json=json,
     )
 
 
@@ -155,38 +152,34 @@ def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
 def compose(
     arm: Annotated[
         Path,
-        typer.Argument(
-            help="URDF file of the arm, or the name of a robot.", metavar="ARM"
-        ),
+        Argument(help="URDF file of the arm, or the name of a robot.", metavar="ARM"),
     ],
     travel: Annotated[
         tuple[float, float],
-        typer.Option("--range", help="Lowest and highest position on the rail, m."),
+        Option("--range", help="Lowest and highest position on the rail, m."),
     ],
-    velocity: Annotated[float, typer.Option(help="Limit of the rail's speed, m/s.")],
-    force: Annotated[float, typer.Option(help="Limit of the rail's drive force, N.")],
-    mass: Annotated[float, typer.Option(help="Mass of the carriage, kg.")],
-    out: Annotated[Path, typer.Option(help="URDF file to write.")],
+    velocity: Annotated[float, Option(help="Limit of the rail's speed, m/s.")],
+    force: Annotated[float, Option(help="Limit of the rail's drive force, N.")],
+    mass: Annotated[float, Option(help="Mass of the carriage, kg.")],
+    out: Annotated[Path, Option(help="URDF file to write.")],
     axis: Annotated[
         Triple,
-        typer.Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0."),
+        Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0."),
     ] = (0.0, 1.0, 0.0),
     mount_xyz: Annotated[
-        Triple, typer.Option(help="Position of the arm's root link on the carriage, m.")
+        Triple, Option(help="Position of the arm's root link on the carriage, m.")
     ] = _ZERO,
     mount_rpy_deg: Annotated[
         Triple,
-        typer.Option(
+        Option(
             help="Its roll, pitch and yaw, degrees; 180 0 0 hangs the arm upside down."
         ),
     ] = _ZERO,
-    name: Annotated[str, typer.Option(help="Name of the rail's joint.")] = "rail",
+    name: Annotated[str, Option(help="Name of the rail's joint.")] = "rail",
     root: Annotated[
-        str, typer.Option(help="Name of the root link, the world frame.")
+        str, Option(help="Name of the root link, the world frame.")
     ] = "world",
-    meshes: Annotated[
-        bool, typer.Option(help="Keep the arm's meshes, or drop them.")
-    ] = True,
+    meshes: Annotated[bool, Option(help="Keep the arm's meshes, or drop them.")] = True,
     json: Json = False,
 ) -> None:
     """Mount an arm on a linear axis, as a new URDF.
@@ -211,7 +204,8 @@ def compose(
         (".urdf",),
         (arm,),
     )
-    if json:
-        print_json({"urdf": str(out), "arm": str(arm), "joint": name, "root": root})
-    else:
-        print_lines(f"wrote {out}")
+    print_answer(
+        {"urdf": str(out), "arm": str(arm), "joint": name, "root": root},
+        f"wrote {out}",
+        as_json=json,
+    )
