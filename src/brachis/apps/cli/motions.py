@@ -23,7 +23,6 @@ from brachis.apps.cli.output import (
     print_json,
     print_lines,
     print_verification,
-    show_warnings,
 )
 from brachis.common import interrupts
 from brachis.common.files import read_file
@@ -116,8 +115,7 @@ def export(
             trajectory, path, form=form, dt=dt, last=last, joints=names, slower=slower
         )
 
-    with show_warnings():
-        _write_motion(out, write, (settings.suffix,), result, trajectory)
+    _write_motion(out, write, (settings.suffix,), result, trajectory)
     period = settings.dt if dt is None else dt
     if period > trajectory.t_end:
         print_error(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import re
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,9 +16,7 @@ from brachis.apps.cli.app import (
     Json,
     Strict,
     Urdf,
-    Verbosity,
     changed_task,
-    get_verbosity,
     motion_file,
     urdf_of,
 )
@@ -35,13 +30,11 @@ from brachis.apps.cli.folder import (
 )
 from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
-    print_error,
     print_json,
     print_lines,
     print_table,
     print_verification,
     show_progress,
-    show_warnings,
 )
 from brachis.errors import InputError, write_count
 
@@ -58,8 +51,6 @@ _PLANNED = (
     "fit.png",
 )
 _BOTTLENECK = ("bottleneck.json", "timeline.png")
-_MOST_CANDIDATES = 40
-"""Candidates that are listed on the screen."""
 
 
 def plan(
@@ -87,7 +78,7 @@ def plan(
     if view:
         require_viser()
     make_folder(out, _PLANNED, (task, urdf))
-    with show_warnings(), show_progress() as listener:
+    with show_progress() as listener:
         result = brachis.plan(
             urdf and urdf_of(urdf),
             changed_task(task, changes, strict=strict),
@@ -182,7 +173,7 @@ def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
     """Print the candidates of the search, the fastest first; the same motion is shown once."""
     from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
 
-    rows = candidate_rows(candidates)[:_MOST_CANDIDATES]
+    rows = candidate_rows(candidates)[:40]
     others = len(candidates) - len(rows)
     more = f", {others} of them in the JSON only" if others else ""
     title = f"candidates ({len(candidates)}{more})"
@@ -233,7 +224,7 @@ def bottleneck(
     make_folder(out, _BOTTLENECK, (task, urdf))
     source = motion_file(task)
     result = None
-    with show_warnings(), show_progress() as listener:
+    with show_progress() as listener:
         if source.suffix.lower() == ".npz":
             given = {"--urdf": urdf, "--set": changes, "--strict": strict}
             for option, value in given.items():
@@ -326,7 +317,7 @@ def sweep(
     """Plan a task many times, with its keys varied."""
     from brachis.apps.sweeps.plans import VERIFIED
 
-    with end_cleanly(), _progress() as listener:
+    with end_cleanly(), show_progress(in_logs=True) as listener:
         result = brachis.sweep(
             source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
         )
@@ -343,27 +334,6 @@ def sweep(
     else:
         _print_sweep(result, files)
     raise typer.Exit(exit_code(verified, failures))
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """Show how far the sweep is: in place on a terminal, otherwise one line on standard error for every 5 %."""
-    with show_progress() as status:
-        if sys.stderr.isatty() or get_verbosity() is not Verbosity.NORMAL:
-            yield status
-            return
-        last_step = -1
-
-        def listener(text: str) -> None:
-            nonlocal last_step
-            status(text)
-            done = re.match(r"(\d+) of (\d+)", text)
-            step = int(done[1]) * 20 // max(1, int(done[2])) if done else -1
-            if step != last_step:
-                print_error(text)
-            last_step = step
-
-        yield listener
 
 
 def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:

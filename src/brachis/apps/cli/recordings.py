@@ -17,7 +17,6 @@ from brachis.apps.cli.output import (
     print_table,
     print_verification,
     show_progress,
-    show_warnings,
 )
 
 if TYPE_CHECKING:
@@ -155,7 +154,7 @@ def compare(
     from brachis.apps.comparison import plot_comparison
 
     make_folder(out, _FILES, (csv, robot))
-    with show_warnings(), show_progress() as listener:
+    with show_progress() as listener:
         trajectory = _load(
             csv, robot, task_space, angle, length, time, tolerance, noise
         )

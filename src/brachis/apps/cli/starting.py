@@ -21,7 +21,6 @@ from brachis.apps.cli.output import (
     print_lines,
     print_table,
     show_progress,
-    show_warnings,
 )
 from brachis.common.files import status_of, writing_errors
 from brachis.errors import InputError
@@ -89,7 +88,7 @@ def new(
                 allowed="a new file",
                 hint="Choose another name with --out",
             )
-    with show_warnings(), show_progress() as listener:
+    with show_progress() as listener:
         starter = starter_task(
             urdf_of(urdf),
             folder=out.parent,

@@ -36,8 +36,6 @@ from brachis.task.points.points import Points
 from brachis.trajectory import Recovered, Trajectory
 from brachis.trajectory.recovered import LARGEST, check_tolerance
 
-_POINTS = 2000
-"""Points of a motion to which its path is fitted."""
 _SURE = 3.0
 """Largest deviation of measured positions, in standard deviations."""
 
@@ -274,11 +272,12 @@ def _tool_speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarra
 
 
 def _choose_evenly(length: np.ndarray) -> np.ndarray:
-    """Choose indices at about equal distances, the first and the last one among them."""
+    """Choose 2000 indices at about equal distances, the first and the last one among them."""
+    count = 2000
     end = len(length) - 1
-    even = np.searchsorted(length, np.linspace(0.0, length[-1], _POINTS)).clip(max=end)
+    even = np.searchsorted(length, np.linspace(0.0, length[-1], count)).clip(max=end)
     chosen = np.unique([0, *even, end])
-    is_apart = np.diff(length[chosen]) > 1e-3 * length[-1] / _POINTS
+    is_apart = np.diff(length[chosen]) > 1e-3 * length[-1] / count
     return chosen[np.concatenate([[True], is_apart[:-1], [True]])]
 
 

@@ -43,12 +43,8 @@ _UNIT_WORDS = "|".join({**TIMES, **ANGLES, **LENGTHS})
 _NAME_AND_UNIT = re.compile(
     rf"^(.+?)\s*(?:[\[(]\s*([a-z0-9/^]+)\s*[\])]|_((?:{_UNIT_WORDS})(?:(?:/|_|_per_)s(?:\^?2)?)?))$"
 )
-_EXACT_DIGITS = 12
-"""Decimals from which on rounding does not matter."""
 FEWEST_ROWS = 5
 """Rows of the shortest motion: a polynomial through five rows gives the derivatives."""
-_LARGEST_FILE = 64_000_000
-"""Bytes."""
 _STILL = 1e-12
 """A joint that moves less between rows with all digits stands still, rad or m."""
 _CHANGED_DIGITS = 2.2
@@ -195,7 +191,7 @@ def _read_column(
             where=where,
         )
     rounding = 0.0
-    for decimals in range(_EXACT_DIGITS):
+    for decimals in range(12):  # more do not matter
         if np.ptp(values) and np.array_equal(np.round(values, decimals), values):
             rounding = 0.5 * 10.0**-decimals * factors[unit]
             break
@@ -262,9 +258,7 @@ def read_recording(
     source = Path(path)
     joints = robot.joint_names
     check_kind(source, "a CSV file", TaskError)
-    text = read_text(
-        source, where=str(source), folder=Path.cwd(), largest=_LARGEST_FILE
-    )
+    text = read_text(source, where=str(source), folder=Path.cwd(), largest=64_000_000)
     table = read_table(
         text,
         str(source),
