@@ -15,12 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from brachis.apps.cli.output import (
-    json_text,
-    print_error,
-    print_json,
-    print_lines,
-)
+from brachis.apps.cli.output import json_text, print_error, print_json, print_lines
 from brachis.common.files import (
     atomic_write,
     is_folder,
@@ -248,13 +243,8 @@ def make_folder(
     """
     if out is None:
         return
-    try:
+    with writing_errors(out):
         out.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or str(error)
-        raise InputError(
-            "the folder cannot be made", where=str(out), found=found
-        ) from error
     inputs = tuple(inputs)
     for verified in (True, False):
         for name in _name_files(names, verified=verified):

@@ -17,13 +17,7 @@ from typing import TextIO, cast
 
 import typer
 
-from brachis.apps.cli import (
-    inspection,
-    motions,
-    planning,
-    recordings,
-    starting,
-)
+from brachis.apps.cli import inspection, motions, planning, recordings, starting
 from brachis.apps.cli.app import Verbosity, app, get_verbosity
 from brachis.apps.cli.output import (
     StandardOutput,

@@ -43,8 +43,7 @@ ResultFile = Annotated[
 def verify(
     result: ResultFile,
     urdf: Annotated[
-        Path | None,
-        Option(help="Check against this URDF instead of the saved one."),
+        Path | None, Option(help="Check against this URDF instead of the saved one.")
     ] = None,
     degrees: Degrees = False,
     json: Json = False,
@@ -83,7 +82,7 @@ def export(
     dt: Annotated[
         float | None,
         Option(
-            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations.",
+            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations."
         ),
     ] = None,
     last: Annotated[
@@ -91,14 +90,12 @@ def export(
         Option(
             help="Where the rows end: exact, at the end time, which need not be a multiple of the period; or hold, at "
             "the first multiple of it that is not before the end time, with the end posture held at rest. Default: "
-            "exact; hold for URScript.",
+            "exact; hold for URScript."
         ),
     ] = None,
     joints: Annotated[
         str | None,
-        Option(
-            help="Joints to write, in this order: j1,j2,... Default: all.",
-        ),
+        Option(help="Joints to write, in this order: j1,j2,... Default: all."),
     ] = None,
     slower: Annotated[
         float, Option(help="How many times slower an animation shows the motion.")

@@ -43,13 +43,7 @@ if TYPE_CHECKING:
     from brachis.result import Result
     from brachis.trajectory import Trajectory
 
-_PLANNED = (
-    "result.npz",
-    "result.json",
-    "overview.png",
-    "candidates.png",
-    "fit.png",
-)
+_PLANNED = ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png")
 _BOTTLENECK = ("bottleneck.json", "timeline.png")
 
 
@@ -65,8 +59,7 @@ def plan(
     urdf: Urdf = None,
     changes: Changes = None,
     view: Annotated[
-        bool,
-        Option("--view", help="Show the motion in the browser, until Ctrl-C."),
+        bool, Option("--view", help="Show the motion in the browser, until Ctrl-C.")
     ] = False,
     strict: Strict = None,
     degrees: Degrees = False,

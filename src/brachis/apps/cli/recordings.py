@@ -47,7 +47,7 @@ RecordedSpace = Annotated[
     str | None,
     Option(
         help="Task space of the path: rows such as x,y, or position, pose, pose_free_roll, joints. Default: that of "
-        "the task, or the most that the robot can prescribe.",
+        "the task, or the most that the robot can prescribe."
     ),
 ]
 
@@ -70,7 +70,7 @@ PathTolerance = Annotated[
     float | None,
     Option(
         help="Largest deviation of the recovered path, m and rad. Default: 1e-6, or more if the file's last digits or "
-        "the noise are coarser.",
+        "the noise are coarser."
     ),
 ]
 
@@ -78,7 +78,7 @@ Noise = Annotated[
     float | None,
     Option(
         help="Standard deviation of measured positions, rad or m, which are then smoothed. Default: that of rounding "
-        "to the file's digits.",
+        "to the file's digits."
     ),
 ]
 

@@ -162,8 +162,7 @@ def compose(
     mass: Annotated[float, Option(help="Mass of the carriage, kg.")],
     out: Annotated[Path, Option(help="URDF file to write.")],
     axis: Annotated[
-        Triple,
-        Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0."),
+        Triple, Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0.")
     ] = (0.0, 1.0, 0.0),
     mount_xyz: Annotated[
         Triple, Option(help="Position of the arm's root link on the carriage, m.")

@@ -16,11 +16,7 @@ import numpy as np
 
 from brachis import ik
 from brachis.apps.recording.nodes import Nodes, nodes_of
-from brachis.apps.recording.recording import (
-    Recording,
-    check_units,
-    read_recording,
-)
+from brachis.apps.recording.recording import Recording, check_units, read_recording
 from brachis.common.arguments import check_keywords, file_name, numbers
 from brachis.common.arrays import with_like_signs
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of

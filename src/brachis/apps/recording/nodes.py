@@ -119,10 +119,7 @@ def _interpolate(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray, 
     note = (
         "velocities and accelerations are those of polynomials through five rows each"
     )
-    rates = (
-        (1, recording.qdot, "velocities"),
-        (2, recording.qddot, "accelerations"),
-    )
+    rates = ((1, recording.qdot, "velocities"), (2, recording.qddot, "accelerations"))
     for order, given, words in rates:
         if given is None:
             continue

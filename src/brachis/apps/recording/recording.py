@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from brachis.common.arrays import freeze
 from brachis.common.files import check_kind, read_text
 from brachis.errors import InputError, TaskError, UnknownNameError, write_count
 from brachis.robot import Robot
@@ -229,11 +228,6 @@ class Recording:
     source: str
     notes: tuple[str, ...]
 
-    def __post_init__(self) -> None:
-        """Take copies that cannot be written to."""
-        rates = (name for name in ("qdot", "qddot") if getattr(self, name) is not None)
-        freeze(self, "t", "q", "rounding", *rates)
-
 
 def read_recording(
     path: str | os.PathLike[str], robot: Robot, units: Mapping[str, str]
@@ -369,8 +363,5 @@ def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path)
 
 def _no_motion(problem: str, t: np.ndarray, source: Path) -> TaskError:
     return TaskError(
-        problem,
-        found=write_count(len(t), "row"),
-        allowed="a motion",
-        where=str(source),
+        problem, found=write_count(len(t), "row"), allowed="a motion", where=str(source)
     )

@@ -20,15 +20,7 @@ from pydantic import (
 )
 
 from brachis.errors import TaskError
-from brachis.task.fields import (
-    Count,
-    Model,
-    Name,
-    Number,
-    Positive,
-    by_form,
-    refuse,
-)
+from brachis.task.fields import Count, Model, Name, Number, Positive, by_form, refuse
 
 MOST_PLANS = 1_000_000
 _HowMany = Annotated[Count, Field(ge=1, le=MOST_PLANS)]
