@@ -21,6 +21,7 @@ from brachis.apps.cli.app import (
     urdf_of,
 )
 from brachis.apps.cli.folder import (
+    Drawing,
     Writer,
     end_cleanly,
     exit_code,
@@ -40,6 +41,7 @@ from brachis.errors import InputError, write_count
 
 if TYPE_CHECKING:
     from brachis.apps.sweeps import SweepResult
+    from brachis.common.progress import Listener
     from brachis.result import Result
     from brachis.trajectory import Trajectory
 
@@ -72,43 +74,42 @@ def plan(
         require_viser()
     make_folder(out, _PLANNED, (task, urdf))
     with show_progress() as listener:
-        result = brachis.plan(
-            urdf and urdf_of(urdf),
-            changed_task(task, changes, strict=strict),
-            listener=listener,
-        )
+        result = _plan_task(task, urdf, changes, strict, listener)
+    plots = brachis.plots
     trajectory = result.trajectory
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
-    plots = brachis.plots
-    writers: dict[str, Writer] = {
-        "result.npz": trajectory.save,
-        "overview.png": lambda path: plots.save_figure(
-            plots.plot_overview(trajectory), path
-        ),
-        "candidates.png": lambda path: plots.save_figure(
-            plots.plot_candidates(result.candidates), path
-        ),
+    figures: dict[str, Drawing] = {
+        "overview.png": lambda: plots.plot_overview(trajectory),
+        "candidates.png": lambda: plots.plot_candidates(result.candidates),
     }
     if any(report.profile for report in result.fits):
-        writers["fit.png"] = lambda path: plots.save_figure(
-            plots.plot_fit(trajectory), path
-        )
+        figures["fit.png"] = lambda: plots.plot_fit(trajectory)
     code = finish(
         data,
-        writers,
+        {"result.npz": trajectory.save},
+        figures,
         out=out,
         names=_PLANNED,
         verified=result.verified,
         show=None if json else lambda: _print_plan(result, data, degrees=degrees),
         result=result,
-        complaint="the motion found did not pass the verification; it is marked unverified",
+        complaint="it is marked unverified",
     )
     if view:
-        viewer = Viewer(
-            trajectory, data["candidates"], verified=result.verified, degrees=degrees
-        )
-        show(viewer)
+        shown = data["candidates"]
+        show(Viewer(trajectory, shown, verified=result.verified, degrees=degrees))
     raise typer.Exit(code)
+
+
+def _plan_task(
+    task: Path,
+    urdf: Path | None,
+    changes: Sequence[str] | None,
+    strict: bool | None,
+    listener: Listener,
+) -> Result:
+    changed = changed_task(task, changes, strict=strict)
+    return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
 
 
 def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
@@ -231,40 +232,32 @@ def bottleneck(
             trajectory = brachis.Trajectory.load(source)
             data = _verify_again(trajectory)
         else:
-            result = brachis.plan(
-                urdf and urdf_of(urdf),
-                changed_task(source, changes, strict=strict),
-                listener=listener,
-            )
+            result = _plan_task(task, urdf, changes, strict, listener)
             trajectory = result.trajectory
             data = result.to_dict()
         listener("looking for what holds the motion back")
         report = brachis.bottleneck.report(
             result or trajectory, check=check, reference=reference
         )
-    plots = brachis.plots
     data["bottleneck"] = report.to_dict()
 
     def show_report() -> None:
         redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
-        end_time = f"end time t_E: {trajectory.t_end:.4f} s"
         print_lines(
-            f"{end_time}, redundant joints: {redundant}", report.text(degrees=degrees)
+            f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}",
+            report.text(degrees=degrees),
         )
 
     code = finish(
         data,
-        {
-            "timeline.png": lambda path: plots.save_figure(
-                plots.plot_timeline(trajectory), path
-            )
-        },
+        {},
+        {"timeline.png": lambda: brachis.plots.plot_timeline(trajectory)},
         out=out,
         names=_BOTTLENECK,
         verified=data["verified"],
         show=None if json else show_report,
         result=result,
-        complaint="the motion found did not pass the verification; what is said of it may not hold",
+        complaint="what is said of it may not hold",
     )
     raise typer.Exit(code)
 

@@ -161,19 +161,14 @@ def compare(
         found = brachis.compare(trajectory, keep_end=keep_end, listener=listener)
     code = finish(
         found.to_dict(),
-        {
-            "today.npz": found.recorded.save,
-            "result.npz": found.result.trajectory.save,
-            "comparison.png": lambda path: brachis.plots.save_figure(
-                plot_comparison(found), path
-            ),
-        },
+        {"today.npz": found.recorded.save, "result.npz": found.result.trajectory.save},
+        {"comparison.png": lambda: plot_comparison(found)},
         out=out,
         names=_FILES,
         verified=found.result.verified,
         show=None if json else lambda: _print_comparison(found),
         result=found.result,
-        complaint="the motion found did not pass the verification; it is marked unverified",
+        complaint="it is marked unverified",
     )
     raise typer.Exit(code)
 
