@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 ResultFile = Annotated[
     Path,
     Argument(
-        help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT"
+        help="Result file (npz) written by 'brachis plan --out', or its folder.",
+        metavar="RESULT",
     ),
 ]
 
@@ -195,13 +196,7 @@ def _write_motion(
 
 
 def view(
-    result: Annotated[
-        Path,
-        Argument(
-            help="Result file (npz) written by 'brachis plan --out', or the folder.",
-            metavar="RESULT",
-        ),
-    ],
+    result: ResultFile,
     host: Annotated[
         str,
         Option(
