@@ -144,6 +144,14 @@ def test_headers_that_are_not_understood(header, change, told, table, write):
         read_recording(write(header, *table[:2]), ROBOT, check_units(change))
 
 
+def test_names_of_joints_may_have_spaces(table, write):
+    t, q, _ = table
+    text = ROBOT.urdf.replace('"j2"', '"joint 2"')
+    robot = Robot.from_urdf("arm", urdf_text=text, tool_frame=ROBOT.tool_frame)
+    found = read_recording(write("t,j1,joint 2_pos,j3", t, q), robot, {})
+    np.testing.assert_array_equal(found.q, q)
+
+
 def test_only_some_velocities(table, write):
     with pytest.raises(TaskError, match="the velocity of 'j2' is missing"):
         read_recording(write("t,j1,j2,j3,qd_j1", *table[:2], table[2][:, 0]), ROBOT, {})

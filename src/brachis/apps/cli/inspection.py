@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from brachis.task import FitReport, Task
 
 _NONE = "none"
-"""What a table shows if there is no limit or no friction."""
+"""What a table shows for a missing limit, and for a joint without friction."""
 _MOST_REFUSED = 12
 """Choices without a closed form that are listed on the screen."""
 _OTHER_TASKS = (
@@ -40,7 +40,7 @@ _OTHER_TASKS = (
     "only for poses",
     "only for the position: x, y and z",
 )
-"""Reasons of families for other task spaces; they are shown only if there are no others."""
+"""Reasons of families for other task spaces; shown only without other reasons."""
 
 
 def inspect(

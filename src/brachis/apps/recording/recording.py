@@ -105,7 +105,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
     meanings = dict.fromkeys(_TIME_COLUMNS, ("t", ""))
     for kind, forms in _JOINT_COLUMNS.items():
         for joint in joints:
-            names = forms.format(joint.lower()).split(" ")
+            names = [form.format(joint.lower()) for form in forms.split()]
             meanings |= dict.fromkeys(names, (kind, joint))
     columns: Columns = {}
     problem = None

@@ -44,7 +44,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     Raises
     ------
     InputError
-        There are no keys or more than two, or no plan is verified.
+        The number of keys is not 1 or 2, or no plan is verified.
     """
     if len(keys) not in (1, 2):
         raise InputError(

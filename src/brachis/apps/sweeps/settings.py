@@ -160,7 +160,7 @@ class SweepSettings(Model):
 
     @field_validator("task")
     @classmethod
-    def _task_is_named_or_given(cls, task: JsonValue) -> JsonValue:
+    def _check_task(cls, task: JsonValue) -> JsonValue:
         if not isinstance(task, str | dict) or not task:
             raise refuse(
                 "no task", found=task, allowed="the name of a task file, or a task"
@@ -168,7 +168,7 @@ class SweepSettings(Model):
         return task
 
     @model_validator(mode="after")
-    def _every_key_in_one_place(self) -> SweepSettings:
+    def _check_places(self) -> SweepSettings:
         places: dict[str, Collection[str]] = {
             "fixed": self.fixed,
             "grid": self.grid,
