@@ -37,7 +37,6 @@ def print_table(
     rows: Iterable[Sequence[object]],
     *,
     numbers: Collection[str] = (),
-    console: Console | None = None,
 ) -> None:
     """Print a table that fits the terminal: text wraps, numbers are neither cut nor wrapped.
 
@@ -53,10 +52,8 @@ def print_table(
         A cell for each column.
     numbers : collection of str, optional
         Headings of the columns of numbers.
-    console : Console, optional
-        That of results unless given.
     """
-    console = console or result_console()
+    console = result_console()
     cells = [[str(cell) for cell in row] for row in rows]
     least = []
     most = []
