@@ -247,8 +247,13 @@ def make_folder(
     """
     if out is None:
         return
-    with writing_errors(out):
+    try:
         out.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        found = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            "the folder cannot be made", where=str(out), found=found
+        ) from error
     inputs = tuple(inputs)
     for verified in (True, False):
         for name in _name_files(names, verified=verified):
