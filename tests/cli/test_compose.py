@@ -120,17 +120,17 @@ def test_no_figure_is_guessed(run, tmp_path, missing):
 
 
 WRONG = {
-    "zero axis": (("--axis", "0,0,0"), ["axis: is not a direction"]),
+    "zero axis": (("--axis", "0,0,0"), ["axis: wrong value"]),
     "range upside down": (
         ("--range", "2", "-2"),
         [
-            "range: is not a range; found (2.0, -2.0); allowed: [low, high] in m, both finite, low < high"
+            "range: wrong value; found (2.0, -2.0); allowed: [low, high] in m, low < high"
         ],
     ),
-    "negative mass": (("--mass", "-1"), ["mass: is not positive; found -1.0"]),
+    "negative mass": (("--mass", "-1"), ["mass: wrong value; found -1.0"]),
     "angle not a number": (
         ("--mount-rpy-deg", "nan", "0", "0"),
-        ["mount_rpy: is not a rotation"],
+        ["mount_rpy: wrong value"],
     ),
     "taken name": (
         ("--name", "j1"),

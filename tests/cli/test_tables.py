@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 import brachis
+from brachis.apps.cli import output
 from brachis.apps.cli.output import print_table
 
 from .conftest import ROOT
@@ -18,8 +19,12 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 def printed(width, columns, rows, **options):
     console = Console(width=width, highlight=False, markup=False)
-    with console.capture() as capture:
-        print_table("title", columns, rows, console=console, **options)
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        console.capture() as capture,
+    ):
+        patch.setattr(output, "result_console", lambda: console)
+        print_table("title", columns, rows, **options)
     return capture.get()
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from brachis.apps.recording import Units, read_recording
+from brachis.apps.recording import read_recording
+from brachis.apps.recording.recording import check_units
 from brachis.errors import InputError, TaskError
 from brachis.robot import Robot
 
@@ -18,7 +19,7 @@ def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
     way = t**4 * (
         35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3
     )  # 3.5e-11 rad in the first millisecond
-    found = read_recording(write("t,j1,j2,j3", t, way, -way, 0.5 * way), ROBOT, Units())
+    found = read_recording(write("t,j1,j2,j3", t, way, -way, 0.5 * way), ROBOT, {})
     assert found.t[-1] == 1.0
     assert not any("stands still" in line for line in found.notes)
 
@@ -40,7 +41,7 @@ def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
 def test_names_and_units(header, units, factors, table, write):
     t, q, _ = table
     found = read_recording(
-        write(header, factors[0] * (t + 3.0), factors[1] * q), ROBOT, Units(**units)
+        write(header, factors[0] * (t + 3.0), factors[1] * q), ROBOT, units
     )
     np.testing.assert_allclose(found.t, t, atol=1e-12)
     np.testing.assert_allclose(found.q, q, atol=1e-14)
@@ -56,16 +57,14 @@ def test_accelerations_with_their_unit(unit, table, write):
         q,
         np.rad2deg(qdot),
     )
-    np.testing.assert_allclose(
-        read_recording(path, ROBOT, Units()).qddot, qdot, rtol=1e-12
-    )
+    np.testing.assert_allclose(read_recording(path, ROBOT, {}).qddot, qdot, rtol=1e-12)
 
 
 def test_columns_in_any_order_and_others_beside_them(table, write):
     t, q, qdot = table
     columns = (q[:, 2], qdot[:, [1, 0, 2]], t, q[:, :2], q[:, 0])
     path = write("j3,qd_j2,j1_vel [rad/s],dq_j3,t,j1,j2,j1_effort", *columns)
-    found = read_recording(path, ROBOT, Units())
+    found = read_recording(path, ROBOT, {})
     np.testing.assert_array_equal(found.q, q)
     np.testing.assert_array_equal(found.qdot, qdot)
     assert "left out the columns j1_effort" in found.notes
@@ -79,7 +78,7 @@ def test_semicolons_and_decimal_commas(table, tmp_path):
     ]
     path = tmp_path / "today.csv"
     path.write_text("\n".join(["t;j1;j2;j3", *rows]))
-    np.testing.assert_allclose(read_recording(path, ROBOT, Units()).q, q, atol=1e-12)
+    np.testing.assert_allclose(read_recording(path, ROBOT, {}).q, q, atol=1e-12)
 
 
 def test_prismatic_joints_have_lengths(write):
@@ -90,13 +89,13 @@ def test_prismatic_joints_have_lengths(write):
     names = robot.joint_names
     path = write(f"t,{names[0]} [mm],{names[1]}", t, 100.0 * t, 0.2 * t)
     np.testing.assert_allclose(
-        read_recording(path, robot, Units()).q, np.outer(t, [0.1, 0.2]), atol=1e-15
+        read_recording(path, robot, {}).q, np.outer(t, [0.1, 0.2]), atol=1e-15
     )
     with pytest.raises(
         TaskError,
         match=r"unknown unit of column .* \[deg\]; found deg; allowed: m, cm, mm",
     ):
-        read_recording(write(f"t,{names[0]} [deg],{names[1]}", t, t, t), robot, Units())
+        read_recording(write(f"t,{names[0]} [deg],{names[1]}", t, t, t), robot, {})
 
 
 def test_standing_still_before_and_after_does_not_count(table, write):
@@ -105,7 +104,7 @@ def test_standing_still_before_and_after_does_not_count(table, write):
         [np.repeat(q[:1], 10, axis=0), q[1:-1], np.repeat(q[-1:], 6, axis=0)]
     )
     times = 0.004 * np.arange(len(around))
-    found = read_recording(write("t,j1,j2,j3", times, around), ROBOT, Units())
+    found = read_recording(write("t,j1,j2,j3", times, around), ROBOT, {})
     assert len(found.t) == len(t)
     assert (
         "left out 0.036 s before the motion, in which the robot stands still (9 rows)"
@@ -142,14 +141,20 @@ def test_standing_still_before_and_after_does_not_count(table, write):
 )
 def test_headers_that_are_not_understood(header, change, told, table, write):
     with pytest.raises(InputError, match=told):
-        read_recording(write(header, *table[:2]), ROBOT, Units(**change))
+        read_recording(write(header, *table[:2]), ROBOT, check_units(change))
+
+
+def test_names_of_joints_may_have_spaces(table, write):
+    t, q, _ = table
+    text = ROBOT.urdf.replace('"j2"', '"joint 2"')
+    robot = Robot.from_urdf("arm", urdf_text=text, tool_frame=ROBOT.tool_frame)
+    found = read_recording(write("t,j1,joint 2_pos,j3", t, q), robot, {})
+    np.testing.assert_array_equal(found.q, q)
 
 
 def test_only_some_velocities(table, write):
     with pytest.raises(TaskError, match="the velocity of 'j2' is missing"):
-        read_recording(
-            write("t,j1,j2,j3,qd_j1", *table[:2], table[2][:, 0]), ROBOT, Units()
-        )
+        read_recording(write("t,j1,j2,j3,qd_j1", *table[:2], table[2][:, 0]), ROBOT, {})
 
 
 def test_rows_that_are_no_motion(table, write):
@@ -158,18 +163,18 @@ def test_rows_that_are_no_motion(table, write):
         TaskError, match=r"line 4: times do not ascend; found 0.004 s after 0.004 s"
     ):
         read_recording(
-            write("t,j1,j2,j3", np.concatenate([t[:2], t[1:-1]]), q), ROBOT, Units()
+            write("t,j1,j2,j3", np.concatenate([t[:2], t[1:-1]]), q), ROBOT, {}
         )
     with pytest.raises(
         TaskError, match="too few rows for a motion; found 4; allowed: 5 or more"
     ):
-        read_recording(write("t,j1,j2,j3", t[:4], q[:4]), ROBOT, Units())
+        read_recording(write("t,j1,j2,j3", t[:4], q[:4]), ROBOT, {})
     with pytest.raises(TaskError, match="the robot does not move"):
-        read_recording(write("t,j1,j2,j3", t, 0.0 * q), ROBOT, Units())
+        read_recording(write("t,j1,j2,j3", t, 0.0 * q), ROBOT, {})
     with pytest.raises(
         TaskError,
         match=r"implausible angle \(degrees\?\); found [0-9.]+ rad at j1. If these are degrees, say",
     ):
-        read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, Units())
-    with pytest.raises(TaskError, match="the file does not exist"):
-        read_recording("nowhere.csv", ROBOT, Units())
+        read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, {})
+    with pytest.raises(TaskError, match="there is no such file"):
+        read_recording("nowhere.csv", ROBOT, {})

@@ -7,7 +7,7 @@ import pytest
 
 import brachis
 from brachis.apps import bottleneck, comparison, export, plots
-from brachis.apps.recording import Units, import_motion, read_recording
+from brachis.apps.recording import import_motion, read_recording
 from brachis.apps.recording.nodes import nodes_of
 from brachis.apps.recording.recording import Recording
 from brachis.errors import InputError, PathError, ResultFileError
@@ -179,7 +179,7 @@ def test_rest_is_found_in_few_digits(digits, motion, table, write):
     """And the time in which the last digit does not show yet that the motion has begun belongs to it."""
     t, q, _ = table
     recording = read_recording(
-        write("t,j1,j2,j3", t, q, fmt=f"%.{digits}f"), motion.robot, Units()
+        write("t,j1,j2,j3", t, q, fmt=f"%.{digits}f"), motion.robot, {}
     )
     nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
     assert nodes.at_rest == (True, True)
@@ -195,7 +195,7 @@ def test_accelerations_that_set_in_with_a_jump_are_no_rest(digits, write):
         0.02,
     ]
     recording = read_recording(
-        write("t,j1,j2,j3", t, way, fmt=f"%.{digits}f"), Robot.from_urdf(SCARA), Units()
+        write("t,j1,j2,j3", t, way, fmt=f"%.{digits}f"), Robot.from_urdf(SCARA), {}
     )
     assert nodes_of(recording, recording.rounding / np.sqrt(3.0)).at_rest == (
         True,
@@ -214,7 +214,7 @@ def test_few_digits_of_a_rail_say_nothing_of_the_joints(write):
     rail = robot.position_units.index("m")
     way[:, rail] = way[:, rail].round(4)  # 0.1 mm
     recording = read_recording(
-        write(",".join(["t", *robot.joint_names]), t, way), robot, Units()
+        write(",".join(["t", *robot.joint_names]), t, way), robot, {}
     )
     assert recording.rounding[rail] == pytest.approx(5e-5)
     assert not np.delete(recording.rounding, rail).any()

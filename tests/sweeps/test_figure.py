@@ -51,6 +51,20 @@ def test_a_heat_map_over_two_keys():
     assert bar.get_ylabel() == r"$t_\mathrm{E}$ (s)"
 
 
+def test_a_heat_map_has_rows_without_any_verified_plan():
+    rows = [row(1.0 if b < 2 else None, a=a, b=b) for a in (0, 1) for b in (0, 1, 2)]
+    ax = plot_sweep(rows, ["a", "b"]).axes[0]
+    assert ax.images[0].get_array().shape == (3, 2)
+    assert ax.collections[0].get_offsets().tolist() == [[0.0, 2.0], [1.0, 2.0]]
+
+
+def test_draws_without_a_verified_plan_are_crosses():
+    rows = [row(1.0 if i else None, a=i * 0.1, b=i**2) for i in range(9)]
+    points, crosses = plot_sweep(rows, ["a", "b"]).axes[0].collections
+    assert len(points.get_offsets().compressed()) == 2 * 8
+    assert crosses.get_offsets().tolist() == [[0.0, 0.0]]
+
+
 def test_cells_are_written_with_the_digits_that_tell_them_apart():
     for near, shown in (
         (0.0012, ["12.3450", "12.3462"]),

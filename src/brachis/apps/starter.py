@@ -66,9 +66,8 @@ class Choice:
 def choices(task_map: TaskMap) -> Iterator[Choice]:
     """Find first motions one by one, the most promising first.
 
-    Postures whose tool stays above the robot's base come first. There are no motions where the robot cannot move its
-    tool in all directions of the task space. The same robot gets the same answer: what is drawn at random has a fixed
-    seed.
+    Postures whose tool stays above the robot's base come first. Nothing is found if the robot cannot move its tool in
+    all directions of the task space. The same robot gets the same answer: the random draws have a fixed seed.
     """
     robot = task_map.robot
     postures = _draw_postures(robot)
@@ -125,7 +124,7 @@ def _quality(
 def _line(
     task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, lowest: float
 ) -> np.ndarray | None:
-    """Find the longest line along an axis on which the arm keeps 0.4 of its dexterity; None if there is none."""
+    """Find the longest line along an axis on which the arm keeps 0.4 of its dexterity; None if it finds no line."""
     count = len(task_map.axes)
     for length in _LENGTHS:
         if length > 0.25 * reach:

@@ -1,19 +1,25 @@
-"""The Typer application: help, exit codes, and the options that several commands share."""
+"""The Typer application: help, exit codes, the options that several commands share, and how their values are read."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextvars import ContextVar
 from enum import IntEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Option
 from typer.core import TyperGroup
 
+import brachis
 from brachis.common import interrupts
-from brachis.common.files import is_file
+from brachis.common.files import is_file, is_folder
 from brachis.common.interrupts import INTERRUPTED
-from brachis.errors import BrachisError
+from brachis.errors import BrachisError, ResultFileError, TaskError, UnknownNameError
+
+if TYPE_CHECKING:
+    from brachis.task import Task
 
 EXIT_CODES = (
     "0    done; of a plan: planned and verified",
@@ -140,8 +146,6 @@ app = typer.Typer(
 def _print_version(asked: bool) -> None:
     """Print the version and stop."""
     if asked:
-        import brachis
-
         typer.echo(f"brachis {brachis.__version__}")
         raise typer.Exit
 
@@ -156,7 +160,7 @@ def _set_verbosity(option: typer.CallbackParam, asked: bool) -> None:
 def options(
     version: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--version",
             callback=_print_version,
             is_eager=True,
@@ -165,7 +169,7 @@ def options(
     ] = False,
     quiet: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--quiet",
             "-q",
             callback=_set_verbosity,
@@ -175,7 +179,7 @@ def options(
     ] = False,
     verbose: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--verbose",
             "-v",
             callback=_set_verbosity,
@@ -189,17 +193,15 @@ def options(
 
 
 Json = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object on standard output.")
+    bool, Option("--json", help="Print one JSON object on standard output.")
 ]
 Degrees = Annotated[
     bool,
-    typer.Option(
-        "--degrees", help="Show angles in degrees; files and JSON stay in rad."
-    ),
+    Option("--degrees", help="Show angles in degrees; files and JSON stay in rad."),
 ]
 Strict = Annotated[
     bool | None,
-    typer.Option(
+    Option(
         "--strict/--no-strict",
         help="Refuse all implausible figures, such as degrees for rad, or only warn of them. Default: only a start "
         "posture that looks like degrees is refused.",
@@ -207,15 +209,86 @@ Strict = Annotated[
 ]
 Changes = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--set",
         metavar="KEY=VALUE",
         help="Change a key of the task, dotted as in spline.intervals=40 or path.0.line.length=0.5; the value is YAML. "
         "Repeatable.",
     ),
 ]
-Urdf = Annotated[
-    Path | None, typer.Option(help="URDF file to use instead of the task's.")
-]
-ToolFrame = Annotated[str | None, typer.Option(help="Link at the end of the chain.")]
-BaseFrame = Annotated[str | None, typer.Option(help="Link at the start of the chain.")]
+Urdf = Annotated[Path | None, Option(help="URDF file to use instead of the task's.")]
+ToolFrame = Annotated[str | None, Option(help="Link at the end of the chain.")]
+BaseFrame = Annotated[str | None, Option(help="Link at the start of the chain.")]
+_MOTIONS = ("result.npz", "unverified.npz")
+"""Names of a motion in the folder of ``brachis plan --out``."""
+
+
+def motion_file(result: Path) -> Path:
+    """Return the file of a motion: the one named, or the one in the folder named.
+
+    Raises
+    ------
+    ResultFileError
+        The folder holds no motion.
+    """
+    if not is_folder(result):
+        return result
+    for name in _MOTIONS:
+        if is_file(result / name):
+            return result / name
+    raise ResultFileError(
+        "is a folder without a motion",
+        where=str(result),
+        allowed=" or ".join(_MOTIONS),
+        hint="Run brachis plan --out",
+    )
+
+
+def task_space_of(text: str | None) -> str | list[str] | None:
+    """Read ``--task-space``: a word, or a list of rows."""
+    from brachis.robot.task_map.protocol import AXES, YAW
+
+    if text is None:
+        return None
+    rows = [row.strip() for row in text.split(",") if row.strip()]
+    return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
+
+
+def changed_task(
+    path: Path, changes: Sequence[str] | None, *, strict: bool | None = None
+) -> Task:
+    """Load a task file with keys set as in ``spline.intervals=40``, and with ``strict`` if it is given.
+
+    If a key is set twice, the last value counts.
+    """
+    from brachis.task import read_assignment
+
+    robots = brachis.robots
+    if robots.is_robot(str(path)) and path.suffix == "":
+        name = robots.path_of(str(path)).parent.name
+        raise TaskError(
+            "is a robot",
+            where=name,
+            allowed="a task file",
+            hint=f"brachis new {name} writes a first task for it",
+        )
+    keys = dict(read_assignment(text) for text in changes or ())
+    if strict is not None:
+        keys["strict"] = strict
+    return brachis.load_task(path, changes=keys)
+
+
+def urdf_of(given: Path) -> Path:
+    """Return the URDF file; of a robot that comes with brachis, given by its name, its file.
+
+    Raises
+    ------
+    UnknownNameError
+        There is neither a file nor a robot of this name.
+    """
+    if is_file(given) or is_folder(given) or given.suffix or len(given.parts) > 1:
+        return given
+    robots = brachis.robots
+    if str(given) not in robots.names():
+        raise UnknownNameError("URDF file or robot", str(given), robots.names())
+    return robots.path_of(str(given))

@@ -11,16 +11,13 @@ import stat
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from brachis.apps.cli.output import (
-    json_text,
-    print_error,
-    print_json,
-    result_console,
-)
+import brachis
+from brachis.apps.cli.output import json_text, print_error, print_json, print_lines
 from brachis.common.files import (
     atomic_write,
     is_folder,
@@ -35,6 +32,8 @@ if TYPE_CHECKING:
 
 Writer = Callable[[Path], object]
 """Writes one file to a path."""
+Drawing = Callable[[], Any]
+"""Draws a Matplotlib figure."""
 
 _SCHEMA = b'{\n  "$schema": "https://json-schema.org/draft/2020-12/schema",\n  "$id": "urn:brachis:'
 BEGINNINGS = {
@@ -87,7 +86,8 @@ def check_output(
                     found="the same file",
                     allowed="another file name",
                 )
-    suffix, allowed = out.suffix.lower(), tuple(suffixes)
+    suffix = out.suffix.lower()
+    allowed = tuple(suffixes)
     if suffix not in allowed:
         raise InputError(
             "the file exists and is of another kind",
@@ -262,7 +262,8 @@ def make_folder(
 
 def finish(
     data: dict[str, Any],
-    writers: Mapping[str, Writer],
+    results: Mapping[str, Writer],
+    figures: Mapping[str, Drawing],
     *,
     out: Path | None,
     names: Sequence[str],
@@ -277,12 +278,14 @@ def finish(
     ----------
     data : dict
         The answer: content of the JSON file, and of ``--json``, which also lists the files.
-    writers : mapping of str to callable
-        What writes the files, by name.
+    results : mapping of str to callable
+        What writes the files of the motion, by name.
+    figures : mapping of str to callable
+        What draws the figures, by name.
     out : Path or None
         Folder; None: no files.
     names : sequence of str
-        Files that the command may write; older ones are removed. Figures end in ``.png``.
+        Files that the command may write; older ones are removed.
     verified : bool
     show : callable or None
         Prints the answer for a person; None: it is printed as JSON.
@@ -293,33 +296,37 @@ def finish(
     """
     failures: list[InputError] = []
     if out is not None:
-        results: dict[str, Writer] = {}
-        figures: dict[str, Writer] = {}
+        files: dict[str, Writer] = {}
+        drawings: dict[str, Writer] = {}
         stale = set(_name_files(names, verified=not verified))
         for name, own in zip(names, _name_files(names, verified=verified), strict=True):
-            if name in writers:
-                kind = figures if name.endswith(".png") else results
-                kind[own] = writers[name]
+            if name in results:
+                files[own] = results[name]
+            elif name in figures:
+                drawings[own] = partial(_draw, figures[name])
             elif name.endswith(".json"):
-                results[own] = lambda path: write_text(json_text(data), path)
+                files[own] = lambda path: write_text(json_text(data), path)
             else:
                 stale.add(own)
         data["files"], failures = write_files(
-            out, results, figures, stale=stale - {*results}
+            out, files, drawings, stale=stale - {*files}
         )
     if show is None:
         print_json(data)
     else:
         show()
-        for name in data.get("files", ()):
-            result_console().print(f"wrote {name}")
+        print_lines(*(f"wrote {name}" for name in data.get("files", ())))
     if result is not None and result.interrupted:
         print_error("the search was ended early; this is the best motion so far")
     for each in result.not_completed if result is not None else ():
         print_error(f"not completed: {each}")
     if not verified:
-        print_error(complaint)
+        print_error(f"the motion found did not pass the verification; {complaint}")
     return exit_code(verified, failures)
+
+
+def _draw(make: Drawing, path: Path) -> None:
+    brachis.plots.save_figure(make(), path)
 
 
 def exit_code(verified: bool, failures: Iterable[InputError]) -> int:

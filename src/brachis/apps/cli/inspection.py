@@ -8,12 +8,20 @@ from math import degrees as in_degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import BaseFrame, Changes, Degrees, Json, ToolFrame
-from brachis.apps.cli.output import print_json, print_table, result_console
-from brachis.apps.cli.settings import changed_task, task_space_of, urdf_of
+from brachis.apps.cli.app import (
+    BaseFrame,
+    Changes,
+    Degrees,
+    Json,
+    ToolFrame,
+    changed_task,
+    task_space_of,
+    urdf_of,
+)
+from brachis.apps.cli.output import print_json, print_lines, print_table
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
 from brachis.errors import InputError, write_count
 
@@ -23,7 +31,7 @@ if TYPE_CHECKING:
     from brachis.task import FitReport, Task
 
 _NONE = "none"
-"""What a table shows if there is no limit or no friction."""
+"""What a table shows for a missing limit, and for a joint without friction."""
 _MOST_REFUSED = 12
 """Choices without a closed form that are listed on the screen."""
 _OTHER_TASKS = (
@@ -32,13 +40,13 @@ _OTHER_TASKS = (
     "only for poses",
     "only for the position: x, y and z",
 )
-"""Reasons of families for other task spaces; they are shown only if there are no others."""
+"""Reasons of families for other task spaces; shown only without other reasons."""
 
 
 def inspect(
     source: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the "
             "points that its path follows.",
             metavar="URDF|TASK",
@@ -46,7 +54,7 @@ def inspect(
     ],
     task_space: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
             "Default: the task's, or all that the robot can."
         ),
@@ -55,13 +63,13 @@ def inspect(
     base_frame: BaseFrame = None,
     posture: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
         ),
     ] = None,
     lock: Annotated[
         list[str] | None,
-        typer.Option(help="Joint held at a position: name=value, repeatable."),
+        Option(help="Joint held at a position: name=value, repeatable."),
     ] = None,
     degrees: Degrees = False,
     changes: Changes = None,
@@ -137,28 +145,26 @@ def _print_robot(
     robot: Robot, task: Task | None, data: dict[str, Any], *, degrees: bool
 ) -> None:
     """Print all for a person."""
-    console = result_console()
     chain = f"{robot.base_frame} -> {robot.tool_frame}"
-    console.print(f"{data['robot']}: {chain}, {write_count(robot.n, 'joint')}")
-    for remark in data["remarks"]:
-        console.print(remark)
+    print_lines(
+        f"{data['robot']}: {chain}, {write_count(robot.n, 'joint')}", *data["remarks"]
+    )
     rows = _joint_rows(robot, degrees=degrees)
     shown = [key for key in rows[0] if any(row[key] != _NONE for row in rows)]
     cells = [[row[key] for key in shown] for row in rows]
     print_table("joints", shown, cells, numbers={*shown} - {"joint", "type"})
-    for name, text in data["in_use"].items():
-        console.print(f"{name}: {text}")
-    for name, text in data["guarantees"].items():
-        console.print(f"{name} limit: {text}")
+    print_lines(*(f"{name}: {text}" for name, text in data["in_use"].items()))
+    guarantees = data["guarantees"].items()
+    print_lines(*(f"{name} limit: {text}" for name, text in guarantees))
     if task is not None and not task.fits:
-        console.print("no part of the path comes from points")
+        print_lines("no part of the path comes from points")
     for fit in task.fits if task is not None else ():
         _print_fit(fit)
     redundancy = data["degree_of_redundancy"]
     space = ", ".join(data["task_space"])
-    console.print(f"task space [{space}]: degree of redundancy {redundancy}")
+    print_lines(f"task space [{space}]: degree of redundancy {redundancy}")
     if redundancy < 0:
-        console.print(
+        print_lines(
             "The robot has fewer joints than the task space has rows; prescribe fewer rows."
         )
     else:
@@ -321,7 +327,6 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
 
 def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     """Print the choices that have a solver as a table, their branches, and the reasons against the others."""
-    console = result_console()
     solved = [row for row in rows if row["solver"] != "-"]
     refused = [row for row in rows if row["solver"] == "-"]
     columns = ["redundant joints", "solver", "branches"]
@@ -334,16 +339,16 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     for row in solved:
         choices.setdefault(row["labels"], []).append(row["redundant joints"])
     for labels, joints in choices.items():
-        console.print(f"branches with {'; '.join(joints)} redundant: {labels}")
+        print_lines(f"branches with {'; '.join(joints)} redundant: {labels}")
     if refused:
-        console.print(
+        print_lines(
             f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
         )
     for row in refused[:_MOST_REFUSED]:
-        console.print(f"  {row['redundant joints']}: {row['why not']}")
+        print_lines(f"  {row['redundant joints']}: {row['why not']}")
     if len(refused) > _MOST_REFUSED:
         more = len(refused) - _MOST_REFUSED
-        console.print(f"  ... and {more} more, which --json lists")
+        print_lines(f"  ... and {more} more, which --json lists")
 
 
 def _tool_pose(robot: Robot, text: str) -> str:

@@ -17,20 +17,14 @@ from typing import TextIO, cast
 
 import typer
 
-from brachis.apps.cli import (
-    inspection,
-    motions,
-    planning,
-    recordings,
-    starting,
-    sweeps,
-)
+from brachis.apps.cli import inspection, motions, planning, recordings, starting
 from brachis.apps.cli.app import Verbosity, app, get_verbosity
 from brachis.apps.cli.output import (
     StandardOutput,
     open_streams,
     print_failure,
     print_usage_error,
+    show_warnings,
 )
 from brachis.common import interrupts
 from brachis.errors import BrachisError
@@ -52,27 +46,31 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "compose": starting.compose,
     "import": recordings.import_,
     "compare": recordings.compare,
-    "sweep": sweeps.sweep,
+    "sweep": planning.sweep,
     "schema": motions.schema,
 }
 """Commands by name, in the order of the help."""
 
 
-def _with_imports(command: Callable[..., None]) -> Callable[..., None]:
-    """Import the planner before a command runs; Ctrl-C waits meanwhile, because compiled libraries may swallow it."""
+def _prepare(command: Callable[..., None]) -> Callable[..., None]:
+    """Import the planner before a command runs, and show warnings as messages while it runs.
+
+    Ctrl-C waits for the end of the import, because compiled libraries may swallow it.
+    """
 
     @wraps(command)
     def run(**options: object) -> None:
         with interrupts.defer():
             import_module("brachis.planner")
-        command(**options)
+        with show_warnings():
+            command(**options)
 
     return run
 
 
 for _name, _command in _COMMANDS.items():
     _class = starting.VectorCommand if _name == "compose" else None
-    app.command(_name, cls=_class)(_with_imports(_command))
+    app.command(_name, cls=_class)(_prepare(_command))
 
 
 def main() -> None:

@@ -7,35 +7,36 @@ import math
 import os
 import sys
 import webbrowser
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Json, Verbosity, get_verbosity
+from brachis.apps.cli.app import Degrees, Json, Verbosity, get_verbosity, motion_file
 from brachis.apps.cli.folder import write_one, write_text
 from brachis.apps.cli.output import (
     json_text,
     print_error,
     print_json,
+    print_lines,
     print_verification,
-    result_console,
-    show_warnings,
 )
-from brachis.apps.cli.settings import motion_file
 from brachis.common import interrupts
 from brachis.common.files import read_file
 from brachis.errors import UnknownNameError
 
 if TYPE_CHECKING:
+    from brachis.apps.view import Viewer
     from brachis.trajectory import Trajectory
 
 ResultFile = Annotated[
     Path,
-    typer.Argument(
-        help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT"
+    Argument(
+        help="Result file (npz) written by 'brachis plan --out', or its folder.",
+        metavar="RESULT",
     ),
 ]
 
@@ -43,8 +44,7 @@ ResultFile = Annotated[
 def verify(
     result: ResultFile,
     urdf: Annotated[
-        Path | None,
-        typer.Option(help="Check against this URDF instead of the saved one."),
+        Path | None, Option(help="Check against this URDF instead of the saved one.")
     ] = None,
     degrees: Degrees = False,
     json: Json = False,
@@ -68,43 +68,38 @@ def export(
     result: ResultFile,
     out: Annotated[
         Path,
-        typer.Option(
+        Option(
             help="File to write; its suffix says the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every "
             "joint; SI units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4."
         ),
     ],
     form: Annotated[
         str | None,
-        typer.Option(
+        Option(
             "--format",
             help="Format, by name: csv, parquet, json, ros2, mcap, urscript, gif or mp4.",
         ),
     ] = None,
     dt: Annotated[
         float | None,
-        typer.Option(
-            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations.",
-            show_default=False,
+        Option(
+            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations."
         ),
     ] = None,
     last: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Where the rows end: exact, at the end time, which need not be a multiple of the period; or hold, at "
             "the first multiple of it that is not before the end time, with the end posture held at rest. Default: "
-            "exact; hold for URScript.",
-            show_default=False,
+            "exact; hold for URScript."
         ),
     ] = None,
     joints: Annotated[
         str | None,
-        typer.Option(
-            help="Joints to write, in this order: j1,j2,... Default: all.",
-            show_default=False,
-        ),
+        Option(help="Joints to write, in this order: j1,j2,... Default: all."),
     ] = None,
     slower: Annotated[
-        float, typer.Option(help="How many times slower an animation shows the motion.")
+        float, Option(help="How many times slower an animation shows the motion.")
     ] = 1.0,
 ) -> None:
     """Sample a saved motion for a controller, or animate it."""
@@ -118,22 +113,21 @@ def export(
             trajectory, path, form=form, dt=dt, last=last, joints=names, slower=slower
         )
 
-    with show_warnings():
-        _write_motion(out, write, (settings.suffix,), result, trajectory)
+    _write_motion(out, write, (settings.suffix,), result, trajectory)
     period = settings.dt if dt is None else dt
     if period > trajectory.t_end:
         print_error(
             f"the period of {period:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s"
         )
-    result_console().print(f"wrote {out}")
+    print_lines(f"wrote {out}")
 
 
 def plot(
     result: ResultFile,
-    out: Annotated[Path, typer.Option(help="Figure to write: png, pdf or svg.")],
+    out: Annotated[Path, Option(help="Figure to write: png, pdf or svg.")],
     kind: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Which figure: torques, postures, motion, overview, timeline or limits."
         ),
     ] = "overview",
@@ -152,22 +146,18 @@ def plot(
 
     suffixes = [f".{suffix}" for suffix in SUFFIXES]
     _write_motion(out, write, suffixes, result, trajectory)
-    result_console().print(f"wrote {out}")
+    print_lines(f"wrote {out}")
 
 
 def report(
     result: ResultFile,
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="HTML file to write; default: beside the result, as result.html."
-        ),
+        Option(help="HTML file to write; default: beside the result, as result.html."),
     ] = None,
     title: Annotated[
         str | None,
-        typer.Option(
-            help="Title of the page; default: the robot's name and the file's."
-        ),
+        Option(help="Title of the page; default: the robot's name and the file's."),
     ] = None,
     degrees: Degrees = False,
 ) -> None:
@@ -178,7 +168,7 @@ def report(
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
     page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
     _write_motion(out, page.save, (".html",), result, trajectory)
-    result_console().print(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
+    print_lines(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
         print_error(
             "the motion did not pass the verification; the report says so, and what failed"
@@ -206,29 +196,23 @@ def _write_motion(
 
 
 def view(
-    result: Annotated[
-        Path,
-        typer.Argument(
-            help="Result file (npz) written by 'brachis plan --out', or the folder.",
-            metavar="RESULT",
-        ),
-    ],
+    result: ResultFile,
     host: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Address that the viewer listens on; 0.0.0.0 lets other machines look.",
             metavar="ADDRESS",
         ),
     ] = "127.0.0.1",
     port: Annotated[
         int | None,
-        typer.Option(
+        Option(
             help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on."
         ),
     ] = None,
     browser: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--browser/--no-browser",
             help="Open the browser, where there is a screen and a terminal.",
         ),
@@ -239,44 +223,34 @@ def view(
 
     Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
     """
+    from brachis.apps.view import Viewer
+
     path, trajectory = _load(result)
-    show(
+    viewer = Viewer(
         trajectory,
         _read_candidates(path, trajectory),
         verified=brachis.verify_trajectory(trajectory).passed,
         degrees=degrees,
-        browser=browser,
         host=host,
         port=port,
     )
+    if not viewer.local:
+        print_error(
+            f"warning: anyone who reaches {host} can look, and move the slider; leave --host out to prevent it"
+        )
+    show(viewer, browser=browser)
 
 
-def show(
-    trajectory: Trajectory,
-    candidates: Sequence[Mapping[str, Any]],
-    *,
-    verified: bool,
-    degrees: bool,
-    browser: bool = True,
-    host: str = "127.0.0.1",
-    port: int | None = None,
-) -> None:
+def show(viewer: Viewer, *, browser: bool = True) -> None:
     """Show a motion until Ctrl-C; open the browser if it is wanted and there is a screen."""
-    from brachis.apps.view import Viewer
-
-    viewer = Viewer(
-        trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port
-    )
     with viewer, interrupts.end_on_interrupt():
-        if not viewer.local:
-            print_error(
-                f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone"
-            )
         if get_verbosity() is not Verbosity.QUIET:
             print_error("Ctrl-C stops the viewer")
         print(f"look at {viewer.url}", flush=True)  # noqa: T201  (what the command is for, however quiet)
-        has_screen = sys.platform == "darwin" or any(
-            os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+        has_screen = (
+            sys.platform == "darwin"
+            or os.environ.get("DISPLAY")
+            or os.environ.get("WAYLAND_DISPLAY")
         )
         if browser and sys.stdout.isatty() and has_screen:
             webbrowser.open(viewer.url)
@@ -295,10 +269,10 @@ def _read_candidates(path: Path, trajectory: Trajectory) -> list[dict[str, Any]]
 
 def schema(
     out: Annotated[
-        Path | None, typer.Option(help="File to write instead of standard output.")
+        Path | None, Option(help="File to write instead of standard output.")
     ] = None,
     of: Annotated[
-        str, typer.Option(help="Of what: task files, or trajectory (exported as JSON).")
+        str, Option(help="Of what: task files, or trajectory (exported as JSON).")
     ] = "task",
 ) -> None:
     """Print the JSON schema of tasks, or of exported JSON."""
@@ -313,4 +287,4 @@ def schema(
         sys.stdout.write(text)
         return
     write_one(out, lambda path: write_text(text, path), (".json",))
-    result_console().print(f"wrote {out}")
+    print_lines(f"wrote {out}")

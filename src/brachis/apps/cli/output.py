@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import sys
 import time
 import warnings
@@ -26,8 +27,6 @@ from brachis.errors import BrachisWarning
 if TYPE_CHECKING:
     from brachis.verify import Verification
 
-_LONGEST_WORD = 24
-"""Characters of the longest word that a column of text keeps whole."""
 WRONG_INPUT = 2
 """Exit code of a command that refuses its input."""
 
@@ -38,7 +37,6 @@ def print_table(
     rows: Iterable[Sequence[object]],
     *,
     numbers: Collection[str] = (),
-    console: Console | None = None,
 ) -> None:
     """Print a table that fits the terminal: text wraps, numbers are neither cut nor wrapped.
 
@@ -54,10 +52,8 @@ def print_table(
         A cell for each column.
     numbers : collection of str, optional
         Headings of the columns of numbers.
-    console : Console, optional
-        That of results unless given.
     """
-    console = console or result_console()
+    console = result_console()
     cells = [[str(cell) for cell in row] for row in rows]
     least = []
     most = []
@@ -65,7 +61,7 @@ def print_table(
         texts = [row[i] for row in cells]
         words = " ".join([name] if name in numbers else [name, *texts]).split()
         whole = texts if name in numbers else []
-        shortened = (min(cell_len(word), _LONGEST_WORD) for word in words)
+        shortened = (min(cell_len(word), 24) for word in words)  # longer ones break
         least.append(max((1, *shortened, *map(cell_len, whole))))
         most.append(max(map(cell_len, (name, *texts))))
     is_lined = sum(width + 3 for width in least) + 1 <= console.width
@@ -267,6 +263,20 @@ def result_console() -> Console:
     )
 
 
+def print_lines(*lines: str) -> None:
+    """Print lines of a result."""
+    for line in lines:
+        result_console().print(line)
+
+
+def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None:
+    """Print an answer as JSON, or as lines for a person."""
+    if as_json:
+        print_json(data)
+    else:
+        print_lines(*lines)
+
+
 @contextmanager
 def show_warnings() -> Iterator[None]:
     """Print warnings of brachis as messages on standard error; a quiet command prints none."""
@@ -285,24 +295,33 @@ def show_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def show_progress() -> Iterator[Callable[[str], None]]:
-    """Give a listener that shows what the planner does, and that notices Ctrl-C.
+def show_progress(*, in_logs: bool = False) -> Iterator[Callable[[str], None]]:
+    """Give a listener that shows what is done, and that notices Ctrl-C.
 
-    On a terminal it shows the present step; a verbose command prints every step with its time; otherwise nothing.
+    On a terminal it shows the present step; a verbose command prints every step with its time. Otherwise nothing is
+    shown, or with `in_logs` one line for every 5 % of texts such as ``3 of 40 plans``.
     """
     console = Console(stderr=True)
     began = time.perf_counter()
     verbosity = get_verbosity()
+    last_step = -1
     with ExitStack() as stack:
         status = None
         if verbosity is Verbosity.NORMAL and console.is_terminal:
             status = stack.enter_context(console.status("reading the task"))
 
         def show(text: str) -> None:
+            nonlocal last_step
             interrupts.check()
             if status is not None:
                 status.update(Text(text))  # a name may hold brackets
             elif verbosity is Verbosity.VERBOSE:
                 print_error(f"{time.perf_counter() - began:.2f} s: {text}")
+            elif in_logs and verbosity is Verbosity.NORMAL:
+                done = re.match(r"(\d+) of (\d+)", text)
+                step = int(done[1]) * 20 // max(1, int(done[2])) if done else -1
+                if step != last_step:
+                    print_error(text)
+                last_step = step
 
         yield show

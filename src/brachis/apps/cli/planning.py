@@ -1,4 +1,4 @@
-"""``brachis plan | bottleneck``: plan a task, show the motion and what holds it back."""
+"""``brachis plan | bottleneck | sweep``: plan a task, say what holds the motion back, plan a task many times."""
 
 from __future__ import annotations
 
@@ -7,42 +7,53 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Changes, Degrees, Json, Strict, Urdf
-from brachis.apps.cli.folder import Writer, finish, make_folder
+from brachis.apps.cli.app import (
+    Changes,
+    Degrees,
+    Json,
+    Strict,
+    Urdf,
+    changed_task,
+    motion_file,
+    urdf_of,
+)
+from brachis.apps.cli.folder import (
+    Drawing,
+    Writer,
+    end_cleanly,
+    exit_code,
+    finish,
+    make_folder,
+    write_files,
+)
 from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
+    print_json,
+    print_lines,
     print_table,
     print_verification,
-    result_console,
     show_progress,
-    show_warnings,
 )
-from brachis.apps.cli.settings import changed_task, motion_file, urdf_of
 from brachis.errors import InputError, write_count
 
 if TYPE_CHECKING:
+    from brachis.apps.sweeps import SweepResult
+    from brachis.common.progress import Listener
     from brachis.result import Result
     from brachis.trajectory import Trajectory
 
-_PLANNED = (
-    "result.npz",
-    "result.json",
-    "overview.png",
-    "candidates.png",
-    "fit.png",
-)
+_PLANNED = ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png")
 _BOTTLENECK = ("bottleneck.json", "timeline.png")
-_MOST_CANDIDATES = 40
-"""Candidates that are listed on the screen."""
 
 
 def plan(
-    task: Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")],
+    task: Annotated[Path, Argument(help="Task file (YAML).", metavar="TASK")],
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Folder for result.npz, result.json, overview.png and candidates.png (and fit.png, where the path was "
             "fitted to points); of a motion that fails the verification the names begin with unverified."
         ),
@@ -50,54 +61,55 @@ def plan(
     urdf: Urdf = None,
     changes: Changes = None,
     view: Annotated[
-        bool,
-        typer.Option("--view", help="Show the motion in the browser, until Ctrl-C."),
+        bool, Option("--view", help="Show the motion in the browser, until Ctrl-C.")
     ] = False,
     strict: Strict = None,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
-    from brachis.apps.view import require_viser
+    from brachis.apps.view import Viewer, require_viser
 
     if view:
         require_viser()
     make_folder(out, _PLANNED, (task, urdf))
-    with show_warnings(), show_progress() as listener:
-        result = brachis.plan(
-            urdf and urdf_of(urdf),
-            changed_task(task, changes, strict=strict),
-            listener=listener,
-        )
+    with show_progress() as listener:
+        result = _plan_task(task, urdf, changes, strict, listener)
+    plots = brachis.plots
     trajectory = result.trajectory
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
-    plots = brachis.plots
-    writers: dict[str, Writer] = {
-        "result.npz": trajectory.save,
-        "overview.png": lambda path: plots.save_figure(
-            plots.plot_overview(trajectory), path
-        ),
-        "candidates.png": lambda path: plots.save_figure(
-            plots.plot_candidates(result.candidates), path
-        ),
+    figures: dict[str, Drawing] = {
+        "overview.png": lambda: plots.plot_overview(trajectory),
+        "candidates.png": lambda: plots.plot_candidates(result.candidates),
     }
     if any(report.profile for report in result.fits):
-        writers["fit.png"] = lambda path: plots.save_figure(
-            plots.plot_fit(trajectory), path
-        )
+        figures["fit.png"] = lambda: plots.plot_fit(trajectory)
     code = finish(
         data,
-        writers,
+        {"result.npz": trajectory.save},
+        figures,
         out=out,
         names=_PLANNED,
         verified=result.verified,
         show=None if json else lambda: _print_plan(result, data, degrees=degrees),
         result=result,
-        complaint="the motion found did not pass the verification; it is marked unverified",
+        complaint="it is marked unverified",
     )
     if view:
-        show(trajectory, data["candidates"], verified=result.verified, degrees=degrees)
+        shown = data["candidates"]
+        show(Viewer(trajectory, shown, verified=result.verified, degrees=degrees))
     raise typer.Exit(code)
+
+
+def _plan_task(
+    task: Path,
+    urdf: Path | None,
+    changes: Sequence[str] | None,
+    strict: bool | None,
+    listener: Listener,
+) -> Result:
+    changed = changed_task(task, changes, strict=strict)
+    return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
 
 
 def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
@@ -132,8 +144,7 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
             f"{100.0 * (candidate.time_scaled - 1.0):.2g} % to meet the limits between collocation points"
         )
     print_table("plan", ("", ""), rows.items())
-    for fit in result.fits:
-        result_console().print(f"path from {fit}")
+    print_lines(*(f"path from {fit}" for fit in result.fits))
     if len(data["candidates"]) > 1:
         _print_candidates(data["candidates"])
     print_verification(result.verification, degrees=degrees)
@@ -156,7 +167,7 @@ def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
     """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once."""
     from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
 
-    rows = candidate_rows(candidates)[:_MOST_CANDIDATES]
+    rows = candidate_rows(candidates)[:40]
     others = len(candidates) - len(rows)
     more = f", {others} of them in the JSON only" if others else ""
     title = f"candidates ({len(candidates)}{more})"
@@ -166,20 +177,20 @@ def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
 def bottleneck(
     task: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="Task file (YAML), or result file (npz) of a motion planned before.",
             metavar="TASK|RESULT",
         ),
     ],
     check: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--check", help="Solve again with every limit raised by 1 %, and compare."
         ),
     ] = False,
     reference: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--reference",
             help="Compare with the best value known: the same problem with discontinuous torque allowed, on a fine "
             "mesh; not a proven bound. Takes seconds.",
@@ -187,7 +198,7 @@ def bottleneck(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Folder for bottleneck.json and timeline.png; of a motion that fails the verification the names "
             "begin with unverified_."
         ),
@@ -207,7 +218,7 @@ def bottleneck(
     make_folder(out, _BOTTLENECK, (task, urdf))
     source = motion_file(task)
     result = None
-    with show_warnings(), show_progress() as listener:
+    with show_progress() as listener:
         if source.suffix.lower() == ".npz":
             given = {"--urdf": urdf, "--set": changes, "--strict": strict}
             for option, value in given.items():
@@ -221,40 +232,32 @@ def bottleneck(
             trajectory = brachis.Trajectory.load(source)
             data = _verify_again(trajectory)
         else:
-            result = brachis.plan(
-                urdf and urdf_of(urdf),
-                changed_task(source, changes, strict=strict),
-                listener=listener,
-            )
+            result = _plan_task(task, urdf, changes, strict, listener)
             trajectory = result.trajectory
             data = result.to_dict()
         listener("looking for what holds the motion back")
         report = brachis.bottleneck.report(
             result or trajectory, check=check, reference=reference
         )
-    plots = brachis.plots
     data["bottleneck"] = report.to_dict()
 
     def show_report() -> None:
         redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
-        end_time = f"end time t_E: {trajectory.t_end:.4f} s"
-        console = result_console()
-        console.print(f"{end_time}, redundant joints: {redundant}")
-        console.print(report.text(degrees=degrees))
+        print_lines(
+            f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}",
+            report.text(degrees=degrees),
+        )
 
     code = finish(
         data,
-        {
-            "timeline.png": lambda path: plots.save_figure(
-                plots.plot_timeline(trajectory), path
-            )
-        },
+        {},
+        {"timeline.png": lambda: brachis.plots.plot_timeline(trajectory)},
         out=out,
         names=_BOTTLENECK,
         verified=data["verified"],
         show=None if json else show_report,
         result=result,
-        complaint="the motion found did not pass the verification; what is said of it may not hold",
+        complaint="what is said of it may not hold",
     )
     raise typer.Exit(code)
 
@@ -271,3 +274,84 @@ def _verify_again(trajectory: Trajectory) -> dict[str, Any]:
         "worst_ratio": verification.worst_ratio,
         "path_error": verification.path_error,
     }
+
+
+def sweep(
+    source: Annotated[Path, Argument(help="Sweep file (YAML).", metavar="SWEEP")],
+    out: Annotated[
+        Path | None,
+        Option(
+            help="Folder for plans, table.parquet, table.csv and sweep.png. Default: one in the current folder, named "
+            "as the file. A sweep that was ended continues with what is missing there."
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        Option(help="Processes. Default and largest: the number of processors."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        Option(
+            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file."
+        ),
+    ] = None,
+    retry: Annotated[
+        bool, Option("--retry", help="Plan stored failures again.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Plan a task many times, with its keys varied."""
+    from brachis.apps.sweeps.plans import VERIFIED
+
+    with end_cleanly(), show_progress(in_logs=True) as listener:
+        result = brachis.sweep(
+            source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
+        )
+    verified = result.count(VERIFIED) > 0
+    figures: dict[str, Writer] = {}
+    if result.varied and verified:
+        figures["sweep.png"] = lambda path: brachis.plots.save_figure(
+            result.plot(), path
+        )
+    drawn, failures = write_files(result.folder, {}, figures, stale=("sweep.png",))
+    files = [*map(str, result.files), *drawn]
+    if json:
+        print_json({**result.summary(), "keys": list(result.keys), "files": files})
+    else:
+        _print_sweep(result, files)
+    raise typer.Exit(exit_code(verified, failures))
+
+
+def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
+    """Print the sweep for a person."""
+    from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
+    from brachis.apps.sweeps.run import write_duration
+
+    found = result.summary()
+    counts = ", ".join(
+        f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
+    )
+    title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
+    shown = [name for name in ("best", "median", "worst") if name in found]
+    if shown:
+        rows = []
+        for key in ("t_end_s", "plan", *result.keys):
+            heading = "t_end [s]" if key == "t_end_s" else key
+            rows.append((heading, *(_write_value(found[name][key]) for name in shown)))
+        print_table(title, ("", *shown), rows, numbers=shown)
+    else:
+        print_lines(title)
+    for error, cause in found["failures"].items():
+        print_lines(
+            f"{cause['plans']} failed with {error}, for example: {cause['message']}"
+        )
+    print_lines(
+        f"planning took {write_duration(found['wall_time_s'])} in all processes together"
+    )
+    print_lines(*(f"wrote {name}" for name in files))
+
+
+def _write_value(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "" if value is None else str(value)

@@ -6,19 +6,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Json
+from brachis.apps.cli.app import Degrees, Json, task_space_of
 from brachis.apps.cli.folder import finish, make_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
+    print_lines,
     print_table,
     print_verification,
-    result_console,
     show_progress,
-    show_warnings,
 )
-from brachis.apps.cli.settings import task_space_of
 
 if TYPE_CHECKING:
     from brachis.apps.comparison import Comparison
@@ -29,7 +28,7 @@ _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")
 
 RecordedFile = Annotated[
     Path,
-    typer.Argument(
+    Argument(
         help="CSV file: time (t, time_ms, ...), joint positions (j1, q_j1, j1_pos [deg], ...), and velocities (qd_j1, "
         "...) and accelerations (qdd_j1, ...) if known.",
         metavar="CSV",
@@ -38,7 +37,7 @@ RecordedFile = Annotated[
 
 RobotFile = Annotated[
     Path,
-    typer.Option(
+    Option(
         "--robot",
         help="URDF file; or a task file (.yaml), whose robot, limits and settings are used.",
     ),
@@ -46,43 +45,40 @@ RobotFile = Annotated[
 
 RecordedSpace = Annotated[
     str | None,
-    typer.Option(
+    Option(
         help="Task space of the path: rows such as x,y, or position, pose, pose_free_roll, joints. Default: that of "
-        "the task, or the most that the robot can prescribe.",
-        show_default=False,
+        "the task, or the most that the robot can prescribe."
     ),
 ]
 
 AngleUnit = Annotated[
     str | None,
-    typer.Option("--angle", help="Unit of angles in columns without a unit: rad, deg."),
+    Option("--angle", help="Unit of angles in columns without a unit: rad, deg."),
 ]
 
 LengthUnit = Annotated[
     str | None,
-    typer.Option("--length", help="Unit of lengths in columns without a unit: m, mm."),
+    Option("--length", help="Unit of lengths in columns without a unit: m, mm."),
 ]
 
 TimeUnit = Annotated[
     str | None,
-    typer.Option("--time", help="Unit of times in a column without a unit: s, ms."),
+    Option("--time", help="Unit of times in a column without a unit: s, ms."),
 ]
 
 PathTolerance = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="Largest deviation of the recovered path, m and rad. Default: 1e-6, or more if the file's last digits or "
-        "the noise are coarser.",
-        show_default=False,
+        "the noise are coarser."
     ),
 ]
 
 Noise = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="Standard deviation of measured positions, rad or m, which are then smoothed. Default: that of rounding "
-        "to the file's digits.",
-        show_default=False,
+        "to the file's digits."
     ),
 ]
 
@@ -90,7 +86,7 @@ Noise = Annotated[
 def import_(
     csv: RecordedFile,
     robot: RobotFile,
-    out: Annotated[Path, typer.Option(help="Result file (npz) to write.")],
+    out: Annotated[Path, Option(help="Result file (npz) to write.")],
     task_space: RecordedSpace = None,
     angle: AngleUnit = None,
     length: LengthUnit = None,
@@ -119,18 +115,15 @@ def import_(
             }
         )
         return
-    console = result_console()
-    console.print(f"end time t_E: {trajectory.t_end:.4f} s")
-    for line in recovered.told:
-        console.print(line)
+    print_lines(f"end time t_E: {trajectory.t_end:.4f} s", *recovered.told)
     print_verification(verification, degrees=degrees)
-    console.print(
+    print_lines(
         "these ratios are of the motion interpolated from the rows; the rows alone prove:"
     )
     for proven in bound_ratios(trajectory):
         ratio, subject, instant = proven.worst
-        console.print(f"{proven.limit} ratio {ratio:.4f}, {subject} at {instant:.4f} s")
-    console.print(f"wrote {out}")
+        print_lines(f"{proven.limit} ratio {ratio:.4f}, {subject} at {instant:.4f} s")
+    print_lines(f"wrote {out}")
 
 
 def compare(
@@ -138,14 +131,14 @@ def compare(
     robot: RobotFile,
     keep_end: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--keep-end",
             help="End in the recorded end posture, not in any posture with the tool there.",
         ),
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Folder for today.npz, result.npz, comparison.json and comparison.png."
         ),
     ] = None,
@@ -161,26 +154,21 @@ def compare(
     from brachis.apps.comparison import plot_comparison
 
     make_folder(out, _FILES, (csv, robot))
-    with show_warnings(), show_progress() as listener:
+    with show_progress() as listener:
         trajectory = _load(
             csv, robot, task_space, angle, length, time, tolerance, noise
         )
         found = brachis.compare(trajectory, keep_end=keep_end, listener=listener)
     code = finish(
         found.to_dict(),
-        {
-            "today.npz": found.recorded.save,
-            "result.npz": found.result.trajectory.save,
-            "comparison.png": lambda path: brachis.plots.save_figure(
-                plot_comparison(found), path
-            ),
-        },
+        {"today.npz": found.recorded.save, "result.npz": found.result.trajectory.save},
+        {"comparison.png": lambda: plot_comparison(found)},
         out=out,
         names=_FILES,
         verified=found.result.verified,
         show=None if json else lambda: _print_comparison(found),
         result=found.result,
-        complaint="the motion found did not pass the verification; it is marked unverified",
+        complaint="it is marked unverified",
     )
     raise typer.Exit(code)
 
@@ -209,8 +197,7 @@ def _load(
 
 def _print_comparison(found: Comparison) -> None:
     """Print the comparison for a person."""
-    console = result_console()
-    console.print(found.verdict)
+    print_lines(found.verdict)
     kept = "kept, as far as rows tell"
     if found.exceeded:
         kept = f"{len(found.exceeded)} exceeded"
@@ -232,5 +219,4 @@ def _print_comparison(found: Comparison) -> None:
     columns = ("", "recorded", "between its rows up to", "planned")
     print_table("", columns, rows, numbers=columns[1:])
     assert found.recorded.recovered is not None
-    for line in (*found.remarks, *found.recorded.recovered.told):
-        console.print(line)
+    print_lines(*found.remarks, *found.recorded.recovered.told)

@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 from typer.core import TyperCommand
 
 import brachis
-from brachis.apps.cli.app import BaseFrame, Json, ToolFrame
+from brachis.apps.cli.app import BaseFrame, Json, ToolFrame, urdf_of
 from brachis.apps.cli.folder import write_one, write_text
 from brachis.apps.cli.output import (
+    print_answer,
     print_json,
+    print_lines,
     print_table,
-    result_console,
     show_progress,
-    show_warnings,
 )
-from brachis.apps.cli.settings import urdf_of
 from brachis.common.files import status_of, writing_errors
 from brachis.errors import InputError
 
@@ -41,17 +41,15 @@ def list_robots(json: Json = False) -> None:
     if json:
         print_json({"robots": listed})
         return
-    console = result_console()
     columns = ("name", "what it is", "joints", "their names")
     rows = [
         (each["name"], each["what"], len(each["joints"]), ", ".join(each["joints"]))
         for each in listed
     ]
     print_table("robots that come with brachis", columns, rows, numbers=("joints",))
-    for each in listed:
-        console.print(f"{each['name']}: {each['urdf']}")
-    console.print(
-        "A name may stand for the URDF: brachis inspect scara3, brachis new scara3"
+    print_lines(
+        *(f"{each['name']}: {each['urdf']}" for each in listed),
+        "A name may stand for the URDF: brachis inspect scara3, brachis new scara3",
     )
 
 
@@ -64,11 +62,11 @@ def _describe_robot(urdf: Path) -> str:
 def new(
     urdf: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="URDF file, or the name of a robot that comes along.", metavar="URDF"
         ),
     ],
-    out: Annotated[Path, typer.Option(help="Task file to write, a new one.")] = Path(
+    out: Annotated[Path, Option(help="Task file to write, a new one.")] = Path(
         "task.yaml"
     ),
     tool_frame: ToolFrame = None,
@@ -90,7 +88,7 @@ def new(
                 allowed="a new file",
                 hint="Choose another name with --out",
             )
-    with show_warnings(), show_progress() as listener:
+    with show_progress() as listener:
         starter = starter_task(
             urdf_of(urdf),
             folder=out.parent,
@@ -99,24 +97,20 @@ def new(
             listener=listener,
         )
     write_text(starter.text, out)
-    result, robot = starter.result, starter.robot
-    if json:
-        print_json(
-            {
-                "file": str(out),
-                "joint_names": list(robot.joint_names),
-                "tool_frame": robot.tool_frame,
-                "t_end": result.t_end,
-                "verified": result.verified,
-            }
-        )
-        return
-    console = result_console()
-    console.print(
-        f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}"
-    )
-    console.print(
-        f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out"
+    result = starter.result
+    robot = starter.robot
+    joints = list(robot.joint_names)
+    print_answer(
+        {
+            "file": str(out),
+            "joint_names": joints,
+            "tool_frame": robot.tool_frame,
+            "t_end": result.t_end,
+            "verified": result.verified,
+        },
+        f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(joints)}",
+        f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out",
+        as_json=json,
     )
 
 
@@ -157,38 +151,33 @@ def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
 def compose(
     arm: Annotated[
         Path,
-        typer.Argument(
-            help="URDF file of the arm, or the name of a robot.", metavar="ARM"
-        ),
+        Argument(help="URDF file of the arm, or the name of a robot.", metavar="ARM"),
     ],
     travel: Annotated[
         tuple[float, float],
-        typer.Option("--range", help="Lowest and highest position on the rail, m."),
+        Option("--range", help="Lowest and highest position on the rail, m."),
     ],
-    velocity: Annotated[float, typer.Option(help="Limit of the rail's speed, m/s.")],
-    force: Annotated[float, typer.Option(help="Limit of the rail's drive force, N.")],
-    mass: Annotated[float, typer.Option(help="Mass of the carriage, kg.")],
-    out: Annotated[Path, typer.Option(help="URDF file to write.")],
+    velocity: Annotated[float, Option(help="Limit of the rail's speed, m/s.")],
+    force: Annotated[float, Option(help="Limit of the rail's drive force, N.")],
+    mass: Annotated[float, Option(help="Mass of the carriage, kg.")],
+    out: Annotated[Path, Option(help="URDF file to write.")],
     axis: Annotated[
-        Triple,
-        typer.Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0."),
+        Triple, Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0.")
     ] = (0.0, 1.0, 0.0),
     mount_xyz: Annotated[
-        Triple, typer.Option(help="Position of the arm's root link on the carriage, m.")
+        Triple, Option(help="Position of the arm's root link on the carriage, m.")
     ] = _ZERO,
     mount_rpy_deg: Annotated[
         Triple,
-        typer.Option(
+        Option(
             help="Its roll, pitch and yaw, degrees; 180 0 0 hangs the arm upside down."
         ),
     ] = _ZERO,
-    name: Annotated[str, typer.Option(help="Name of the rail's joint.")] = "rail",
+    name: Annotated[str, Option(help="Name of the rail's joint.")] = "rail",
     root: Annotated[
-        str, typer.Option(help="Name of the root link, the world frame.")
+        str, Option(help="Name of the root link, the world frame.")
     ] = "world",
-    meshes: Annotated[
-        bool, typer.Option(help="Keep the arm's meshes, or drop them.")
-    ] = True,
+    meshes: Annotated[bool, Option(help="Keep the arm's meshes, or drop them.")] = True,
     json: Json = False,
 ) -> None:
     """Mount an arm on a linear axis, as a new URDF.
@@ -213,7 +202,8 @@ def compose(
         (".urdf",),
         (arm,),
     )
-    if json:
-        print_json({"urdf": str(out), "arm": str(arm), "joint": name, "root": root})
-    else:
-        result_console().print(f"wrote {out}")
+    print_answer(
+        {"urdf": str(out), "arm": str(arm), "joint": name, "root": root},
+        f"wrote {out}",
+        as_json=json,
+    )

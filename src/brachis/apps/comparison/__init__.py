@@ -1,11 +1,6 @@
 """A recorded motion beside the motion that is planned along its path, within the same limits."""
 
-from brachis.apps.comparison.comparison import (
-    Comparison,
-    Use,
-    compare,
-    plot_comparison,
-)
+from brachis.apps.comparison.comparison import Comparison, Use, compare, plot_comparison
 from brachis.apps.comparison.rows import RatioBounds, bound_ratios
 
 __all__ = [

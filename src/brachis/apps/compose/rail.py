@@ -30,22 +30,17 @@ def _is_positive(value: np.ndarray) -> np.ndarray:
     return value > 0.0
 
 
-_FIGURES: dict[str, tuple[str, str, tuple[int, ...], Callable[[np.ndarray], Any]]] = {
-    "range": (
-        "is not a range",
-        "[low, high] in m, both finite, low < high",
-        (2,),
-        lambda ends: ends[0] < ends[1],
-    ),
-    "velocity": ("is not positive", "a finite number > 0 m/s", (), _is_positive),
-    "force": ("is not positive", "a finite number > 0 N", (), _is_positive),
-    "mass": ("is not positive", "a finite number > 0 kg", (), _is_positive),
-    "axis": ("is not a direction", "[x, y, z], not all zero", (3,), np.any),
-    "mount_xyz": ("is not a position", "[x, y, z] in m", (3,), np.isfinite),
-    "mount_rpy": ("is not a rotation", "[roll, pitch, yaw] in rad", (3,), np.isfinite),
-    "carriage_size": ("is not a size", "three lengths > 0 m", (3,), _is_positive),
+_FIGURES: dict[str, tuple[str, tuple[int, ...], Callable[[np.ndarray], Any]]] = {
+    "range": ("[low, high] in m, low < high", (2,), lambda ends: ends[0] < ends[1]),
+    "velocity": ("a finite number > 0 m/s", (), _is_positive),
+    "force": ("a finite number > 0 N", (), _is_positive),
+    "mass": ("a finite number > 0 kg", (), _is_positive),
+    "axis": ("a direction [x, y, z], not all zero", (3,), np.any),
+    "mount_xyz": ("a position [x, y, z] in m", (3,), np.isfinite),
+    "mount_rpy": ("[roll, pitch, yaw] in rad", (3,), np.isfinite),
+    "carriage_size": ("three lengths > 0 m", (3,), _is_positive),
 }
-"""Figures of a rail: what is said of a wrong one, what is allowed, the shape, and a test of finite values."""
+"""Figures of a rail: what is allowed, the shape, and a test of values, which have to be finite too."""
 
 
 def rename_link(robot: Element, old: str, new: str) -> None:
@@ -135,7 +130,7 @@ class Rail:
 
     def __post_init__(self) -> None:
         """Check the figures."""
-        for figure, (problem, allowed, shape, test) in _FIGURES.items():
+        for figure, (allowed, shape, test) in _FIGURES.items():
             given = getattr(self, figure)
             try:
                 value = np.array(given, dtype=float)
@@ -144,7 +139,7 @@ class Rail:
             is_finite = value.shape == shape and np.isfinite(value).all()
             if not is_finite or not np.all(test(value)):
                 raise InputError(
-                    problem, where=figure, found=str(given), allowed=allowed
+                    "wrong value", where=figure, found=str(given), allowed=allowed
                 )
             if figure == "axis":
                 value /= np.abs(value).max()  # squares of its size may overflow

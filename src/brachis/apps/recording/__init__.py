@@ -1,6 +1,6 @@
 """Recorded motions: from files of joint positions over time to trajectories."""
 
 from brachis.apps.recording.importing import import_motion, joint_path_of
-from brachis.apps.recording.recording import Recording, Units, read_recording
+from brachis.apps.recording.recording import Recording, read_recording
 
-__all__ = ["Recording", "Units", "import_motion", "joint_path_of", "read_recording"]
+__all__ = ["Recording", "import_motion", "joint_path_of", "read_recording"]

@@ -16,7 +16,7 @@ import numpy as np
 
 from brachis import ik
 from brachis.apps.recording.nodes import Nodes, nodes_of
-from brachis.apps.recording.recording import Recording, Units, read_recording
+from brachis.apps.recording.recording import Recording, check_units, read_recording
 from brachis.common.arguments import check_keywords, file_name, numbers
 from brachis.common.arrays import with_like_signs
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
@@ -40,8 +40,6 @@ from brachis.task.points.points import Points
 from brachis.trajectory import Recovered, Trajectory
 from brachis.trajectory.recovered import LARGEST, check_tolerance
 
-_POINTS = 2000
-"""Points of a motion to which its path is fitted."""
 _SURE = 3.0
 """Largest deviation of measured positions, in standard deviations."""
 
@@ -126,7 +124,7 @@ def import_motion(
     space = task_space
     if not space:
         space = settings.task_space if settings else ik.default_task_space(given_robot)
-    recording = read_recording(path, given_robot, _read_units(units))
+    recording = read_recording(path, given_robot, check_units(units or {}))
     bound, task_map = bind(given_robot, space)
     deviation = _deviations(recording, noise)
     nodes = nodes_of(recording, deviation)
@@ -273,11 +271,12 @@ def _tool_speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarra
 
 
 def _choose_evenly(length: np.ndarray) -> np.ndarray:
-    """Choose indices at about equal distances, the first and the last one among them."""
+    """Choose 2000 indices at about equal distances, the first and the last one among them."""
+    count = 2000
     end = len(length) - 1
-    even = np.searchsorted(length, np.linspace(0.0, length[-1], _POINTS)).clip(max=end)
+    even = np.searchsorted(length, np.linspace(0.0, length[-1], count)).clip(max=end)
     chosen = np.unique([0, *even, end])
-    is_apart = np.diff(length[chosen]) > 1e-3 * length[-1] / _POINTS
+    is_apart = np.diff(length[chosen]) > 1e-3 * length[-1] / count
     return chosen[np.concatenate([[True], is_apart[:-1], [True]])]
 
 
@@ -345,23 +344,6 @@ def _is_task(given: object) -> bool:
         return isinstance(given, Task | Mapping)
     suffix = pathlib.Path(given).suffix.lower()
     return suffix in TASK_SUFFIXES or kind_of(given) is Kind.TASK
-
-
-def _read_units(given: Mapping[str, str] | None) -> Units:
-    """Read units by the quantities that have them.
-
-    Raises
-    ------
-    InputError
-    """
-    if given is not None and not isinstance(given, Mapping):
-        raise InputError(
-            "wrong type",
-            where="units",
-            found=repr(given),
-            allowed='{"angle": "deg", "length": "mm", "time": "ms"}, or some of them',
-        )
-    return check_keywords(Units, "units")(**dict(given or {}))
 
 
 def _deviations(

@@ -27,10 +27,6 @@ from brachis.errors import write_count
 _TINY = np.finfo(float).tiny
 _DEGREE = 5
 """Degree of smoothing splines."""
-_NEAR = 1.05
-"""Deviation of a smoothing spline with enough intervals, in standard deviations; noise alone gives 1."""
-_EXPLAINED = 2.0
-"""Largest deviation of a spline that explains the rows, in standard deviations."""
 _AT_REST = {1: 1e-3, 2: 1e-2}
 """Velocity and acceleration at an end, as parts of the largest ones, below which they are zero."""
 _NARROWEST = 0.02
@@ -111,7 +107,7 @@ def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
         is_rough = rounding > threshold
         if is_rough.any():
             spline, off = _fit_rows(t, q[:, is_rough], deviation[is_rough])
-            if off <= _EXPLAINED or in_any_case:
+            if off <= 2.0 or in_any_case:  # two standard deviations
                 states[:, :, is_rough] = spline
                 break
     return states
@@ -123,10 +119,7 @@ def _interpolate(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray, 
     note = (
         "velocities and accelerations are those of polynomials through five rows each"
     )
-    rates = (
-        (1, recording.qdot, "velocities"),
-        (2, recording.qddot, "accelerations"),
-    )
+    rates = ((1, recording.qdot, "velocities"), (2, recording.qddot, "accelerations"))
     for order, given, words in rates:
         if given is None:
             continue
@@ -178,9 +171,10 @@ def _fit_rows(
 
     At its ends as many derivatives vanish as the rows allow: none, the velocity, the acceleration too.
     """
+    # More intervals, until the spline is about as far off as noise alone, which is 1.
     count = 4.0
     states, off = _fit_spline(t, q, deviation, int(count), 0, 0)
-    while off > _NEAR and 1.2 * count <= len(t) / 2.0:
+    while off > 1.05 and 1.2 * count <= len(t) / 2.0:
         count *= 1.2
         states, off = _fit_spline(t, q, deviation, int(count), 0, 0)
     largest = np.abs(states).max(axis=1)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from brachis.common.arrays import freeze
 from brachis.common.files import check_kind, read_text
-from brachis.errors import TaskError, write_count
+from brachis.errors import InputError, TaskError, UnknownNameError, write_count
 from brachis.robot import Robot
 from brachis.task.points.tables import Table, read_table
 from brachis.task.points.units import ANGLES, LENGTHS
@@ -43,12 +42,8 @@ _UNIT_WORDS = "|".join({**TIMES, **ANGLES, **LENGTHS})
 _NAME_AND_UNIT = re.compile(
     rf"^(.+?)\s*(?:[\[(]\s*([a-z0-9/^]+)\s*[\])]|_((?:{_UNIT_WORDS})(?:(?:/|_|_per_)s(?:\^?2)?)?))$"
 )
-_EXACT_DIGITS = 12
-"""Decimals from which on rounding does not matter."""
 FEWEST_ROWS = 5
 """Rows of the shortest motion: a polynomial through five rows gives the derivatives."""
-_LARGEST_FILE = 64_000_000
-"""Bytes."""
 _STILL = 1e-12
 """A joint that moves less between rows with all digits stands still, rad or m."""
 _CHANGED_DIGITS = 2.2
@@ -59,36 +54,33 @@ _MOST_TURNS = 6.0 * np.pi
 """Largest plausible angle of a joint without a range, rad."""
 
 
-@dataclass(frozen=True)
-class Units:
-    """Units of the numbers in a file; None: as the header says, otherwise s, rad and m.
+def check_units(units: object) -> dict[str, str]:
+    """Return units of the quantities ``angle``, ``length`` and ``time`` that the user states.
 
-    Attributes
-    ----------
-    angle, length, time : str or None
-        One of ``rad``, ``deg``, ...; ``m``, ``mm``, ...; ``s``, ``ms``, ...
+    Raises
+    ------
+    InputError
+        A quantity or a unit is unknown.
     """
-
-    angle: str | None = None
-    length: str | None = None
-    time: str | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse unknown units.
-
-        Raises
-        ------
-        TaskError
-        """
-        for name, known in _UNITS.values():
-            unit = getattr(self, name)
-            if unit is not None and unit not in known:
-                raise TaskError(
-                    f"unknown unit of {name}",
-                    found=unit,
-                    allowed=", ".join(known),
-                    where=f"units.{name}",
-                )
+    if not isinstance(units, Mapping):
+        raise InputError(
+            "wrong type",
+            where="units",
+            found=repr(units),
+            allowed='{"angle": "deg", "length": "mm", "time": "ms"}, or some of them',
+        )
+    known = dict(_UNITS.values())
+    for name, unit in units.items():
+        if name not in known:
+            raise UnknownNameError("quantity", name, known, where="units")
+        if unit not in known[name]:
+            raise TaskError(
+                f"unknown unit of {name}",
+                found=unit,
+                allowed=", ".join(known[name]),
+                where=f"units.{name}",
+            )
+    return dict(units)
 
 
 Columns = dict[tuple[str, str], tuple[int, str | None]]
@@ -113,7 +105,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
     meanings = dict.fromkeys(_TIME_COLUMNS, ("t", ""))
     for kind, forms in _JOINT_COLUMNS.items():
         for joint in joints:
-            names = forms.format(joint.lower()).split(" ")
+            names = [form.format(joint.lower()) for form in forms.split()]
             meanings |= dict.fromkeys(names, (kind, joint))
     columns: Columns = {}
     problem = None
@@ -154,7 +146,7 @@ def _read_column(
     columns: Columns,
     key: tuple[str, str],
     base: str,
-    units: Units,
+    units: Mapping[str, str],
     where: str,
 ) -> tuple[np.ndarray, str, float]:
     """Return a column in SI units, (K,), its unit in the file, and half of its last digit in SI units.
@@ -167,7 +159,7 @@ def _read_column(
         Quantity and joint.
     base : {"s", "rad", "m"}
         SI unit of time, or of the joint's position.
-    units : Units
+    units : mapping
         Units that the user states.
     where : str
         Line of the header, for messages.
@@ -179,7 +171,7 @@ def _read_column(
     """
     i, stated = columns[key]
     name, factors = _UNITS[base]
-    asked = getattr(units, name)
+    asked = units.get(name)
     per = _QUANTITIES[key[0]][1]
     values = table.values[:, i]
     unit = (asked or base) if stated is None else stated.removesuffix(per)
@@ -198,7 +190,7 @@ def _read_column(
             where=where,
         )
     rounding = 0.0
-    for decimals in range(_EXACT_DIGITS):
+    for decimals in range(12):  # more do not matter
         if np.ptp(values) and np.array_equal(np.round(values, decimals), values):
             rounding = 0.5 * 10.0**-decimals * factors[unit]
             break
@@ -236,14 +228,9 @@ class Recording:
     source: str
     notes: tuple[str, ...]
 
-    def __post_init__(self) -> None:
-        """Take copies that nobody can write to."""
-        rates = (name for name in ("qdot", "qddot") if getattr(self, name) is not None)
-        freeze(self, "t", "q", "rounding", *rates)
-
 
 def read_recording(
-    path: str | os.PathLike[str], robot: Robot, units: Units
+    path: str | os.PathLike[str], robot: Robot, units: Mapping[str, str]
 ) -> Recording:
     """Read a CSV file of time and joint positions, and of velocities and accelerations if it has them.
 
@@ -254,7 +241,8 @@ def read_recording(
     path : path
     robot : Robot
         Its joints name the columns.
-    units : Units
+    units : mapping
+        Units of ``angle``, ``length`` and ``time`` in columns whose header states none.
 
     Raises
     ------
@@ -264,9 +252,7 @@ def read_recording(
     source = Path(path)
     joints = robot.joint_names
     check_kind(source, "a CSV file", TaskError)
-    text = read_text(
-        source, where=str(source), folder=Path.cwd(), largest=_LARGEST_FILE
-    )
+    text = read_text(source, where=str(source), folder=Path.cwd(), largest=64_000_000)
     table = read_table(
         text,
         str(source),
@@ -287,8 +273,10 @@ def read_recording(
             if kind == "q":
                 position_units = [unit for _, unit, _ in read]
                 rounding = np.array([digit for _, _, digit in read])
+    q = parts["q"]
     _check_times(t, table, source)
-    _check_angles(parts["q"], robot, units, source)
+    if "angle" not in units:
+        _check_angles(q, robot, source)
     notes = [
         *table.notes,
         f"units: {', '.join(dict.fromkeys((time_unit, *position_units)))}",
@@ -297,17 +285,28 @@ def read_recording(
     ignored = [name for i, name in enumerate(table.header) if i not in known]
     if ignored:
         notes.append(f"left out the columns {', '.join(ignored)}")
-    return _trim(
-        Recording(
-            t,
-            parts["q"],
-            parts.get("qdot"),
-            parts.get("qddot"),
-            rounding,
-            robot.position_units,
-            str(source),
-            tuple(notes),
-        )
+    first = _first_row(t, q, rounding, source)
+    last = len(t) - 1 - _first_row(-t[::-1], q[::-1], rounding, source)
+    if last - first + 1 < FEWEST_ROWS:
+        raise _no_motion(f"the robot moves in fewer than {FEWEST_ROWS} rows", t, source)
+    for rows, time, when in (
+        (first, t[first] - t[0], "before"),
+        (len(t) - 1 - last, t[-1] - t[last], "after"),
+    ):
+        if rows:
+            notes.append(
+                f"left out {time:.6g} s {when} the motion, in which the robot stands still ({write_count(rows, 'row')})"
+            )
+    kept = {kind: part[first : last + 1] for kind, part in parts.items()}
+    return Recording(
+        t[first : last + 1] - t[first],
+        kept["q"],
+        kept.get("qdot"),
+        kept.get("qddot"),
+        rounding,
+        robot.position_units,
+        str(source),
+        tuple(notes),
     )
 
 
@@ -327,7 +326,7 @@ def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
         )
 
 
-def _check_angles(q: np.ndarray, robot: Robot, units: Units, source: Path) -> None:
+def _check_angles(q: np.ndarray, robot: Robot, source: Path) -> None:
     """Refuse degrees that were taken for radians: no joint turns so far."""
     ends = np.abs([robot.limits.position_lower, robot.limits.position_upper]).max(
         axis=0
@@ -335,7 +334,7 @@ def _check_angles(q: np.ndarray, robot: Robot, units: Units, source: Path) -> No
     reach = 1.5 * np.where(np.isfinite(ends), ends, 0.0)
     largest = np.abs(q).max(axis=0)
     is_far = robot.revolute & (largest > np.maximum(_MOST_TURNS, reach))
-    if is_far.any() and units.angle is None:
+    if is_far.any():
         joint = int(np.argmax(is_far))
         raise TaskError(
             "implausible angle (degrees?)",
@@ -345,54 +344,24 @@ def _check_angles(q: np.ndarray, robot: Robot, units: Units, source: Path) -> No
         )
 
 
-def _trim(recording: Recording) -> Recording:
-    """Leave out rows in which nothing moves before the motion begins and after it has ended."""
-    t = recording.t
-    q = recording.q
-    first = _first_row(t, q, recording)
-    last = len(t) - 1 - _first_row(-t[::-1], q[::-1], recording)
-    if last - first + 1 < FEWEST_ROWS:
-        raise _no_motion(f"the robot moves in fewer than {FEWEST_ROWS} rows", recording)
-    notes = list(recording.notes)
-    for rows, time, when in (
-        (first, t[first] - t[0], "before"),
-        (len(t) - 1 - last, t[-1] - t[last], "after"),
-    ):
-        if rows:
-            notes.append(
-                f"left out {time:.6g} s {when} the motion, in which the robot stands still ({write_count(rows, 'row')})"
-            )
-    kept = slice(first, last + 1)
-    rates: dict[str, Any] = {}
-    for name in ("qdot", "qddot"):
-        part = getattr(recording, name)
-        rates[name] = None if part is None else part[kept]
-    return replace(
-        recording, t=t[kept] - t[first], q=q[kept], notes=tuple(notes), **rates
-    )
-
-
-def _first_row(t: np.ndarray, q: np.ndarray, recording: Recording) -> int:
+def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path) -> int:
     """Return the row at which motion begins.
 
     If the file has few digits, a gentle motion has been going on for a while when the last digit shows it. It grows as
     the cube of time, so that it is eight times as large after twice the time.
     """
     away = np.abs(q - q[0])
-    changed = away > np.maximum(_STILL, _CHANGED_DIGITS * recording.rounding)
-    clear = away > np.maximum(_STILL, _CLEAR_DIGITS * recording.rounding)
+    changed = away > np.maximum(_STILL, _CHANGED_DIGITS * rounding)
+    clear = away > np.maximum(_STILL, _CLEAR_DIGITS * rounding)
     if not changed.any():
-        raise _no_motion("the robot does not move", recording)
+        raise _no_motion("the robot does not move", t, source)
     row = int(np.argmax(changed.any(axis=1)))
     lead = t[np.argmax(clear.any(axis=1))] - t[row] if clear.any() else 0.0
     before = np.searchsorted(t, t[row] - lead, side="right") - 1
     return int(np.clip(before, 0, row - 1))
 
 
-def _no_motion(problem: str, recording: Recording) -> TaskError:
+def _no_motion(problem: str, t: np.ndarray, source: Path) -> TaskError:
     return TaskError(
-        problem,
-        found=write_count(len(recording.t), "row"),
-        allowed="a motion",
-        where=recording.source,
+        problem, found=write_count(len(t), "row"), allowed="a motion", where=str(source)
     )

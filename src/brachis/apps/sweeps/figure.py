@@ -44,7 +44,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     Raises
     ------
     InputError
-        There are no keys or more than two, or no plan is verified.
+        The number of keys is not 1 or 2, or no plan is verified.
     """
     if len(keys) not in (1, 2):
         raise InputError(
@@ -74,18 +74,22 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     figure = style.new_figure(width, height)
     ax = figure.add_subplot()
     x = places[0]
+    shown = np.where(is_verified, times, np.nan)
     if len(keys) == 1:
         y = np.full(len(x), times[is_verified].max())
         order = np.argsort(x)
-        shown = np.where(is_verified, times, np.nan)
         look = style.joint_style(0)
         look["linestyle"] = "-" if _are_numbers(values[0]) else "none"
         ax.plot(x[order], shown[order], marker="o", markersize=3.0, **look)
         style.dress(ax, _title(keys[0]), _END_TIME)
     else:
         y = places[1]
-        draw = _draw_heat_map if is_heat_map else _draw_points
-        image = draw(ax, x[is_verified], y[is_verified], times[is_verified])
+        if is_heat_map:
+            image = _draw_heat_map(ax, x, y, shown)
+        else:
+            image = ax.scatter(
+                x, y, c=shown, cmap=_COLOURS, s=14.0, plotnonfinite=False
+            )
         style.dress(ax, _title(keys[0]), _title(keys[1]))
         style.dress(figure.colorbar(image, ax=ax).ax, "", _END_TIME)
     if not is_verified.all():
@@ -143,33 +147,30 @@ def _are_numbers(values: Sequence[Any]) -> bool:
     )
 
 
-def _draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
-    return ax.scatter(x, y, c=times, cmap=_COLOURS, s=14.0)
-
-
 def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
-    """Draw cells at whole numbers x and y; small maps have the times written in them."""
+    """Draw cells at whole numbers x and y, NaN empty; small maps have the times written in them."""
     grid = np.full((int(y.max()) + 1, int(x.max()) + 1), np.nan)
     grid[y.astype(int), x.astype(int)] = times
     image = ax.imshow(grid, cmap=_COLOURS, aspect="auto", origin="lower")
     if max(grid.shape) > _MOST_TICKS:
         return image
-    differences = np.diff(np.unique(times))
-    differences = differences[differences > 1e-5 * times.max()]
+    differences = np.diff(np.unique(times[np.isfinite(times)]))
+    differences = differences[differences > 1e-5 * np.nanmax(times)]
     decimals = 2
     if len(differences):  # as many as show them, five at most
         decimals = int(np.clip(np.ceil(-np.log10(differences.min()) - 1e-6), 2, 5))
-    middle = 0.5 * (times.min() + times.max())
+    middle = 0.5 * (np.nanmin(times) + np.nanmax(times))
     for column, row, time in zip(x, y, times, strict=True):
-        ax.text(
-            column,
-            row,
-            f"{time:.{decimals}f}",
-            color="white" if time < middle else "black",
-            ha="center",
-            va="center",
-            fontsize=style.TICK_SIZE,
-        )
+        if math.isfinite(time):
+            ax.text(
+                column,
+                row,
+                f"{time:.{decimals}f}",
+                color="white" if time < middle else "black",
+                ha="center",
+                va="center",
+                fontsize=style.TICK_SIZE,
+            )
     return image
 
 

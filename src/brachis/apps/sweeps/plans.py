@@ -10,6 +10,7 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -216,22 +217,22 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
     TaskError
     """
     unknown: dict[str, BrachisError | None] = {}
+
+    def find_error(plan: Plan | BrachisError) -> BrachisError | None:
+        if isinstance(plan, BrachisError):
+            return plan
+        if plan.digest not in unknown:
+            unknown[plan.digest] = _unknown_name(plan)
+        return unknown[plan.digest]
+
     refused: dict[str, str] = {}
     for key in settings.keys or ("task",):
         plans = [row.plan for row in rows if key in row.changes or not row.changes]
-        first = None
-        for plan in sorted(plans, key=lambda plan: isinstance(plan, BrachisError)):
-            error = plan if isinstance(plan, BrachisError) else None
-            if isinstance(plan, Plan):
-                if plan.digest not in unknown:
-                    unknown[plan.digest] = _unknown_name(plan)
-                error = unknown[plan.digest]
-            first = first or error
-            if error is None:
-                break
-        else:
+        plans.sort(key=lambda plan: isinstance(plan, BrachisError))
+        errors = list(takewhile(bool, map(find_error, plans)))
+        if len(errors) == len(plans):
             refused[key] = (
-                f"refused in every plan that sets it ({len(plans)}); the first: {first}"
+                f"refused in every plan that sets it ({len(plans)}); the first: {errors[0]}"
             )
     if refused:
         # One wrong key refuses the plans of all others.

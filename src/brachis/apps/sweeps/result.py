@@ -60,7 +60,7 @@ def arrow() -> ModuleType:
     Raises
     ------
     NotInstalledError
-        It is not.
+        It is not installed.
     """
     try:
         import pyarrow as pa
@@ -77,7 +77,7 @@ class Store:
     Parameters
     ----------
     folder : Path
-        Made where there is none. One that holds other files than a sweep's is refused.
+        Made if it does not exist. One that holds other files than those of a sweep is refused.
 
     Raises
     ------
@@ -249,11 +249,11 @@ class SweepResult(Summary):
         Raises
         ------
         InputError
-            It holds none, or none that was finished.
+            It holds no sweep, or one that was not finished.
         """
         path = Path(folder)
         if not is_folder(path):
-            raise InputError("there is no such folder", where=str(path))
+            raise InputError("the folder does not exist", where=str(path))
         store = Store(path)
         about = store.read_description()
         if about is None:
@@ -297,11 +297,11 @@ class SweepResult(Summary):
         Raises
         ------
         InputError
-            There is no such plan, or it failed.
+            The number is too large, or the plan failed.
         """
         if not 0 <= plan < len(self.table):
             raise InputError(
-                "there is no such plan",
+                "the plan does not exist",
                 found=plan,
                 allowed=f"0 to {len(self.table) - 1}",
             )

@@ -6,7 +6,8 @@ import itertools
 import json
 import math
 import zlib
-from typing import Annotated, Any, Literal
+from collections.abc import Collection
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -18,16 +19,7 @@ from pydantic import (
 )
 
 from brachis.errors import TaskError
-from brachis.task.fields import (
-    ByForm,
-    ByKey,
-    Count,
-    Model,
-    Name,
-    Number,
-    Positive,
-    refuse,
-)
+from brachis.task.fields import ByForm, Count, Model, Name, Number, Positive, refuse
 
 MOST_PLANS = 1_000_000
 _HowMany = Annotated[Count, Field(ge=1, le=MOST_PLANS)]
@@ -44,90 +36,75 @@ def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
     return pair
 
 
-class Linear(Model):
-    """Values at equal distances."""
+class _OneKey(Model):
+    """A mapping with exactly one of its keys."""
 
-    linear: tuple[Number, Number, _HowMany] = Field(
-        description="First value, last value, how many."
+    @model_validator(mode="after")
+    def _check_keys(self) -> Self:
+        keys = [key for key, value in self if value is not None]
+        if len(keys) != 1:
+            raise refuse(
+                "exactly one key is needed",
+                found=", ".join(keys) or "none",
+                allowed=", ".join(type(self).model_fields),
+            )
+        return self
+
+
+class Spacing(_OneKey):
+    """Values at equal distances or ratios."""
+
+    linear: tuple[Number, Number, _HowMany] | None = Field(
+        default=None, description="Equal distances: first value, last value, how many."
+    )
+    logarithmic: tuple[Positive, Positive, _HowMany] | None = Field(
+        default=None, description="Equal ratios: first value, last value, how many."
     )
 
     def values(self) -> list[JsonValue]:
         """List them."""
-        return np.linspace(*self.linear).tolist()
-
-
-class Logarithmic(Model):
-    """Values at equal ratios."""
-
-    logarithmic: tuple[Positive, Positive, _HowMany] = Field(
-        description="First value, last value, how many."
-    )
-
-    def values(self) -> list[JsonValue]:
-        """List them."""
+        if self.linear is not None:
+            return np.linspace(*self.linear).tolist()
+        assert self.logarithmic is not None
         return np.geomspace(*self.logarithmic).tolist()
 
 
 GridValues = Annotated[
-    _Values | Annotated[Linear | Logarithmic, ByKey("values are spaced in one way")],
+    _Values | Spacing,
     ByForm(
         "a list of values, {linear: [first, last, count]} or {logarithmic: [first, last, count]}"
     ),
 ]
 
 
-class Uniform(Model):
-    """Every value of a range is as likely."""
+class Distribution(_OneKey):
+    """Distribution of random values."""
 
-    uniform: Annotated[tuple[Number, Number], AfterValidator(_ascending)] = Field(
-        description="Both ends."
+    uniform: Annotated[tuple[Number, Number], AfterValidator(_ascending)] | None = (
+        Field(default=None, description="Every value between two ends is as likely.")
     )
+    log_uniform: (
+        Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] | None
+    ) = Field(
+        default=None, description="Every ratio between two ends, > 0, is as likely."
+    )
+    normal: tuple[Number, Positive] | None = Field(
+        default=None, description="Mean and standard deviation."
+    )
+    choice: _Values | None = Field(default=None, description="Each value is as likely.")
 
     def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
         """Draw values."""
-        return generator.uniform(*self.uniform, size=count).tolist()
-
-
-class LogUniform(Model):
-    """Every ratio within a range is as likely."""
-
-    log_uniform: Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] = (
-        Field(description="Both ends, > 0.")
-    )
-
-    def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
-        """Draw values."""
+        if self.choice is not None:
+            chosen = generator.integers(len(self.choice), size=count)
+            return [self.choice[i] for i in chosen]
+        if self.normal is not None:
+            return generator.normal(*self.normal, size=count).tolist()
+        if self.uniform is not None:
+            return generator.uniform(*self.uniform, size=count).tolist()
+        assert self.log_uniform is not None
         low, high = map(math.log, self.log_uniform)
         return np.exp(generator.uniform(low, high, size=count)).tolist()
-
-
-class Normal(Model):
-    """A normal distribution."""
-
-    normal: tuple[Number, Positive] = Field(description="Mean and standard deviation.")
-
-    def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
-        """Draw values."""
-        return generator.normal(*self.normal, size=count).tolist()
-
-
-class Choice(Model):
-    """One of a list, each as likely."""
-
-    choice: _Values = Field(description="The values.")
-
-    def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
-        """Draw values."""
-        return [
-            self.choice[place]
-            for place in generator.integers(len(self.choice), size=count)
-        ]
-
-
-Distribution = Annotated[
-    Uniform | LogUniform | Normal | Choice,
-    ByKey("a distribution has one of these keys"),
-]
 
 
 class RandomSettings(Model):
@@ -147,15 +124,14 @@ class RandomSettings(Model):
 
     def draws(self) -> list[dict[str, JsonValue]]:
         """Draw: for each of the draws the values of all keys."""
-        columns = {
-            key: distribution.draw(
-                np.random.default_rng([self.seed, zlib.crc32(key.encode())]), self.count
-            )
-            for key, distribution in self.keys.items()
-        }
+        columns = []
+        for key, distribution in self.keys.items():
+            seed = [self.seed, zlib.crc32(key.encode())]
+            generator = np.random.default_rng(seed)
+            columns.append(distribution.draw(generator, self.count))
         return [
-            dict(zip(columns, values, strict=True))
-            for values in zip(*columns.values(), strict=True)
+            dict(zip(self.keys, values, strict=True))
+            for values in zip(*columns, strict=True)
         ]
 
 
@@ -183,7 +159,7 @@ class SweepSettings(Model):
 
     @field_validator("task")
     @classmethod
-    def _task_is_named_or_given(cls, task: JsonValue) -> JsonValue:
+    def _check_task(cls, task: JsonValue) -> JsonValue:
         if not isinstance(task, str | dict) or not task:
             raise refuse(
                 "no task", found=task, allowed="the name of a task file, or a task"
@@ -191,14 +167,12 @@ class SweepSettings(Model):
         return task
 
     @model_validator(mode="after")
-    def _every_key_in_one_place(self) -> SweepSettings:
-        drawn = self.random.keys if self.random else {}
-        rows = {key for row in self.rows for key in row}
-        places = {
-            "fixed": set(self.fixed),
-            "grid": set(self.grid),
-            "rows": rows,
-            "random": set(drawn),
+    def _check_places(self) -> SweepSettings:
+        places: dict[str, Collection[str]] = {
+            "fixed": self.fixed,
+            "grid": self.grid,
+            "rows": self._row_keys(),
+            "random": self.random.keys if self.random else (),
         }
         found: dict[str, str] = {}
         for place, keys in places.items():
@@ -213,11 +187,14 @@ class SweepSettings(Model):
                 found[key] = place
         return self
 
+    def _row_keys(self) -> Collection[str]:
+        return dict.fromkeys(key for row in self.rows for key in row)
+
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys that are varied, in the order of the file."""
-        in_rows = dict.fromkeys(key for row in self.rows for key in row)
-        return (*self.grid, *in_rows, *(self.random.keys if self.random else ()))
+        drawn = self.random.keys if self.random else ()
+        return (*self.grid, *self._row_keys(), *drawn)
 
     def changes(self) -> list[dict[str, JsonValue]]:
         """List what every plan sets of the varied keys: the grid's first key changes slowest, equal ones come once.
