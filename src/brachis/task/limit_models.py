@@ -219,7 +219,10 @@ class LimitSpec:
             object.__setattr__(self, each.name, value)
         if given:
             raise UnknownNameError(
-                "limit", next(iter(given)), LimitKeywords.__annotations__
+                "limit",
+                next(iter(given)),
+                LimitKeywords.__annotations__,
+                where="LimitSpec",
             )
 
 

@@ -340,7 +340,7 @@ class MovingSegment(SegmentModel):
 
 
 class LineSegment(MovingSegment):
-    """A straight line."""
+    """A straight line: `to` a point, `by` a displacement, or of a `length` in a direction."""
 
     line: LineForm
 
@@ -361,25 +361,25 @@ class LineSegment(MovingSegment):
 
 
 class ArcSegment(MovingSegment):
-    """A circular arc."""
+    """A circular arc: about a `center` by an angle, or `via` a point `to` another one."""
 
     arc: ArcForm
 
 
 class CircleSegment(MovingSegment):
-    """A circle."""
+    """Whole or fractional turns about a centre."""
 
     circle: CircleTurns
 
 
 class HelixSegment(MovingSegment):
-    """A helix."""
+    """Turns about an axis that climb along it, in three position rows."""
 
     helix: HelixTurns
 
 
 class SplineSegment(MovingSegment):
-    """A smooth curve through waypoints."""
+    """A smooth curve through waypoints, from the end of the segment before it or the path's start."""
 
     spline: SplineThrough
 
