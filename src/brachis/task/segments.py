@@ -94,13 +94,14 @@ class BSplineCurve(Model):
                 found=len(knots),
                 allowed=f"{needed}: control points + degree + 1",
             )
-        times = Counter(knots)
         ends = (knots[0], knots[-1])
         clamped = ends == (knots[outer - 1], knots[-outer]) and ends[0] < ends[1]
-        inner = [count for knot, count in times.items() if knot not in ends]
-        most = max(inner, default=0)
         allowed = self.degree - _SMOOTH
-        often = most > allowed or any(times[end] > outer for end in ends)
+        often = [
+            count
+            for knot, count in Counter(knots).items()
+            if count > (outer if knot in ends else allowed)
+        ]
         return self.check(
             (
                 len({len(point) for point in self.control_points}) > 1,
@@ -117,7 +118,7 @@ class BSplineCurve(Model):
             (
                 often,
                 "knots",
-                f"a knot occurs {most} times, so often that a derivative up to the third jumps",
+                f"a knot occurs {max(often, default=0)} times, so often that a derivative up to the third jumps",
                 f"{allowed} times at most",
             ),
         )
