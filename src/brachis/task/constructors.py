@@ -64,7 +64,10 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
         except ValidationError as error:
             raise task_error(error, name, model) from None
 
-    described = (f"{key}\n    {field.description}" for key, field in fields.items())
+    described = [
+        f"{key} : {'required' if key in needed else 'optional'}\n    {field.description}"
+        for key, field in fields.items()
+    ]
     make.__doc__ = _DOCSTRING.format(
         summary=model.__doc__, parameters="\n".join(described), example=example
     )

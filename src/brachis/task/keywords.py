@@ -142,18 +142,14 @@ def task_with(
     if source is not None and not keywords:
         return load_task(source)
     check_keywords(keywords)
-    content = (
-        {"brachis": 1}
-        if source is None
-        else load_task(source).model_dump(exclude_unset=True)
-    )
+    content: dict[str, Any] = {"brachis": 1}
+    if source is not None:
+        content = load_task(source).model_dump(exclude_unset=True)
     for key, value in keywords.items():
-        whole = (
-            {_SECTION_OF[key]: {key: value}}
-            if key in _SECTION_OF
-            else {key: _in_full(key, value)}
-        )
-        content = _merge(content, whole)
+        if key in _SECTION_OF:
+            content = _merge(content, {_SECTION_OF[key]: {key: value}})
+        else:
+            content = _merge(content, {key: _in_full(key, value)})
     return load_task(content)
 
 
@@ -207,16 +203,14 @@ def _as_keyword(parts: Sequence[str]) -> str:
 
 
 def _in_full(key: str, value: object) -> object:
-    """Write a posture, a solver's name, and a transform for the start of the path as a task file does."""
+    """Write a posture, or a solver's name, as a task file does."""
     if key == "solver" and isinstance(value, str):
         return {"name": value}
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
-    return (
-        value
-        if isinstance(value, Mapping) and set(value) == {"joints"}
-        else {"joints": plain(value)}
-    )
+    if isinstance(value, Mapping) and set(value) == {"joints"}:
+        return value
+    return {"joints": plain(value)}
 
 
 def _merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -20,7 +20,6 @@ from brachis.task.fields import (
     Number,
     Positive,
     plain,
-    refuse,
 )
 from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, task_error
@@ -70,28 +69,20 @@ class RosJointLimits(Model):
     angle_wraparound: Flag = False
 
     @model_validator(mode="after")
-    def _figures_fit(self) -> RosJointLimits:
+    def _figures_fit(self) -> Self:
         for kind, (_, keys) in _ROS_KINDS.items():
             switch = f"has_{kind}_limits"
             has = getattr(self, switch)
-            figures = {key: getattr(self, key) for key in keys}
-            if has is False or (has is None and set(figures.values()) == {None}):
+            figures = [getattr(self, key) for key in keys]
+            if has is False or (has is None and set(figures) == {None}):
                 continue
-            for key, value in figures.items():
-                if value is None:
-                    raise refuse(
-                        "this figure is missing",
-                        key=f".{key}",
-                        absent=True,
-                        allowed=f"or {switch}: false",
-                    )
-                if kind != "position" and value <= 0.0:
-                    raise refuse(
-                        "out of range",
-                        key=f".{key}",
-                        found=value,
-                        allowed=f"> 0, or {switch}: false",
-                    )
+            for key, figure in zip(keys, figures, strict=True):
+                small = kind != "position" and figure is not None and figure <= 0.0
+                missing = "this figure is missing"
+                self.check(
+                    (figure is None, key, missing, f"or {switch}: false"),
+                    (small, key, "out of range", f"> 0, or {switch}: false"),
+                )
         return self
 
     def by_kind(self) -> dict[str, Any]:

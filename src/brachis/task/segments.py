@@ -94,13 +94,14 @@ class BSplineCurve(Model):
                 found=len(knots),
                 allowed=f"{needed}: control points + degree + 1",
             )
-        times = Counter(knots)
         ends = (knots[0], knots[-1])
         clamped = ends == (knots[outer - 1], knots[-outer]) and ends[0] < ends[1]
-        inner = [count for knot, count in times.items() if knot not in ends]
-        most = max(inner, default=0)
         allowed = self.degree - _SMOOTH
-        often = most > allowed or any(times[end] > outer for end in ends)
+        often = [
+            count
+            for knot, count in Counter(knots).items()
+            if count > (outer if knot in ends else allowed)
+        ]
         return self.check(
             (
                 len({len(point) for point in self.control_points}) > 1,
@@ -117,7 +118,7 @@ class BSplineCurve(Model):
             (
                 often,
                 "knots",
-                f"a knot occurs {most} times, so often that a derivative up to the third jumps",
+                f"a knot occurs {max(often, default=0)} times, so often that a derivative up to the third jumps",
                 f"{allowed} times at most",
             ),
         )
@@ -340,7 +341,7 @@ class MovingSegment(SegmentModel):
 
 
 class LineSegment(MovingSegment):
-    """A straight line."""
+    """A straight line: `to` a point, `by` a displacement, or of a `length` in a direction."""
 
     line: LineForm
 
@@ -361,25 +362,25 @@ class LineSegment(MovingSegment):
 
 
 class ArcSegment(MovingSegment):
-    """A circular arc."""
+    """A circular arc: about a `center` by an angle, or `via` a point `to` another one."""
 
     arc: ArcForm
 
 
 class CircleSegment(MovingSegment):
-    """A circle."""
+    """Whole or fractional turns about a centre."""
 
     circle: CircleTurns
 
 
 class HelixSegment(MovingSegment):
-    """A helix."""
+    """Turns about an axis that climb along it, in three position rows."""
 
     helix: HelixTurns
 
 
 class SplineSegment(MovingSegment):
-    """A smooth curve through waypoints."""
+    """A smooth curve through waypoints, from the end of the segment before it or the path's start."""
 
     spline: SplineThrough
 

@@ -9,7 +9,7 @@ import csv
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -295,67 +295,40 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
     return stated or next(iter(possible), None)
 
 
-@dataclass(frozen=True)
-class _Reader:
-    """Columns of a table in SI units.
+def _unit_of(name: str, kind: str, columns: Columns, units: FileUnits) -> str:
+    """Return the unit of a column: the heading's, else the task's, else the default.
 
-    Attributes
-    ----------
-    units : FileUnits
-        As the task states them.
-    used : dict of str to list of str
-        By kind, the units that the header states, as they are read.
+    Raises
+    ------
+    TaskError
     """
-
-    table: Table
-    columns: Columns
-    units: FileUnits
-    used: dict[str, list[str]] = field(default_factory=dict)
-
-    def read(self, names: Sequence[str], kind: str) -> Array:
-        """Return columns side by side, (n, c)."""
-        chosen = [self.columns.places[name][0] for name in names]
-        factors = [UNITS[kind][self._unit(name, kind)] for name in names]
-        return self.table.values[:, chosen] * np.array(factors)
-
-    def _unit(self, name: str, kind: str) -> str:
-        """Return the unit of a column: the heading's, else the task's, else the default.
-
-        Raises
-        ------
-        TaskError
-        """
-        unit = self.columns.places[name][1]
-        where = self.columns.where
-        factors = UNITS[kind]
-        asked = getattr(self.units, kind)
-        if unit is None:
-            convention = self.columns.convention
-            is_euler = convention is not None and CONVENTIONS[convention].euler
-            asked = asked or {"length": "m", "angle": "" if is_euler else "rad"}.get(
-                kind
-            )
-            if asked:
-                return str(asked)
-            usual = {"speed": "mm/min", "angle": "deg"}[kind]
-            raise TaskError(
-                f"the unit of {name} is not stated",
-                allowed=", ".join(factors),
-                where=where,
-                hint=f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task",
-            )
+    unit = columns.places[name][1]
+    factors = UNITS[kind]
+    asked = getattr(units, kind)
+    if unit is None:
+        convention = columns.convention
+        is_euler = convention is not None and CONVENTIONS[convention].euler
+        defaults = {"length": "m", "angle": "" if is_euler else "rad"}
+        asked = asked or defaults.get(kind)
+        if asked:
+            return str(asked)
+        usual = {"speed": "mm/min", "angle": "deg"}[kind]
+        raise TaskError(
+            f"the unit of {name} is not stated",
+            allowed=", ".join(factors),
+            where=columns.where,
+            hint=f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task",
+        )
+    problem = None
+    if unit not in factors:
+        problem = f"unknown unit of {kind}"
+        asked = ", ".join(factors)
+    elif asked is not None and factors[asked] != factors[unit]:
+        problem = "the header contradicts the task's units"
+    if problem:
         found = f"{unit} for {name}"
-        if unit not in factors:
-            allowed = ", ".join(factors)
-            problem = f"unknown unit of {kind}"
-            raise TaskError(problem, found=found, allowed=allowed, where=where)
-        if asked is not None and factors[asked] != factors[unit]:
-            problem = "the header contradicts the task's units"
-            raise TaskError(problem, found=found, allowed=asked, where=where)
-        used = self.used.setdefault(kind, [])
-        if unit not in used:
-            used.append(unit)
-        return unit
+        raise TaskError(problem, found=found, allowed=asked, where=columns.where)
+    return unit
 
 
 def points_of(
@@ -378,18 +351,27 @@ def points_of(
     TaskError
         Units are missing or contradict each other, a quaternion has no unit length, or a feed rate is not positive.
     """
-    reader = _Reader(table, columns, units)
+    used: dict[str, dict[str, None]] = {}
+
+    def read(names: Sequence[str], kind: str) -> Array:
+        chosen = [columns.places[name] for name in names]
+        found = [_unit_of(name, kind, columns, units) for name in names]
+        stated = [unit for _, unit in chosen if unit is not None]
+        if stated:
+            used[kind] = dict.fromkeys(stated)
+        factors = [UNITS[kind][unit] for unit in found]
+        return table.values[:, [place for place, _ in chosen]] * np.array(factors)
+
     position = [name for name in columns.names if name in POSITION]
     others = columns.names[len(position) :]
     convention = columns.convention or ""
-    lengths = reader.read(position, "length")
-    has_speed = _SPEED in columns.places
-    speed = reader.read([_SPEED], "speed")[:, 0] if has_speed else None
+    lengths = read(position, "length")
+    speed = read([_SPEED], "speed")[:, 0] if _SPEED in columns.places else None
     if convention.startswith("quaternion"):
         chosen = [columns.places[name][0] for name in others]
         turning = table.values[:, chosen]
     else:
-        turning = reader.read(others, "angle")
+        turning = read(others, "angle")
     points = Points(lengths, turning, speed, table.lines, source)
     if convention:
         points = _with_quaternions(points, convention)
@@ -402,8 +384,8 @@ def points_of(
             allowed="more than 0",
         )
     notes = [
-        f"{kind} in {' and '.join(used)}, as the header says"
-        for kind, used in reader.used.items()
+        f"{kind} in {' and '.join(stated)}, as the header says"
+        for kind, stated in used.items()
     ]
     if convention:
         notes.append(f"orientations: {CONVENTIONS[convention].meaning}")
