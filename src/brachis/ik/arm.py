@@ -96,7 +96,7 @@ class RemainingJoints:
     def of_pose(
         cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
     ) -> RemainingJoints:
-        """Take the six joints that are left over for a pose; raises NotApplicableError where there is no such thing."""
+        """Take the six joints that are left over for a pose; raises NotApplicableError for other tasks or counts."""
         if not isinstance(task_map, Pose):
             raise NotApplicableError("only for poses")
         return cls.of(geometry, redundant, 6)

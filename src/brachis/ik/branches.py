@@ -234,7 +234,7 @@ class FactoredSolver(IKSolver):
         return margins
 
     def reason_if_singular(self) -> str:
-        """Say which factor of det J_nr vanishes at all postures; empty if there is none."""
+        """Say which factor of det J_nr vanishes at all postures; empty if none does."""
         for factor, size in zip(self._factors, self._scales, strict=True):
             if size < EXACT:
                 names = dict(zip(self.letters, self._joints.names, strict=True))

@@ -266,7 +266,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     Returns
     -------
     (count, 2, 8, 6) ndarray
-        NaN where there is no further answer.
+        NaN after the last answer.
     """
     marks = 0.5 + joints / TURN
     keys = np.zeros(len(joints), dtype=np.int64)
@@ -274,7 +274,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     for cell in np.floor(cells * marks).astype(np.int64).T:
         keys = keys * (cells + 1) + cell
     order = np.lexsort((keys, groups))
-    order = order[~_find_repeated(marks[order], groups[order])]
+    order = order[~_find_repetitions(marks[order], groups[order])]
     groups = groups[order]
     places = np.arange(len(groups)) - np.searchsorted(groups, groups)
     fits = places < _PER_SIGN
@@ -283,7 +283,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     return table.reshape(count, 2, *table.shape[1:])
 
 
-def _find_repeated(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
+def _find_repetitions(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
     """Find answers, (N,), within 1e-5 rad of one before them in their group; marks (N, 6) are in turns."""
     repeated = np.zeros(len(marks), dtype=bool)
     for behind in range(1, len(marks)):

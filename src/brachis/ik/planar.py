@@ -90,6 +90,7 @@ class PlanarSolver(DeterminantSolver):
             self._lift = basis.T @ np.linalg.inv(self._rows @ basis.T)
         flat = replace(
             geometry,
+            axes=np.where(revolute[:, None], geometry.axes, self._slides @ basis),
             points=self._centres @ basis,
             tool_position=self._tool @ basis,
         )

@@ -88,7 +88,7 @@ class Circle:
     ) -> np.ndarray:
         """Angles at which ``direction . position = level``: growing with the angle at the first, falling at the second.
 
-        The two follow each other along the axis `slot`; NaN where there is none.
+        The two follow each other along the axis `slot`; NaN where the level is out of reach.
         """
         level = level - dot(direction, self.middle)
         return cosine_roots(
