@@ -336,7 +336,7 @@ def test_positions():
 
 def test_newton_goes_nowhere_but_to_the_answer_beside_its_start():
     robot = by_angles(ARMS["UR10"], EXACT)
-    geometry, rng = ChainGeometry.of(robot), np.random.default_rng(6)
+    rng = np.random.default_rng(6)
     q = rng.uniform(-2.0, 2.0, (100, 6))
     task_map = task_map_of(robot, "pose")
     newton, goal = Newton(task_map), task_map.values(q)

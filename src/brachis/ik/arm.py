@@ -121,16 +121,10 @@ class RemainingJoints:
 
         Vectors are (3, ..., K), with so many axes of length one before the samples as there are `alternatives`.
         """
-        axes = -screws.axes if self.mirrored else screws.axes
-        spread = (slice(None), *[None] * alternatives)
-        return tuple(
-            Screw(
-                axes[:, i][spread],
-                screws.points[:, i][spread],
-                bool(screws.revolute[i]),
-            )
-            for i in self.joints
-        )
+        picked = screws.pick(self.joints, alternatives)
+        if self.mirrored:
+            return tuple(screw.inverse for screw in picked)
+        return picked
 
     def are_parallel(self, first: int, *others: int) -> bool:
         """Whether the directions of joints, of whatever kind, are always parallel."""

@@ -92,7 +92,6 @@ class EaikSolver(DeterminantSolver):
         self._behind = [i for i in redundant if i > last]
         self._held = [i for i in redundant if first < i < last]
         self._inner = slice(len(self._before), len(redundant) - len(self._behind))
-        self._redundant = list(redundant)
         self._newton = Newton(task_map, geometry)
         self._tool = Poses.of_tool(geometry.screws_with([], np.empty((1, 0))))
         self._robots: dict[tuple[float, ...], tuple[Any, float]] = {}
@@ -100,7 +99,7 @@ class EaikSolver(DeterminantSolver):
         postures[:, first : last + 1] = np.random.default_rng(0).uniform(
             -np.pi, np.pi, (64, last + 1 - first)
         )
-        super().__init__(geometry, rest, postures=postures)
+        super().__init__(geometry, redundant, postures=postures)
         if None in self._make_robots(postures[:, self._held], EXACT_AXES):
             raise NotApplicableError(
                 "EAIK knows no decomposition: too few of the six axes are parallel or meet"

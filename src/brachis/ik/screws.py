@@ -159,6 +159,18 @@ class PosedScrews:
             [np.where(turns, cross(axes, lever), axes), np.where(turns, axes, 0.0)]
         )
 
+    def pick(self, joints: Sequence[int], alternatives: int) -> tuple[Screw, ...]:
+        """Pick joints; vectors are (3, ..., K), with so many axes of length one before the postures as `alternatives`."""
+        spread = (slice(None), *[None] * alternatives)
+        return tuple(
+            Screw(
+                self.axes[:, i][spread],
+                self.points[:, i][spread],
+                bool(self.revolute[i]),
+            )
+            for i in joints
+        )
+
     def determinant(self, joints: Sequence[int]) -> np.ndarray:
         """Compute det J_nr (K,) of six joints for a pose, or of three for a position; real or complex, and analytic."""
         return determinants(self.jacobian_columns(joints)[: len(joints)])
