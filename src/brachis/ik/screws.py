@@ -160,7 +160,7 @@ class PosedScrews:
         )
 
     def pick(self, joints: Sequence[int], alternatives: int) -> tuple[Screw, ...]:
-        """Pick joints; vectors are (3, ..., K), with so many axes of length one before the postures as `alternatives`."""
+        """Pick joints; vectors are (3, ..., K), with `alternatives` axes of length one before the postures."""
         spread = (slice(None), *[None] * alternatives)
         return tuple(
             Screw(
