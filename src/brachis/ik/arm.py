@@ -96,7 +96,7 @@ class RemainingJoints:
     def of_pose(
         cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
     ) -> RemainingJoints:
-        """Take the six joints that are left over for a pose; raises NotApplicableError where there is no such thing."""
+        """Take the six joints that are left over for a pose; raises NotApplicableError for other tasks or counts."""
         if not isinstance(task_map, Pose):
             raise NotApplicableError("only for poses")
         return cls.of(geometry, redundant, 6)
@@ -121,16 +121,10 @@ class RemainingJoints:
 
         Vectors are (3, ..., K), with so many axes of length one before the samples as there are `alternatives`.
         """
-        axes = -screws.axes if self.mirrored else screws.axes
-        spread = (slice(None), *[None] * alternatives)
-        return tuple(
-            Screw(
-                axes[:, i][spread],
-                screws.points[:, i][spread],
-                bool(screws.revolute[i]),
-            )
-            for i in self.joints
-        )
+        picked = screws.pick(self.joints, alternatives)
+        if self.mirrored:
+            return tuple(screw.inverse for screw in picked)
+        return picked
 
     def are_parallel(self, first: int, *others: int) -> bool:
         """Whether the directions of joints, of whatever kind, are always parallel."""

@@ -26,6 +26,7 @@ from brachis.ik.arm import Arm, RemainingJoints
 from brachis.ik.protocol import IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews, Poses, Screw
 from brachis.ik.vectors import EXACT, wrap
+from brachis.robot.joints import complement
 
 SINGULAR = "J_nr is singular everywhere"
 """The reason against a decomposition whose determinant is zero in all postures."""
@@ -51,8 +52,7 @@ class DeterminantSolver(IKSolver):
     Parameters
     ----------
     chain : ChainGeometry
-    joints : sequence of int
-        The non-redundant ones, ascending.
+    redundant : sequence of int
     name : str
         What the labels begin with.
     postures : (K, n) ndarray, optional
@@ -62,13 +62,14 @@ class DeterminantSolver(IKSolver):
     def __init__(
         self,
         chain: ChainGeometry,
-        joints: Sequence[int],
+        redundant: Sequence[int],
         name: str = "determinant",
         postures: np.ndarray | None = None,
     ) -> None:
         self.branches: tuple[str, ...] = (f"{name}_positive", f"{name}_negative")
         self._chain = chain
-        self._joints = list(joints)
+        self._redundant = list(redundant)
+        self._joints = complement(chain.n, redundant)
         if postures is None:
             rng = np.random.default_rng(0)
             postures = rng.uniform(-np.pi, np.pi, (64, chain.n))
@@ -234,7 +235,7 @@ class FactoredSolver(IKSolver):
         return margins
 
     def reason_if_singular(self) -> str:
-        """Say which factor of det J_nr vanishes at all postures; empty if there is none."""
+        """Say which factor of det J_nr vanishes at all postures; empty if none does."""
         for factor, size in zip(self._factors, self._scales, strict=True):
             if size < EXACT:
                 names = dict(zip(self.letters, self._joints.names, strict=True))

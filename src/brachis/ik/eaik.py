@@ -92,7 +92,6 @@ class EaikSolver(DeterminantSolver):
         self._behind = [i for i in redundant if i > last]
         self._held = [i for i in redundant if first < i < last]
         self._inner = slice(len(self._before), len(redundant) - len(self._behind))
-        self._redundant = list(redundant)
         self._newton = Newton(task_map, geometry)
         self._tool = Poses.of_tool(geometry.screws_with([], np.empty((1, 0))))
         self._robots: dict[tuple[float, ...], tuple[Any, float]] = {}
@@ -100,7 +99,7 @@ class EaikSolver(DeterminantSolver):
         postures[:, first : last + 1] = np.random.default_rng(0).uniform(
             -np.pi, np.pi, (64, last + 1 - first)
         )
-        super().__init__(geometry, rest, postures=postures)
+        super().__init__(geometry, redundant, postures=postures)
         if None in self._make_robots(postures[:, self._held], EXACT_AXES):
             raise NotApplicableError(
                 "EAIK knows no decomposition: too few of the six axes are parallel or meet"
@@ -266,7 +265,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     Returns
     -------
     (count, 2, 8, 6) ndarray
-        NaN where there is no further answer.
+        NaN after the last answer.
     """
     marks = 0.5 + joints / TURN
     keys = np.zeros(len(joints), dtype=np.int64)
@@ -274,7 +273,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     for cell in np.floor(cells * marks).astype(np.int64).T:
         keys = keys * (cells + 1) + cell
     order = np.lexsort((keys, groups))
-    order = order[~_find_repeated(marks[order], groups[order])]
+    order = order[~_find_repetitions(marks[order], groups[order])]
     groups = groups[order]
     places = np.arange(len(groups)) - np.searchsorted(groups, groups)
     fits = places < _PER_SIGN
@@ -283,7 +282,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     return table.reshape(count, 2, *table.shape[1:])
 
 
-def _find_repeated(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
+def _find_repetitions(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
     """Find answers, (N,), within 1e-5 rad of one before them in their group; marks (N, 6) are in turns."""
     repeated = np.zeros(len(marks), dtype=bool)
     for behind in range(1, len(marks)):

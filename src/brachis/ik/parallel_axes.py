@@ -21,7 +21,7 @@ Here p slides along s, and a letter's motion R is a rotation. Then, for all of t
     theta    turns e to R_G e about n,                  G D0 = G P + R_n(theta) (D0 - P)
     elbow    |E_c D0 - B| = |G D0 - B|   for c (2),     b turns E_c D0 to G D0
 
-with B, D0 on the axes b, d, and w in the place of e where there is no e; d follows from theta. Chains whose last joints
+with B, D0 on the axes b, d, and w in the place of e if e is missing; d follows from theta. Chains whose last joints
 do what the first ones do above are solved in the reverse order, E_6^-1 ... E_1^-1 = D^-1.
 
 Branches are told apart by the signs of these factors, of which det J_nr is the product:
@@ -103,7 +103,7 @@ class ParallelAxesSolver(FactoredSolver):
         self._turn = before.index(True) if True in before else None
         self._slide = before.index(False) if False in before else None
         self._parallel = (self._first, self._first + 1, self._first + 2)
-        # x spans the wrist's factor with f, the last joint: it is e, or a where there is no e.
+        # x spans the wrist's factor with f, the last joint: it is e, or a if e is missing.
         if self._first == 1:
             self.letters = "abcdxf" if self._slide is None else "pbcdxf"
         else:

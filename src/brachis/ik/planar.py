@@ -66,9 +66,7 @@ class PlanarSolver(DeterminantSolver):
         redundant: tuple[int, ...],
         basis: np.ndarray,
     ) -> None:
-        rest = complement(geometry.n, redundant)
         revolute = geometry.revolute
-        self._redundant = list(redundant)
         self._plane = basis
         self._normal = np.cross(*basis)
         self._rows = np.eye(3)[list(task_map.axes)]
@@ -76,24 +74,24 @@ class PlanarSolver(DeterminantSolver):
         self._centres = geometry.points @ basis.T
         self._slides = geometry.axes @ basis.T
         self._tool = basis @ geometry.tool_position
-        self._tool_axis = (
-            task_map.tool_axis if isinstance(task_map, RowsAndYaw) else None
-        )
-        letters = ["R" if revolute[i] else "P" for i in rest]
-        if self._tool_axis is not None:
+        letters = [
+            "R" if revolute[i] else "P" for i in complement(geometry.n, redundant)
+        ]
+        self._tool_axis = None
+        if isinstance(task_map, RowsAndYaw):
+            self._tool_axis = task_map.tool_axis
             del letters[len(letters) - 1 - letters[::-1].index("R")]
-        # All heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
-        self._offset = (
-            self._rows @ self._normal * (self._normal @ geometry.tool_position)
-        )
-        if len(rest) > 1:
-            self._lift = basis.T @ np.linalg.inv(self._rows @ basis.T)
+        # Heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
+        height = self._normal @ geometry.tool_position
+        self._offset = self._rows @ self._normal * height
+        self._lift = basis.T @ np.linalg.pinv(self._rows @ basis.T)
         flat = replace(
             geometry,
+            axes=np.where(revolute[:, None], self._normal, self._slides @ basis),
             points=self._centres @ basis,
             tool_position=self._tool @ basis,
         )
-        super().__init__(flat, rest, _LABELS["".join(letters)])
+        super().__init__(flat, redundant, _LABELS["".join(letters)])
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
         """Compute det J_nr from plane vectors (2, K), from the tool inwards; angles are about the normal.
@@ -123,47 +121,39 @@ class PlanarSolver(DeterminantSolver):
         if len(self._joints) == 1:
             rows = np.tensordot(self._rows @ self._plane.T, rows, 1)
         elif self._tool_axis is not None:
-            turns = self._chain.revolute[self._joints].astype(q.dtype)
-            rows = np.concatenate(
-                [rows, np.broadcast_to(turns[:, None], rows[:1].shape)]
-            )
+            turns = np.empty((1, *rows.shape[1:]), q.dtype)
+            turns[0] = self._chain.revolute[self._joints, None]
+            rows = np.concatenate([rows, turns])
         return determinants(rows)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Return the non-redundant joints, (K, 2, 1, m)."""
-        screws = self._chain.screws_with(self._redundant, q_r)
-        joints = [
-            Screw(
-                screws.axes[:, i, None] * self._senses[i],
-                screws.points[:, i, None],
-                bool(screws.revolute[i]),
-            )
-            for i in self._joints
-        ]
+        known = q_r * self._senses[self._redundant]
+        screws = self._chain.screws_with(self._redundant, known)
+        joints = screws.pick(self._joints, 1)
         tool = screws.tool_position[:, None]
         rows = targets[:, : len(self._rows)] - self._offset
+        goal = (self._lift @ rows.T)[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
             if len(joints) == 1:
                 row = self._rows[0][:, None, None]
                 values = [joints[0].orbit(tool).component(row, rows[:, 0], 0)]
+            elif self._tool_axis is None:
+                values = [*move_within_plane(joints[0], joints[1], tool, goal, 0)]
             else:
-                goal = (self._lift @ rows.T)[:, None]
-                values = self._solve_two_or_three(joints, tool, goal, targets, screws)
+                heading = self._plane @ screws.tool_rotation[:, self._tool_axis]
+                angle = targets[:, 2] - np.arctan2(heading[1], heading[0])
+                values = self._solve_with_yaw(joints, tool, goal, angle)
             return self._arrange(np.broadcast_arrays(*values), q_r)
 
-    def _solve_two_or_three(
+    def _solve_with_yaw(
         self,
-        joints: list[Screw],
+        joints: Sequence[Screw],
         tool: np.ndarray,
         goal: np.ndarray,
-        targets: np.ndarray,
-        screws: PosedScrews,
+        angle: np.ndarray,
     ) -> list[np.ndarray]:
-        """Positions of joints that bring the tool to its goal, both (3, 1, K), with yaw where it is prescribed."""
-        if self._tool_axis is None:
-            return [*move_within_plane(joints[0], joints[1], tool, goal, 0)]
-        heading = self._plane @ screws.tool_rotation[:, self._tool_axis]
-        angle = targets[:, 2] - np.arctan2(heading[1], heading[0])
+        """Positions of three joints that turn the tool by an angle, (K,), and bring it to its goal, both (3, 1, K)."""
         normal = self._normal[:, None, None]
         first, second, last = joints
         anchor = next(i for i in (2, 0, 1) if joints[i].revolute)
@@ -272,9 +262,8 @@ class PrismaticSolver(DeterminantSolver):
     def __init__(
         self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
     ) -> None:
-        self._redundant = list(redundant)
         self._rows = list(task_map.axes)
-        super().__init__(geometry, complement(geometry.n, redundant), "slides")
+        super().__init__(geometry, redundant, "slides")
         if np.ptp(self._random) <= EXACT * self._scale:
             self.branches = ("slides",)
 

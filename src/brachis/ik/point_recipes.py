@@ -48,7 +48,7 @@ UP = 1
 """Slot of a recipe's second step."""
 
 Values = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Positions of a, b, c, with one or two answers along the slots, NaN where there is none."""
+"""Positions of a, b, c, with one or two answers along the slots, NaN where the target is out of reach."""
 
 
 def solve_plane_of_last(arm: Arm, target: np.ndarray) -> Values:

@@ -42,7 +42,7 @@ class IKSolver(ABC):
         Returns
         -------
         (K, B, A, m) ndarray
-            Chain order; angles in (-pi, pi] or any other turn; NaN where there is no answer, or no further one.
+            Chain order; angles in (-pi, pi] or any other turn; NaN without an answer, and after the last one.
         """
 
     def solve_branch(

@@ -88,7 +88,7 @@ class Circle:
     ) -> np.ndarray:
         """Angles at which ``direction . position = level``: growing with the angle at the first, falling at the second.
 
-        The two follow each other along the axis `slot`; NaN where there is none.
+        The two follow each other along the axis `slot`; NaN where the level is out of reach.
         """
         level = level - dot(direction, self.middle)
         return cosine_roots(
@@ -157,6 +157,18 @@ class PosedScrews:
         lever = self.tool_position[:, None] - self.points[:, chosen]
         return np.concatenate(
             [np.where(turns, cross(axes, lever), axes), np.where(turns, axes, 0.0)]
+        )
+
+    def pick(self, joints: Sequence[int], alternatives: int) -> tuple[Screw, ...]:
+        """Pick joints; vectors are (3, ..., K), with `alternatives` axes of length one before the postures."""
+        spread = (slice(None), *[None] * alternatives)
+        return tuple(
+            Screw(
+                self.axes[:, i][spread],
+                self.points[:, i][spread],
+                bool(self.revolute[i]),
+            )
+            for i in joints
         )
 
     def determinant(self, joints: Sequence[int]) -> np.ndarray:

@@ -28,7 +28,7 @@ from brachis.robot.task_map import Pose
 TOLERANCE = 1e-4
 """Axes this near to parallel or perpendicular (rad), or to meeting (m), are taken to be meant so."""
 _ROUNDING = 1e-12
-"""Changes that are no larger (rad, m) come from rounding alone."""
+"""Changes up to this size (rad, m) come from rounding alone."""
 _SKEW = 1e-2
 """Axes at a smaller angle (rad) have no point where they meet that could be trusted."""
 

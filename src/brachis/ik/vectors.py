@@ -14,7 +14,7 @@ import numpy as np
 from brachis.common.arrays import cross
 
 EXACT = 1e-9
-"""Sines, cosines, lengths (m) and determinants that are no larger are zero: rotations of a URDF err by about 1e-15."""
+"""Sines, cosines, lengths (m) and determinants below this are zero: rotations of a URDF err by about 1e-15."""
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -66,7 +66,7 @@ def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.n
     """Angles in [-2 pi, 2 pi] at which ``a cos + b sin = c``.
 
     The two follow each other along the axis `slot`: the left side's derivative ``b cos - a sin`` is positive at the
-    first one, negative at the second. NaN where there is none.
+    first one, negative at the second. NaN where c is out of reach.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         half = np.arccos(c / np.sqrt(a * a + b * b))

@@ -63,7 +63,7 @@ class JointState(SharedTorques):
 
     @property
     def s(self) -> np.ndarray:
-        """Path coordinate, (K,); NaN where there is no path."""
+        """Path coordinate, (K,); NaN without a path."""
         if self.joint_map.path is None:
             return np.full(len(self.y), np.nan)
         return self.y[:, 0]
@@ -117,13 +117,13 @@ class JointMap(ABC):
     start : (n,) ndarray
         Posture at, or near, the beginning; it decides about turns of 2 pi.
     path : Path or None
-        The path along which y[0] is the path coordinate s; None where there is none, and no s.
+        The path along which y[0] is the path coordinate s; None without a path: then y has no s.
     r : int
         Number of joints that are chosen freely.
     redundant_joints : tuple of str
         Names of the joints that are curves themselves.
     branch_label : str
-        What the branch is called whose margins `margins` gives; empty where there is none.
+        What the branch is called whose margins `margins` gives; empty without margins.
     """
 
     robot: Robot
@@ -139,7 +139,7 @@ class JointMap(ABC):
 
     @abstractmethod
     def postures(self, y: np.ndarray) -> np.ndarray:
-        """Joint positions, (K, n), at successive times with curves (K, c); NaN where there is no answer."""
+        """Joint positions, (K, n), at successive times with curves (K, c); NaN where the curves cannot be met."""
 
     @abstractmethod
     def state(
@@ -165,7 +165,7 @@ class JointMap(ABC):
         Raises
         ------
         UnreachableError
-            There is no answer at one of the times.
+            The curves cannot be met at one of the times.
         """
 
     @abstractmethod

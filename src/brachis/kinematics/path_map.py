@@ -95,7 +95,7 @@ class PathMap(JointMap):
     task_map : TaskMap
         Of the robot.
     no_posture : str
-        What is said where there is no posture.
+        The message where a posture does not exist.
     """
 
     path: Path
@@ -123,7 +123,7 @@ class PathMap(JointMap):
         Returns
         -------
         (K, n) ndarray
-            NaN where there is no answer.
+            NaN where the curves cannot be met.
         """
 
     @abstractmethod
