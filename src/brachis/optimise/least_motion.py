@@ -129,7 +129,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     if not first.status.usable:
         status = f"the fastest motion stays: {first.status.value}"
         return _keep(fastest, status, (first,))
-    too_similar = "the fastest motion stays: no motion as fast is calmer by 5 %"
+    too_similar = "the fastest motion stays: no other is calmer by 5 % or more"
     if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
         return _keep(fastest, too_similar, (first,))
     settings = task.refinement
