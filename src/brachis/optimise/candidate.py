@@ -32,7 +32,7 @@ PathMap = ClosedFormMap | ChartMap | JointSpaceMap
 
 
 def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
-    """Say in which coordinates a motion is planned beside s: redundant joints, a chart's own, or none."""
+    """Name the coordinates in which a motion is planned, s apart: redundant joints, a chart's own, or none."""
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 

@@ -21,8 +21,9 @@ class Evaluator:
     """All that an optimisation asks of a robot along curves y(t).
 
     A phase has one, and it alone asks joint map and limits for values and slopes: for the rows of the program, their
-    Jacobian, and the checks between collocation points. So a compiled evaluator can take the place of this one. It
-    needs `limits`, `is_mean`, and `evaluate` with an answer that has what `Evaluation` has.
+    Jacobian, and the checks between collocation points. (Where it fails, `refine` asks the joint map which
+    postures exist.) So a compiled evaluator can take the place of this one. It needs `limits`, `is_mean`, and
+    `evaluate` with an answer that has what `Evaluation` has.
 
     Parameters
     ----------

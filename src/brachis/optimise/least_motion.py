@@ -129,9 +129,9 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     if not first.status.usable:
         status = f"the fastest motion stays: {first.status.value}"
         return _keep(fastest, status, (first,))
-    hardly_any = "the fastest motion stays: hardly any other is calmer"
+    too_similar = "the fastest motion stays: no other is calmer by 5 % or more"
     if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
-        return _keep(fastest, hardly_any, (first,))
+        return _keep(fastest, too_similar, (first,))
     settings = task.refinement
     options = RefinementOptions(
         settings.tolerance,
@@ -148,7 +148,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
         return _keep(fastest, status, found.reports)
     reduction = float(1.0 - np.sqrt(program.objective(found.refined.x)))
     if reduction < _WORTH_IT:
-        return _keep(fastest, hardly_any, found.reports)
+        return _keep(fastest, too_similar, found.reports)
     later = found.t_end / fastest.t_end - 1.0
     status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
     assert found.verification is not None

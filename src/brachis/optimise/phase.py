@@ -274,24 +274,24 @@ class Phase:
         totals = np.full(len(self.grid.total), self._h(x).sum())
         return np.concatenate([*values, self._layout.progress.values(x), totals])
 
-    def _number_of(self, limit: Limit) -> int:
-        """Place of a limit among those of the phase."""
-        return next(i for i, own in enumerate(self.limits) if own is limit)
+    def _number(self, limit: Limit) -> int:
+        """Place of a limit, the very object, among the phase's."""
+        return next(i for i, each in enumerate(self.limits) if each is limit)
 
     def _limit_values(self, limit: Limit, x: np.ndarray) -> np.ndarray:
         """Values of a limit that are rows, (K, c), or (1, c) where their means are."""
-        values = self.evaluate(x).by_limit[self._number_of(limit)]
+        values = self.evaluate(x).by_limit[self._number(limit)]
         if limit.guarantee.is_mean:
             return np.asarray(self.grid.mean_weights(self._h(x))[None] @ values)
         return values
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
-        return any(own is limit for own in self.limits)
+        return any(each is limit for each in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of one of the limits, (K, c), or (1, c) where its means are rows."""
-        return self._layout.limit_rows[self._number_of(limit)]
+        return self._layout.limit_rows[self._number(limit)]
 
     def violation_of_means(self, x: np.ndarray) -> float:
         """How far the limits that hold over the whole motion are violated; -inf without such limits."""

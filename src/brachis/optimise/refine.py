@@ -192,7 +192,7 @@ def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """List times at and a grid step beside the centres: a peak moves when it is held down."""
+    """List times at the centres, and a grid step before and after them: a peak moves when it is held down."""
     steps = _spacing(t_norm, centres)[:, None] * np.array([-1.0, 0.0, 1.0])
     return np.unique(np.clip(centres[:, None] + steps, 0.0, 1.0))
 
@@ -215,7 +215,7 @@ def _suspects(
     """List times around which a violation may hide: the grid's peaks near a limit, and both sides of knots near one.
 
     A peak between grid points is higher than its neighbours by an eighth of their second difference; four times that
-    is allowed for. The motion's higher derivatives jump at knots: a peak beside a knot need not show on the grid.
+    is allowed for. The motion's higher derivatives jump at knots: a peak next to a knot need not show on the grid.
     """
     padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
     bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])

@@ -12,7 +12,6 @@ from brachis.errors import (
     PathError,
     Remedy,
     StartError,
-    UnknownNameError,
     write_apart,
 )
 from brachis.ik import Match
@@ -272,60 +271,14 @@ def _least_singular_values(task_map: TaskMap, postures: np.ndarray) -> np.ndarra
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
 
 
-def branch_of(
-    task_map: TaskMap,
-    match: Match,
-    posture: np.ndarray,
-    wanted: str,
-    *,
-    name: str = "start",
-) -> int:
-    """Index of the closed form's branch on which the given posture, at the path's start or end, lies.
+def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
+    """Index of the closed form's branch on which the posture at the path's start or end, called `name`, lies.
 
     Raises
     ------
     StartError
-        The posture lies on no branch's inside, or on another than the `wanted` one.
-    UnknownNameError
-        The closed form has no branch of the wanted name.
+        Branches meet in the posture.
     """
-    branches = match.solver.branches
-    if wanted != "auto" and wanted not in branches:
-        raise UnknownNameError("branch", wanted, branches, where="branch")
-    branch = _branch_of(task_map, match, posture, name)
-    if wanted != "auto" and branches[branch] != wanted:
-        raise StartError(
-            f"the {name} posture is on another branch",
-            where="branch",
-            found=branches[branch],
-            allowed=wanted,
-            hint=f"Leave branch out, or {name} in a posture of that branch",
-        )
-    return branch
-
-
-def check_end_branch(
-    task_map: TaskMap, match: Match, end: np.ndarray, branch: int
-) -> None:
-    """Refuse an end posture on another branch than the start posture's.
-
-    Raises
-    ------
-    StartError
-    """
-    found = _branch_of(task_map, match, end, "end")
-    if found != branch:
-        raise StartError(
-            "the end posture is on another branch than the start posture",
-            where="end.joints",
-            found=match.solver.branches[found],
-            allowed=match.solver.branches[branch],
-            hint="Choose an end posture of the same branch, or leave end: free",
-        )
-
-
-def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
-    """Index of the branch in whose inside a posture lies."""
     robot = task_map.robot
     solver = match.solver
     redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
@@ -346,3 +299,24 @@ def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) 
             hint="Bend the arm a little, or choose other redundant joints",
         )
     return branch
+
+
+def other_branch(
+    name: str, found: str, allowed: str, *, is_start_given: bool
+) -> StartError:
+    """Return the error that a posture is on another branch than the start posture, or than the task asks for."""
+    if name == "end" and is_start_given:
+        return StartError(
+            "the end posture is on another branch than the start posture",
+            where="end.joints",
+            found=found,
+            allowed=allowed,
+            hint="Choose an end posture of the same branch, or leave end: free",
+        )
+    return StartError(
+        f"the {name} posture is on another branch",
+        where="branch",
+        found=found,
+        allowed=allowed,
+        hint=f"Leave branch out, or {name} in a posture of that branch",
+    )

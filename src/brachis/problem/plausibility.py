@@ -161,7 +161,7 @@ def _positions(
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
-    """Look at a motion's end time, s, beside the `least` that the planner allows, s."""
+    """Compare a motion's end time, s, with the `least` that the planner allows, s."""
     if t_end > 1.01 * least:
         return ()
     message = "the end time is the least that the planner knows, so that no limit holds the motion back"

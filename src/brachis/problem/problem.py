@@ -16,11 +16,11 @@ from brachis.limits.process_speed import approach_of
 from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
 from brachis.problem.feasibility import (
     branch_of,
-    check_end_branch,
     check_postures,
     check_regular,
     check_smoothness,
     lacks_a_direction,
+    other_branch,
 )
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
@@ -247,10 +247,13 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, labels, where="branch")
     branches = tuple(i for i, label in enumerate(labels) if wanted in ("auto", label))
-    if problem.start is not None:
-        branches = (branch_of(task_map, match, problem.start, wanted),)
-        if problem.end is not None:
-            check_end_branch(task_map, match, problem.end, branches[0])
-    elif problem.end is not None:
-        branches = (branch_of(task_map, match, problem.end, wanted, name="end"),)
+    for name, posture in (("start", problem.start), ("end", problem.end)):
+        if posture is None:
+            continue
+        branch = branch_of(task_map, match, posture, name)
+        if branch not in branches:
+            allowed = labels[branches[0]]
+            is_given = problem.start is not None
+            raise other_branch(name, labels[branch], allowed, is_start_given=is_given)
+        branches = (branch,)
     return Decomposition(problem, match, redundant, branches)

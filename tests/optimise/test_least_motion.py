@@ -16,7 +16,7 @@ from brachis.task import task_with
 from brachis.trajectory import Trajectory
 from support.starts import starting_points
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 NOTEWORTHY = 0.01
 """A velocity above this part of its limit."""
 

@@ -26,7 +26,7 @@ from brachis.robot import Robot
 from brachis.robot.urdf import first_limb, read_file
 from support.chains import Joint, chain_urdf
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SCARA = ROOT / "robots/scara3/robot.urdf"
 RAIL = ROOT / "robots/tx90l_rail/robot.urdf"
 PACKAGE = "cmeel.prefix/share/example-robot-data/robots"

@@ -5,6 +5,7 @@ A slide of mass m pushed by at most F moves, stops and moves on: each move over 
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -264,3 +265,14 @@ def test_one_phase_is_the_program():
     slower = program.with_time_scaled(x, 2.0)
     assert slower[0] == 2.0 * x[0]
     np.testing.assert_array_equal(slower[1:], x[1:])
+
+
+def test_a_program_in_another_process_is_the_same():
+    """Plans in several processes send programs to and fro."""
+    program = two_moves()
+    x = first_point(program)
+    copy = pickle.loads(pickle.dumps(program))  # noqa: S301
+    np.testing.assert_array_equal(copy.rows(x), program.rows(x))
+    np.testing.assert_array_equal(copy.jacobian(x), program.jacobian(x))
+    (limit,) = copy.limits
+    np.testing.assert_array_equal(copy.rows_of(limit), program.rows_of(TORQUE))
