@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import brachis
-from brachis.apps.comparison import plot_comparison as plot_motions
+from brachis.apps.comparison import plot_both_motions
 from brachis.apps.plots import (
     plot_candidates,
     plot_comparison,
@@ -165,7 +165,7 @@ def joint_path() -> Planned:
 def today() -> Planned:
     """Draw a motion that runs today beside the one that is planned along its path."""
     found = load("examples/12_today.py").main()
-    save(plot_motions(found), "today")
+    save(plot_both_motions(found), "today")
     return {"planned": found.result}
 
 

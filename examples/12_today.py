@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import brachis
-from brachis.apps.comparison import plot_comparison
+from brachis.apps.comparison import plot_both_motions
 from brachis.apps.plots import save_figure
 
 ROOT = Path(__file__).parents[1]
@@ -24,7 +24,7 @@ def main(figure: str | None = None) -> brachis.Comparison:
     )
     print(found)
     if figure:
-        save_figure(plot_comparison(found), figure)
+        save_figure(plot_both_motions(found), figure)
     return found
 
 

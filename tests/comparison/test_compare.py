@@ -11,7 +11,7 @@ import pytest
 
 import brachis
 from brachis.apps import comparison
-from brachis.apps.comparison import compare, plot_comparison
+from brachis.apps.comparison import compare, plot_both_motions
 from brachis.apps.comparison.comparison import tasks_of
 from brachis.robot import bind
 from support.effort import QUICK
@@ -135,7 +135,7 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
         f", between the rows up to {100 * use.recorded_up_to:.1f} %"
     )
     assert words in str(coarse)
-    *_, ratio = plot_comparison(coarse).axes
+    *_, ratio = plot_both_motions(coarse).axes
     (band,) = ratio.collections
     assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(
         use.recorded_up_to, rel=0.02
@@ -144,7 +144,7 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
 
 
 def test_the_figure_shows_both(found):
-    figure = plot_comparison(found)
+    figure = plot_both_motions(found)
     progress, speed, ratio = figure.axes
     for ax in (progress, speed, ratio):
         ends = sorted(line.get_xdata()[-1] for line in ax.lines[:2])

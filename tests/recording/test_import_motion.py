@@ -87,7 +87,7 @@ def test_the_rows_of_a_file_of_schema_2_are_not_known(imported, tmp_path):
     assert "the rows of the recorded motion are not known" in str(found)
     assert "prove" not in str(found)
     assert "between its rows" not in str(
-        comparison.plot_comparison(found).axes[2].get_legend_handles_labels()[1]
+        comparison.plot_both_motions(found).axes[2].get_legend_handles_labels()[1]
     )
 
 

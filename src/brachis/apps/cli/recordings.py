@@ -151,7 +151,7 @@ def compare(
     json: Json = False,
 ) -> None:
     """Compare a recorded motion with a plan along its path."""
-    from brachis.apps.comparison import plot_comparison
+    from brachis.apps.comparison import plot_both_motions
 
     make_folder(out, _FILES, (csv, robot))
     with show_progress() as listener:
@@ -162,7 +162,7 @@ def compare(
     code = finish(
         found.to_dict(),
         {"today.npz": found.recorded.save, "result.npz": found.result.trajectory.save},
-        {"comparison.png": lambda: plot_comparison(found)},
+        {"comparison.png": lambda: plot_both_motions(found)},
         out=out,
         names=_FILES,
         verified=found.result.verified,

@@ -306,7 +306,7 @@ def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
         yield task.model_copy(update={"task_space": JOINTS, "path": path})
 
 
-def plot_comparison(comparison: Comparison) -> Figure:
+def plot_both_motions(comparison: Comparison) -> Figure:
     """Plot path coordinate, tool speed, and the largest ratio to any limit over time, of both motions.
 
     The line of the recorded motion is the ratio that its rows prove; the band above it is the ratio between the rows,
