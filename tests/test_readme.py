@@ -351,7 +351,7 @@ def test_what_the_commands_need_is_installed_by_what_the_readme_says():
         extra
         for path in (ROOT / "src").rglob("*.py")
         for extra in re.findall(
-            r'(?:NotInstalledError\(.*|_EXTRA = )"(\w+)"\)?(?: from .*)?$',
+            r'(?:NotInstalledError\(.*|_EXTRA = |\bextra(?:: str )?=\s?)"(\w+)"\)?(?: from .*)?$',
             path.read_text(),
             re.MULTILINE,
         )

@@ -227,7 +227,7 @@ def _find_active(
         if not 0 <= before < len(t) - 1:
             return float(t[max(before, 0)])
         low, high = values[before : before + 2]
-        part = (threshold - low) / (high - low)
-        return float(t[before] + (t[before + 1] - t[before]) * part)
+        step = t[before + 1] - t[before]
+        return float(t[before] + step * (threshold - low) / (high - low))
 
     return [(crossing(first - 1), crossing(last)) for first, last in found]

@@ -199,7 +199,7 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
     Raises
     ------
     InputError
-        There is no ffmpeg, or it cannot encode.
+        ffmpeg is not installed, or cannot encode.
     """
     program = shutil.which("ffmpeg")
     if program is None:
