@@ -16,7 +16,7 @@ from brachis.apps.sweeps.result import COLUMNS
 from brachis.errors import TaskError
 from brachis.task import Task
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def changes(**parts):

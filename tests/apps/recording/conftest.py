@@ -8,7 +8,7 @@ from brachis.apps.recording import import_motion
 from brachis.planner import plan
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCARA = ROOT / "robots/scara3/robot.urdf"
 DT = 0.004
 

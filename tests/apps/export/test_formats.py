@@ -152,7 +152,7 @@ def ur10(line_trajectory):
     """A motion of an arm of six joints on a rail, at rest in between."""
     from pathlib import Path
 
-    robot = Robot.from_urdf(Path(__file__).parents[2] / "robots/ur10_rail/robot.urdf")
+    robot = Robot.from_urdf(Path(__file__).parents[3] / "robots/ur10_rail/robot.urdf")
     times, q = np.array([0.0, 1.0]), np.array([np.zeros(7), np.linspace(0.6, 0.7, 7)])
     rest = np.zeros((2, 7))
     parts = {

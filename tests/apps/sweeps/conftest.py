@@ -10,7 +10,7 @@ import pytest
 
 import brachis
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CONTENT = {
     "sweep": 1,
     "task": str(ROOT / "examples/01_scara_line.yaml"),

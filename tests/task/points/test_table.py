@@ -140,7 +140,7 @@ def test_the_example_is_read_as_it_is_written(tmp_path):
     """The seam of the example, through its own writer."""
     import importlib.util
 
-    place = Path(__file__).parents[2] / "examples/08_cam_seam.py"
+    place = Path(__file__).parents[3] / "examples/08_cam_seam.py"
     spec = importlib.util.spec_from_file_location(place.stem, place)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -19,7 +19,7 @@ from brachis.verify import Verification, VerifyOptions
 from support.command_line import code_of, interrupts_kept
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCARA = ROOT / "robots/scara3/robot.urdf"
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from brachis import ik
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 WITHOUT_CLOSED_FORM = {"gen3": 7, "arm8": 28, "gen3_rails": 84}
 OWN = sorted((ROOT / "robots").glob("*/*.urdf"))
 PUBLISHED = {

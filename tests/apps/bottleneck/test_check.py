@@ -15,7 +15,7 @@ from brachis.errors import InputError
 from brachis.optimise.backends import solver_named
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 LARGE = 1e-4
 
 

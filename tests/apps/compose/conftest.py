@@ -11,7 +11,7 @@ import pytest
 
 from support.chains import Joint, chain_urdf
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 RAIL = {"range": (-2.0, 1.5), "velocity": 2.0, "force": 1500.0, "mass": 80.0}
 BASE_INERTIAL = (
     "<link name='base'><inertial><origin xyz='0.01 0.02 0.1'/><mass value='7'/>"

@@ -11,7 +11,7 @@ import brachis
 from support.chains import INERTIAL, Joint, chain_urdf
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 

@@ -10,7 +10,7 @@ from brachis.apps.comparison import bound_ratios
 from brachis.robot import dynamics
 from brachis.verify import verify_trajectory
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCARA = ROOT / "robots/scara3/robot.urdf"
 SHARES = np.array([1.0, -0.5, 0.02])
 """Of the largest velocity, acceleration and jerk, joint by joint."""

@@ -16,7 +16,7 @@ from brachis.apps.comparison.comparison import tasks_of
 from brachis.robot import bind
 from support.effort import QUICK
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SEED, DT = 4, 0.002
 
 
