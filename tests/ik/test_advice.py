@@ -33,10 +33,8 @@ def candidates(robot):
         ("win32", "AMD64", False),
     ],
 )
-def test_it_is_required_where_it_has_wheels(python, system, machine, wheels):
-    (required,) = (
-        Requirement(text) for text in PROJECT["dependencies"] if text.startswith("EAIK")
-    )
+def test_its_extra_brings_it_where_it_has_wheels(python, system, machine, wheels):
+    (required,) = map(Requirement, PROJECT["optional-dependencies"]["eaik"])
     here = {
         "python_version": python,
         "sys_platform": system,
@@ -45,9 +43,9 @@ def test_it_is_required_where_it_has_wheels(python, system, machine, wheels):
     assert required.marker.evaluate(here) is (wheels and python != "3.14")
 
 
-def test_it_is_no_extra():
-    assert "eaik" not in PROJECT["optional-dependencies"]
-    assert "EAIK" not in str(PROJECT["optional-dependencies"])
+def test_all_commands_have_it():
+    assert "eaik" in str(PROJECT["optional-dependencies"]["all"])
+    assert "EAIK" not in str(PROJECT["dependencies"])
 
 
 def test_what_is_missing_and_how_to_get_it(monkeypatch):

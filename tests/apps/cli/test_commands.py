@@ -275,7 +275,7 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     data = json.loads(outcome.out)
     assert data["interrupted"]
     assert (
-        data["not_completed"][-1]
+        data["undone"][-1]
         == "what search.effort asks for was not tried to its end"
     )
     assert (
@@ -284,7 +284,7 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     )
     assert all(
         f"brachis: not completed: {each}\n" in outcome.err
-        for each in data["not_completed"]
+        for each in data["undone"]
     )
 
 

@@ -108,9 +108,9 @@ def test_compare(run, recorded, tmp_path):
         (("--task-space", "x,z,y,yaw"), "yaw"),
         (
             ("--tolerance", "0.1"),
-            "no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001",
+            "the tolerance of a path is out of range; found 0.1; allowed: 2e-07 to 0.001",
         ),
-        (("--tolerance", "0"), "no tolerance of a path; found 0.0"),
+        (("--tolerance", "0"), "the tolerance of a path is out of range; found 0.0"),
         (("--noise", "-1"), "noise"),
         ((), 'If these are degrees, say units={"angle": "deg"}, or --angle deg'),
     ],

@@ -176,5 +176,5 @@ def test_rows_that_are_no_motion(table, write):
         match=r"implausible angle \(degrees\?\); found [0-9.]+ rad at j1. If these are degrees, say",
     ):
         read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, {})
-    with pytest.raises(TaskError, match="there is no such file"):
+    with pytest.raises(TaskError, match="the file does not exist"):
         read_recording("nowhere.csv", ROBOT, {})
