@@ -18,12 +18,11 @@ from brachis.limits import Limit, Partials
 
 
 class Evaluator:
-    """All that an optimisation asks of a robot along curves y(t).
+    """Values and slopes of all limits along curves y(t).
 
-    A phase has one, and it alone asks joint map and limits for values and slopes: for the rows of the program, their
-    Jacobian, and the checks between collocation points. (Where it fails, `refine` asks the joint map which
-    postures exist.) So a compiled evaluator can take the place of this one. It needs `limits`, `is_mean`, and
-    `evaluate` with an answer that has what `Evaluation` has.
+    A phase constructs one, and asks it alone: for the rows of the program, their Jacobian, and the checks between
+    collocation points. A compiled evaluator can replace it. It needs `is_mean`, and `evaluate` with an answer that
+    has the members of `Evaluation`.
 
     Parameters
     ----------

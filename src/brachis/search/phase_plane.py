@@ -1,6 +1,6 @@
 """Least time along a fixed joint path, and first guesses from it: the phase plane of s and ds/dt.
 
-With u = d2s/dt2 and x = (ds/dt)^2, limits along a joint path q(s) are lines in (u, x) (`Limit.lines`):
+With u = d2s/dt2 and x = (ds/dt)^2, limits along a joint path q(s) are lines in (u, x) (`phase_plane_rows`):
 
     a(s) u + b(s) x + c(s)   in [-1, 1],
 

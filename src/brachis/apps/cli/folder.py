@@ -36,23 +36,23 @@ Drawing = Callable[[], Any]
 """Draws a Matplotlib figure."""
 
 _SCHEMA = b'{\n  "$schema": "https://json-schema.org/draft/2020-12/schema",\n  "$id": "urn:brachis:'
-BEGINNINGS = {
-    ".csv": (b"t,q_", b"# brachis: "),
+_BEGINNINGS = {
     ".html": (b"<!doctype html>\n<!-- brachis report -->",),
-    ".gif": (b"GIF8",),
-    ".json": (b'{\n  "t_end"', b'{\n  "$schema": "urn:brachis:', _SCHEMA),
-    ".mcap": (b"\x89MCAP0",),
-    ".mp4": (b"\0\0\0\x1cftyp", b"\0\0\0\x20ftyp"),
+    ".json": (b'{\n  "t_end"', _SCHEMA),
     ".npz": (b"PK",),
-    ".parquet": (b"PAR1",),
     ".pdf": (b"%PDF",),
     ".png": (b"\x89PNG",),
-    ".script": (b"def brachis_motion():",),
     ".svg": (b"<?xml", b"<svg"),
     ".urdf": (b"<?xml", b"<robot"),
-    ".yaml": (b"# trajectory_msgs/msg/JointTrajectory",),
 }
-"""How files that brachis wrote begin, by suffix; a file that begins otherwise is never written over."""
+
+
+def beginnings_of(suffix: str) -> tuple[bytes, ...]:
+    """Return how files of a suffix begin that brachis wrote; a file that begins otherwise is never overwritten."""
+    from brachis.apps.export.formats import FORMATS
+
+    exported = [form.beginnings for form in FORMATS.values() if form.suffix == suffix]
+    return sum(exported, _BEGINNINGS.get(suffix, ()))
 
 
 def check_output(
@@ -65,7 +65,7 @@ def check_output(
     out : Path
         What will be written. A new file may have any name; devices such as ``/dev/stdout`` are not checked.
     suffixes : iterable of str
-        Suffixes of the format, keys of `BEGINNINGS`.
+        Suffixes of the format.
     inputs : iterable of Path or None
         Files that the command reads.
 
@@ -95,9 +95,10 @@ def check_output(
             found=f"suffix {suffix}" if suffix else "no suffix",
             allowed=f"a new file, or one that ends in {' or '.join(allowed)}",
         )
+    known = beginnings_of(suffix)
     with writing_errors(out), out.open("rb") as stream:
-        beginning = stream.read(max(map(len, BEGINNINGS[suffix])))
-    if beginning and not beginning.startswith(BEGINNINGS[suffix]):
+        beginning = stream.read(max(map(len, known)))
+    if beginning and not beginning.startswith(known):
         raise InputError(
             "the file exists and was not written by brachis",
             where=str(out),

@@ -27,6 +27,8 @@ class Format:
         What it is, in a few words.
     suffix : str
         By which it is known, with the dot.
+    beginnings : tuple of bytes
+        How its files begin; a file that begins otherwise is never overwritten.
     writer : callable
         Writes `JointRows`, or the `Film` of an animation, to a binary stream.
     dt : float
@@ -39,6 +41,7 @@ class Format:
 
     about: str
     suffix: str
+    beginnings: tuple[bytes, ...]
     writer: Callable[[Any, BinaryIO], None]
     dt: float = 0.001
     last: str = "exact"
@@ -46,22 +49,52 @@ class Format:
 
 
 FORMATS: dict[str, Format] = {
-    "csv": Format("table of t, q_, qd_, qdd_, tau_ of every joint", ".csv", write_csv),
-    "parquet": Format("the same table in binary columns", ".parquet", write_parquet),
-    "json": Format("samples, with a schema", ".json", write_json),
+    "csv": Format(
+        "table of t, q_, qd_, qdd_, tau_ of every joint",
+        ".csv",
+        (b"t,q_", b"# brachis: "),
+        write_csv,
+    ),
+    "parquet": Format(
+        "the same table in binary columns", ".parquet", (b"PAR1",), write_parquet
+    ),
+    "json": Format(
+        "samples, with a schema",
+        ".json",
+        (b'{\n  "$schema": "urn:brachis:',),
+        write_json,
+    ),
     "ros2": Format(
-        "trajectory_msgs/JointTrajectory as YAML", ".yaml", write_ros2_yaml, dt=0.01
+        "trajectory_msgs/JointTrajectory as YAML",
+        ".yaml",
+        (b"# trajectory_msgs/msg/JointTrajectory",),
+        write_ros2_yaml,
+        dt=0.01,
     ),
     "mcap": Format(
-        "trajectory_msgs/JointTrajectory in an MCAP bag", ".mcap", write_mcap, dt=0.01
+        "trajectory_msgs/JointTrajectory in an MCAP bag",
+        ".mcap",
+        (b"\x89MCAP0",),
+        write_mcap,
+        dt=0.01,
     ),
     "urscript": Format(
-        "program of servoj commands", ".script", write_urscript, dt=0.002, last="hold"
+        "program of servoj commands",
+        ".script",
+        (b"def brachis_motion():",),
+        write_urscript,
+        dt=0.002,
+        last="hold",
     ),
     # GIF counts time in hundredths of a second.
-    "gif": Format("animation", ".gif", write_gif, dt=0.04, step=0.01),
+    "gif": Format("animation", ".gif", (b"GIF8",), write_gif, dt=0.04, step=0.01),
     "mp4": Format(
-        "animation, where ffmpeg is installed", ".mp4", write_mp4, dt=0.04, step=1e-3
+        "animation, where ffmpeg is installed",
+        ".mp4",
+        (b"\0\0\0\x1cftyp", b"\0\0\0\x20ftyp"),
+        write_mp4,
+        dt=0.04,
+        step=1e-3,
     ),
 }
 """Formats by name."""
