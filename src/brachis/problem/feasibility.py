@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import (
     InputError,
     PathError,
@@ -290,7 +291,7 @@ def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -
     gaps = np.where(exists, np.abs(gap).max(axis=2), np.inf).min(axis=1)
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]
-    if gaps[branch] > 1e-5 or np.any(margins <= 0.0):
+    if gaps[branch] > 1e-5 or np.any(margins <= tolerances.ANGLE):
         raise StartError(
             f"the {name} posture is singular for redundant joints [{', '.join(match.redundant_joints)}]",
             where=f"{name}.joints",

@@ -178,7 +178,9 @@ class Trajectory(Summary):
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
         """Path coordinate s at times `t`, same shape."""
-        return np.asarray(self.path_spline(self._check_times(t)))
+        times = self._check_times(t)
+        end = self.control_points[0, -1]  # without the spline's rounding
+        return np.where(times == self.t_end, end, self.path_spline(times))
 
     def position(self, t: ArrayLike) -> np.ndarray:
         """Joint positions at times `t`: (n,) for a number, (K, n) for (K,); rad or m.

@@ -42,7 +42,7 @@ def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page
 
 
 def test_it_is_said_where_every_limit_holds(planar, planar_page):
-    for limit in planar.attempt.refined.program.limits:
+    for limit in planar.candidate.refined.program.limits:
         row = f"<tr><th>{limit.name}</th><td>{limit.guarantee.value}</td></tr>"
         assert (row in planar_page.html) == (limit.role is not Role.SAFEGUARD)
     assert "It holds at all instants" in planar_page.html
