@@ -412,7 +412,7 @@ def nearest(
 ) -> str | None:
     """Suggest a valid name: one for a word of other libraries, else the longest beginning of `name`, else the nearest.
 
-    elsewhere in brachis count as well.
+    If an attribute is asked for, functions elsewhere in brachis count as well.
     """
     by_small = {one.lower(): one for one in valid}
     small = name.lower()

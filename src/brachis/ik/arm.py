@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import cross
 from brachis.errors import write_count
 from brachis.ik.protocol import NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
-from brachis.ik.vectors import EXACT, across, dot
+from brachis.ik.vectors import across, dot
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose
@@ -129,11 +130,13 @@ class RemainingJoints:
     def are_parallel(self, first: int, *others: int) -> bool:
         """Whether the directions of joints, of whatever kind, are always parallel."""
         sines = cross(self.axes[:, [first]], self.axes[:, others])
-        return bool(np.abs(sines).max() < EXACT)
+        return bool(np.abs(sines).max() < tolerances.LENGTH)
 
     def are_perpendicular(self, i: int, j: int) -> bool:
         """Whether the directions of two joints, of whatever kind, are always at a right angle."""
-        return bool(np.abs(dot(self.axes[:, i], self.axes[:, j])).max() < EXACT)
+        return bool(
+            np.abs(dot(self.axes[:, i], self.axes[:, j])).max() < tolerances.LENGTH
+        )
 
     def miss(self, *places: int) -> float:
         """Largest distance of the axes of revolute joints from the point where the first two come nearest, m."""
@@ -148,12 +151,15 @@ class RemainingJoints:
 
         Of two axes that coincide it is any point.
         """
-        if not self.revolute[list(places)].all() or self.miss(*places) > EXACT:
+        if (
+            not self.revolute[list(places)].all()
+            or self.miss(*places) > tolerances.LENGTH
+        ):
             return None
         point = self._nearest(*places[:2])
         for place in places:
             offsets = dot(self.axes[:, place], point - self.points[:, place])
-            if np.ptp(offsets) < EXACT:
+            if np.ptp(offsets) < tolerances.LENGTH:
                 return Anchor(place, float(offsets.mean()))
         return None
 
@@ -165,7 +171,7 @@ class RemainingJoints:
         size = dot(normal, normal)
         along = dot(cross(self.points[:, j] - self.points[:, i], second), normal)
         return self.points[:, i] + first * (
-            along / np.where(size < EXACT**2, np.inf, size)
+            along / np.where(size < tolerances.LENGTH**2, np.inf, size)
         )
 
 

@@ -22,10 +22,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.ik.arm import Arm, RemainingJoints
 from brachis.ik.protocol import IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews, Poses, Screw
-from brachis.ik.vectors import EXACT, wrap
+from brachis.ik.vectors import wrap
 from brachis.robot.joints import complement
 
 SINGULAR = "J_nr is singular everywhere"
@@ -41,7 +42,7 @@ def largest_size(values: np.ndarray) -> float:
         J_nr is singular in all of them.
     """
     size = float(np.abs(values).max())
-    if size < EXACT:
+    if size < tolerances.LENGTH:
         raise NotApplicableError(SINGULAR)
     return size
 
@@ -149,7 +150,7 @@ class FactoredSolver(IKSolver):
         self._varying = [
             slot
             for slot, value in enumerate(values)
-            if np.ptp(value) > EXACT * self._scales[slot]
+            if np.ptp(value) > tolerances.LENGTH * self._scales[slot]
         ]
         self._signs = []
         self._sided = []
@@ -237,7 +238,7 @@ class FactoredSolver(IKSolver):
     def reason_if_singular(self) -> str:
         """Say which factor of det J_nr vanishes at all postures; empty if none does."""
         for factor, size in zip(self._factors, self._scales, strict=True):
-            if size < EXACT:
+            if size < tolerances.LENGTH:
                 names = dict(zip(self.letters, self._joints.names, strict=True))
                 return f": {factor.vanishes.format(**names, point=self.point)}"
         return ""

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import cross
 from brachis.ik.branches import DeterminantSolver, largest_size
 from brachis.ik.newton import Newton
@@ -290,7 +291,7 @@ def _find_repetitions(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
         if not len(together):
             break
         gap = np.abs(marks[together + behind] - marks[together])
-        near = np.minimum(gap, 1.0 - gap).max(axis=1) < 1e-5 / TURN
+        near = np.minimum(gap, 1.0 - gap).max(axis=1) < tolerances.POSTURE / TURN
         repeated[together + behind] |= near
     return repeated
 

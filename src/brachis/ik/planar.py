@@ -27,11 +27,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.ik.branches import DeterminantSolver
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
-from brachis.ik.vectors import EXACT, determinants, rotate, wrap
+from brachis.ik.vectors import determinants, rotate, wrap
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose, RowsAndYaw
@@ -205,11 +206,11 @@ def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
         geometry.joint_names, geometry.axes, geometry.revolute, strict=True
     ):
         cosine = abs(axis @ normal)
-        if revolute and cosine < 1.0 - EXACT:
+        if revolute and cosine < 1.0 - tolerances.ANGLE:
             raise NotApplicableError(
                 f"not planar: the axes of {geometry.joint_names[turning[0]]} and {name} are not parallel"
             )
-        if not revolute and EXACT < cosine < 1.0 - EXACT:
+        if not revolute and tolerances.ANGLE < cosine < 1.0 - tolerances.ANGLE:
             raise NotApplicableError(
                 f"not planar: {name} slides at an angle to the plane"
             )
@@ -218,7 +219,7 @@ def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
 
 def _basis(normal: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Two orthonormal vectors of the plane, (2, 3); the rows' own axes where these span it."""
-    if len(rows) == 2 and np.all(np.abs(rows @ normal) < EXACT):
+    if len(rows) == 2 and np.all(np.abs(rows @ normal) < tolerances.ANGLE):
         return rows
     first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
     first /= np.linalg.norm(first)
@@ -239,17 +240,21 @@ def planar(
     rows = np.eye(3)[list(task_map.axes)]
     basis = _basis(normal, rows)
     normal = np.cross(*basis)
-    inert = ~geometry.revolute & (np.abs(geometry.axes @ normal) > 1.0 - EXACT)
-    if inert.any() and np.any(np.abs(rows @ normal) > EXACT):
+    inert = ~geometry.revolute & (
+        np.abs(geometry.axes @ normal) > 1.0 - tolerances.ANGLE
+    )
+    if inert.any() and np.any(np.abs(rows @ normal) > tolerances.ANGLE):
         raise NotApplicableError(
             "a slide along the plane's normal changes the prescribed rows"
         )
-    if len(rows) > 2 or np.linalg.matrix_rank(rows @ basis.T, tol=EXACT) < len(rows):
+    if len(rows) > 2 or np.linalg.matrix_rank(
+        rows @ basis.T, tol=tolerances.ANGLE
+    ) < len(rows):
         raise NotApplicableError(
             "the prescribed rows do not fit the plane in which the joints move"
         )
     if isinstance(task_map, RowsAndYaw):
-        if abs(normal[task_map.world_axis]) < 1.0 - EXACT:
+        if abs(normal[task_map.world_axis]) < 1.0 - tolerances.ANGLE:
             raise NotApplicableError("yaw turns in another plane than the joints")
         if not geometry.revolute[complement(geometry.n, redundant)].any():
             raise NotApplicableError("no revolute joint is left to set yaw")
@@ -264,7 +269,7 @@ class PrismaticSolver(DeterminantSolver):
     ) -> None:
         self._rows = list(task_map.axes)
         super().__init__(geometry, redundant, "slides")
-        if np.ptp(self._random) <= EXACT * self._scale:
+        if np.ptp(self._random) <= tolerances.ANGLE * self._scale:
             self.branches = ("slides",)
 
     def _directions(self, screws: PosedScrews) -> np.ndarray:

@@ -18,12 +18,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.ik.arm import Arm, RemainingJoints
 from brachis.ik.branches import SINGULAR, FactoredSolver, fit
 from brachis.ik.point_recipes import choose_recipe
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Screw
-from brachis.ik.vectors import EXACT
 from brachis.robot import TaskMap
 from brachis.robot.task_map import Pose
 
@@ -90,7 +90,7 @@ def positioning(
     columns = geometry.random_screws.jacobian_columns(three.joints)
     speeds = np.abs(columns[:3]).max(axis=(0, 2))
     for name, speed in zip(three.names, speeds, strict=True):
-        if speed < EXACT:
+        if speed < tolerances.LENGTH:
             raise NotApplicableError(f"{SINGULAR}: {name} does not move the tool")
     return fit(
         geometry,

@@ -17,6 +17,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import DecompositionError, UnknownNameError, write_count
 from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.parallel_axes import parallel_axes
@@ -26,7 +27,6 @@ from brachis.ik.protocol import Family, IKSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.snapping import TOLERANCE, PolishedSolver, SnappedChain, snap_axes
 from brachis.ik.spherical_wrist import spherical_wrist
-from brachis.ik.vectors import EXACT
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import complement, difference
 from brachis.robot.task_map import JointSpace
@@ -394,7 +394,7 @@ def default_task_space(robot: Robot) -> str | list[str]:
             np.abs(geometry.axes),
         )
     )
-    normals = np.flatnonzero(np.all(along < EXACT, axis=0))
+    normals = np.flatnonzero(np.all(along < tolerances.LENGTH, axis=0))
     if len(normals):
         return [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
     return "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.ik.newton import Newton
 from brachis.ik.protocol import IKSolver
 from brachis.ik.screws import ChainGeometry
@@ -27,8 +28,6 @@ from brachis.robot.task_map import Pose
 
 TOLERANCE = 1e-4
 """Axes this near to parallel or perpendicular (rad), or to meeting (m), are taken to be meant so."""
-_ROUNDING = 1e-12
-"""Changes up to this size (rad, m) come from rounding alone."""
 _SKEW = 1e-2
 """Axes at a smaller angle (rad) have no point where they meet that could be trusted."""
 
@@ -90,7 +89,7 @@ def snap_axes(
             points[i] = chain.snap_point(axes[i], geometry.points[i])
     if not pose:
         chain.snap_tool(geometry.tool_position)
-    if max(chain.turned, chain.shifted) < _ROUNDING:
+    if max(chain.turned, chain.shifted) < tolerances.ROUNDING:
         return None
     snapped = replace(
         geometry,
@@ -146,7 +145,7 @@ class _Chain:
         before, here = self._nearest(axis, self.carry(point))
         meets = False
         if self._axis is not None and np.linalg.norm(here - before) < self._tolerance:
-            parallel = abs(self._axis @ axis) > 1.0 - _ROUNDING
+            parallel = abs(self._axis @ axis) > 1.0 - tolerances.ROUNDING
             if self._meets and np.linalg.norm(self._point - before) < self._tolerance:
                 before = self._point
             if parallel or np.linalg.norm(np.cross(self._axis, axis)) > _SKEW:

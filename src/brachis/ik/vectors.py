@@ -13,9 +13,6 @@ import numpy as np
 
 from brachis.common.arrays import cross
 
-EXACT = 1e-9
-"""Sines, cosines, lengths (m) and determinants below this are zero: rotations of a URDF err by about 1e-15."""
-
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar product, shape (...)."""

@@ -334,7 +334,7 @@ def _verify(
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
             trajectory = extract_trajectory(start, refined)
-            verification = verify_trajectory(trajectory, own_limits=problem.further)
+            verification = verify_trajectory(trajectory, own_limits=problem.user_limits)
     (phase,) = refined.program.phases
     tolerance = problem.task.refinement.tolerance
     return dataclasses.replace(

@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import (
     ORDERS,
@@ -46,7 +47,9 @@ def interval_weights(breaks: np.ndarray, t_norm: np.ndarray, degree: int) -> np.
     """
     weights = np.zeros((len(breaks) - 1, len(t_norm)))
     for row, low, high in zip(weights, breaks[:-1], breaks[1:], strict=True):
-        inside = np.flatnonzero((t_norm > low - 1e-12) & (t_norm < high + 1e-12))
+        inside = np.flatnonzero(
+            (t_norm > low - tolerances.TIME) & (t_norm < high + tolerances.TIME)
+        )
         # Without continuous accelerations, the values at the end belong to the next interval.
         if degree < 3 and high < breaks[-1]:
             inside = inside[:-1]

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.common import interrupts
+from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
@@ -36,9 +36,7 @@ from brachis.optimise.session import SolverSession
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
-_AS_FAST = 1e-4
-"""Motions are equally fast whose end times differ by no more than this fraction."""
-_KEPT_BACK = 0.1 * _AS_FAST
+_KEPT_BACK = 0.1 * tolerances.END_TIME
 """Fraction of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
@@ -118,7 +116,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
         status = late if fastest.verified else "the fastest motion is not verified"
         return _keep(fastest, status)
     task = start.problem.task
-    slower = max(task.search.slower, _AS_FAST)
+    slower = max(task.search.slower, tolerances.END_TIME)
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)

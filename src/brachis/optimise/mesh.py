@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.optimise.bspline import clamped_knots, spread
@@ -283,7 +284,7 @@ def optimise_knots(
         [free_knots] * 5,
         move_fix_and_refine,
         least_gain=0.0,
-        go_on_above=2e-4,
+        go_on_above=tolerances.GAIN,
         judge=judge,
         deadline=refinement.deadline,
     )

@@ -9,6 +9,7 @@ from math import floor
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
+from brachis.common import tolerances
 from brachis.common.arrays import with_like_signs
 from brachis.path.context import stands_still
 from brachis.path.joins import Join
@@ -144,7 +145,7 @@ def _check_neighbours(
             f"Turn {turning} along a line",
         )
     longest = min(first.length, second.length) / 2
-    if size > longest * (1 + 1e-12):
+    if size > longest * (1.0 + tolerances.ROUNDING):
         raise join.wrong_blend(
             "the blend is longer than half of a neighbouring segment",
             found,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PathError, StartError, write_apart
 from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
 from brachis.path.joins import find_joins, refuse_corners
@@ -164,7 +165,7 @@ def check_on_path(
     place = task_map.value(posture)
     miss = np.abs(task_map.difference(place, target))
     worst = int(np.argmax(miss))
-    largest = 1e-6  # m, rad
+    largest = tolerances.WRITTEN
     if miss[worst] > largest:
         unit = task_map.units[worst]
         found, allowed = write_apart(miss[worst], largest, digits=3)

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PathError
 from brachis.path.protocol import Array, Curve
 from brachis.robot.task_map.protocol import position_rows
-
-ZERO_LENGTH = 1e-9
-"""Lengths (m) and angles (rad) below are rounding of the start posture's coordinates, not a motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,4 +115,4 @@ def place(rows: Sequence[str], point: Array) -> str:
 def stands_still(curve: Curve, positions: int) -> bool:
     """Return whether the position rows, the first ones, do not move along a curve."""
     ends = curve.derivatives(curve.knots, 0)[0, :, :positions]
-    return bool(np.ptp(ends, axis=0).max() < ZERO_LENGTH)
+    return bool(np.ptp(ends, axis=0).max() < tolerances.LENGTH)

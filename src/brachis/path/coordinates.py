@@ -9,9 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PathError, UnknownNameError
 from brachis.path.blends import blend_poses, blend_rows
-from brachis.path.context import ZERO_LENGTH, SegmentContext
+from brachis.path.context import SegmentContext
 from brachis.path.curves import (
     LineCurve,
     arc_center,
@@ -227,7 +228,7 @@ class PoseCoordinates(RowCoordinates):
         )
         if isinstance(segment, TurnSegment):
             turn = turn_of(segment.turn, rotation, context.key)
-            if abs(turn.angle) < ZERO_LENGTH:
+            if abs(turn.angle) < tolerances.LENGTH:
                 raise context.wrong(
                     "the turn has zero length",
                     found="0 degrees",

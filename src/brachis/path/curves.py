@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from brachis.path.context import ZERO_LENGTH, SegmentContext
+from brachis.common import tolerances
+from brachis.path.context import SegmentContext
 from brachis.path.protocol import Array
 from brachis.task.segments import (
     ArcCenter,
@@ -76,9 +77,9 @@ def _line(
     displacement: Array, context: SegmentContext, key: str, found: object
 ) -> LineCurve:
     length = float(np.linalg.norm(displacement[: len(context.positions)]))
-    if length < ZERO_LENGTH:
+    if length < tolerances.LENGTH:
         length = float(np.linalg.norm(displacement))
-    if length < ZERO_LENGTH:
+    if length < tolerances.LENGTH:
         raise context.zero_length(key, found)
     return LineCurve(context.start, displacement / length, length)
 
@@ -142,7 +143,7 @@ def _arc(center: Array, outward: Array, forward: Array, angle: float) -> ArcCurv
 def arc_center(shape: ArcCenter, context: SegmentContext) -> ArcCurve:
     """Return the arc about a centre by an angle."""
     angle = float(np.deg2rad(shape.angle_deg))
-    if abs(angle) < ZERO_LENGTH:
+    if abs(angle) < tolerances.LENGTH:
         raise context.zero_length(".angle_deg", shape.angle_deg)
     return _with_yaw(_about_center(shape, angle, context), shape.yaw, context)
 
@@ -163,11 +164,11 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
     start = context.position
     to_via = context.coordinates(shape.via, "via", context.positions) - start
     to_end = context.coordinates(shape.to, "to", context.positions) - start
-    if np.linalg.norm(to_end) < ZERO_LENGTH:
+    if np.linalg.norm(to_end) < tolerances.LENGTH:
         raise context.zero_length(".to", list(shape.to))
     sides = np.stack([to_via, to_end])
     gram = sides @ sides.T
-    collinear = 1e-6  # relative: coordinates are given with a few digits
+    collinear = tolerances.WRITTEN
     if np.linalg.det(gram) <= collinear**2 * gram[0, 0] * gram[1, 1]:
         raise context.wrong(
             "start, via and end of the arc lie on a line",
@@ -205,7 +206,7 @@ def _about_center(
     context.need_rows("an arc", 2, 3)
     center = context.coordinates(shape.center, "center", context.positions)
     outward = context.position - center
-    if np.linalg.norm(outward) < ZERO_LENGTH:
+    if np.linalg.norm(outward) < tolerances.LENGTH:
         raise context.wrong(
             "the arc has zero length: its centre is its start, so that the radius is zero",
             ".center",

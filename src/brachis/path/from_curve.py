@@ -11,12 +11,10 @@ from brachis.errors import InputError
 from brachis.path.protocol import Array, Path
 from brachis.path.sequence import SequencePath
 from brachis.task import BSplineSegment, Segment, SpeedTable, Task
+from brachis.task.segments import SMOOTHNESS
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline, PPoly
-
-_SMOOTH = 3
-"""Derivatives that a path must have."""
 
 
 def bspline_segment(
@@ -102,7 +100,7 @@ def _of_pieces(
     inner = np.unique(breaks[(breaks > first) & (breaks < last)])
     after = np.append(inner, last)  # one place at least, also without breaks
     before = np.nextafter(after, first)
-    for order in range(_SMOOTH + 1):
+    for order in range(SMOOTHNESS + 1):
         values = _rows(pieces(after, nu=order))
         jumps = np.abs(values - _rows(pieces(before, nu=order))).max(axis=1)
         if jumps.max() > 1e-7 * (1.0 + np.abs(values).max()):
@@ -116,7 +114,7 @@ def _of_pieces(
                 "themselves (spline: {through: ...})",
             )
     grid = np.concatenate([[first], inner, [last]])
-    return _interpolate(lambda u: _rows(pieces(u)), grid, max(degree, _SMOOTH + 1))
+    return _interpolate(lambda u: _rows(pieces(u)), grid, max(degree, SMOOTHNESS + 1))
 
 
 def _of_function(
@@ -162,7 +160,7 @@ def _interpolate(
     """
     from scipy.interpolate import make_interp_spline
 
-    times = np.full(len(breaks), multiplicity or degree - _SMOOTH)
+    times = np.full(len(breaks), multiplicity or degree - SMOOTHNESS)
     times[[0, -1]] = degree + 1
     knots = np.repeat(breaks, times)
     windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)

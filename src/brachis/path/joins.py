@@ -8,14 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PathError
 from brachis.path.context import place, stands_still
 from brachis.path.pose import POSITIONS, twist
 from brachis.path.protocol import Array, Curve
 from brachis.robot.task_map.protocol import joints_of, position_rows
-
-TOLERANCE = 1e-6
-"""Largest relative mismatch of derivatives at a join: coordinates are given with six digits or more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,16 +124,16 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
     jumps = (
         np.linalg.norm(after - before, axis=1) * length ** np.arange(-1.0, 3.0) / size
     )
-    if np.all(jumps <= TOLERANCE):
+    if np.all(jumps <= tolerances.WRITTEN):
         return None
-    if jumps[1] > TOLERANCE:
+    if jumps[1] > tolerances.WRITTEN:
         corner = angle_between(before[1], after[1])
         speed, new_speed = (float(np.linalg.norm(one[1])) for one in (before, after))
         # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
         if corner > 0.01 * abs(new_speed - speed):
             return f"a corner of {np.rad2deg(corner):.4g} degrees{_of_yaw(before, after, positions)}"
         return f"the parameter's speed changing from {speed:.6g} to {new_speed:.6g}"
-    if jumps[2] > TOLERANCE:
+    if jumps[2] > tolerances.WRITTEN:
         return f"a curvature jump of {np.linalg.norm(after[2] - before[2]):.4g} 1/m"
     return f"a jump of {np.linalg.norm(after[3] - before[3]):.4g} 1/m^2 in the third derivative"
 
@@ -167,7 +165,7 @@ def _of_yaw(before: Array, after: Array, positions: int) -> str:
     """Say that it is yaw's slope that jumps where the position goes straight on."""
     if (
         before.shape[1] == positions
-        or np.linalg.norm((after - before)[1, :positions]) > TOLERANCE
+        or np.linalg.norm((after - before)[1, :positions]) > tolerances.WRITTEN
     ):
         return ""
     return f" in yaw alone, which turns by {before[1, -1]:.4g} rad/m before and {after[1, -1]:.4g} rad/m after"
@@ -211,13 +209,13 @@ def _turning_mismatch(
     old, new = (twist(one[:, None])[:, 0, POSITIONS:] for one in (before, after))
     rate, new_rate = (float(np.linalg.norm(one[0])) for one in (old, new))
     jumps = np.linalg.norm(new - old, axis=1)
-    large = jumps * length ** np.arange(3.0) > TOLERANCE * max(rate, 1.0)
+    large = jumps * length ** np.arange(3.0) > tolerances.WRITTEN * max(rate, 1.0)
     if not np.any(large):
         return None
     if not large[0]:
         order, k = ("slope", 1) if large[1] else ("second derivative", 2)
         return f"the {order} of the tool's turning rate jumps by {jumps[k]:.4g} rad/{unit}^{k + 1}"
-    if abs(new_rate - rate) > TOLERANCE * max(rate, 1.0):
+    if abs(new_rate - rate) > tolerances.WRITTEN * max(rate, 1.0):
         return f"the tool's turning rate jumps: {rate:.4g} rad/{unit} before and {new_rate:.4g} after"
     angle = np.rad2deg(angle_between(old[0], new[0]))
     return f"the axis about which the tool turns jumps by {angle:.4g} degrees"

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PathError
 from brachis.path.blends import septic
-from brachis.path.context import ZERO_LENGTH, place
+from brachis.path.context import place
 from brachis.path.curves import ArcCurve, LineCurve
 from brachis.path.pose import smallest
 from brachis.path.protocol import Array, Curve, Orientation
@@ -119,7 +120,7 @@ def turn_between(
     angle = float(np.linalg.norm(vector))
     if angle > np.pi - AMBIGUOUS:
         raise half_turn(key)
-    axis = vector / angle if angle > ZERO_LENGTH else np.array([1.0, 0.0, 0.0])
+    axis = vector / angle if angle > tolerances.LENGTH else np.array([1.0, 0.0, 0.0])
     return Turn(start, axis, angle, smooth)
 
 

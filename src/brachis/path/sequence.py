@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PathError
 from brachis.path.protocol import Array, Curve, Path, PathSample
 from brachis.robot import TaskMap
@@ -175,7 +176,7 @@ def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
     """
     sizes = task_map.norms(path.sample(np.array([s])).xi)
     position, angle = (float(size[0]) for size in sizes)
-    return position if position > 1e-9 else angle
+    return position if position > tolerances.LENGTH else angle
 
 
 def check_closed(task_map: TaskMap, path: Path) -> None:
@@ -188,7 +189,7 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
     ends = path.sample(np.array([0.0, 1.0]))
     gap = np.abs(task_map.difference(*ends.target))
     worst = int(np.argmax(gap))
-    largest = 1e-6  # m and rad; of derivatives relative to their size
+    largest = tolerances.WRITTEN  # of derivatives relative to their size
     if gap[worst] > largest:
         raise PathError(
             "the path does not close",

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import with_like_signs
 from brachis.errors import PathError
-from brachis.path.context import ZERO_LENGTH, SegmentContext, place
+from brachis.path.context import SegmentContext, place
 from brachis.path.curves import LineCurve
 from brachis.path.orientation import AMBIGUOUS, half_turn, turn_between
 from brachis.path.pose import (
@@ -30,6 +31,7 @@ from brachis.path.rotations import (
 from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import joints_of
 from brachis.task.orientation import Attitude
+from brachis.task.points.points import steps_of
 from brachis.task.segments import BSplineCurve, SplineThrough
 
 if TYPE_CHECKING:
@@ -78,10 +80,10 @@ def spline_through(
             hint="Set task_space: pose",
         )
     waypoints = _waypoints_of(shape, context)
-    if _repeats_start(_lengths(waypoints)):
+    if _repeats_start(steps_of(waypoints)):
         waypoints = np.delete(waypoints, 1, axis=0)
-    chords = _lengths(waypoints[:, : len(context.positions)])
-    knots = _chord_knots(chords, _lengths(waypoints), shape, context)
+    chords = steps_of(waypoints[:, : len(context.positions)])
+    knots = _chord_knots(chords, steps_of(waypoints), shape, context)
     return _interpolate(knots, waypoints)
 
 
@@ -115,7 +117,7 @@ def pose_spline(
     """
     points = _waypoints_of(shape, context)
     turned = _rotations(shape, attitudes, context, rotation)
-    if _repeats_start(np.hypot(_lengths(points), _angles(turned))):
+    if _repeats_start(np.hypot(steps_of(points), _angles(turned))):
         kept = np.delete(np.arange(len(points)), 1)
         points = points[kept]
         turned = turned[kept]
@@ -124,7 +126,7 @@ def pose_spline(
         raise half_turn(
             f"{context.key}.orientations[{i + len(attitudes) - len(angles)}]"
         )
-    knots = _chord_knots(_lengths(points), angles, shape, context)
+    knots = _chord_knots(steps_of(points), angles, shape, context)
     if len(points) == 2:
         last = f"{context.key}.orientations[{len(attitudes) - 1}]"
         turn = turn_between(rotation, turned[1], last)
@@ -143,12 +145,6 @@ def pose_spline(
             hint="Give more waypoints, or orientations that are closer to each other",
         )
     return quaternion_curve(columns)
-
-
-def _lengths(points: Array) -> Array:
-    """Return the distances, (n - 1,), between n successive points."""
-    lengths: Array = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return lengths
 
 
 def _angles(turned: Rotation) -> Array:
@@ -271,13 +267,13 @@ def _chord_knots(
     PathError
         Nothing moves, or a waypoint repeats its predecessor.
     """
-    if np.all(chords < ZERO_LENGTH):
+    if np.all(chords < tolerances.LENGTH):
         chords = otherwise
-    if np.all(chords < ZERO_LENGTH):
+    if np.all(chords < tolerances.LENGTH):
         raise context.zero_length(".through", [list(each) for each in shape.through])
-    if np.any(chords < ZERO_LENGTH):
+    if np.any(chords < tolerances.LENGTH):
         before = len(shape.through) - len(chords)
-        repeated = int(np.argmax(chords < ZERO_LENGTH)) + before
+        repeated = int(np.argmax(chords < tolerances.LENGTH)) + before
         raise context.wrong(
             "a waypoint repeats its predecessor",
             f".through[{repeated}]",
@@ -301,7 +297,7 @@ def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
     try:
         return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
     except ValueError as error:  # knots that fall together, or singular equations
-        distances = _lengths(waypoints)
+        distances = steps_of(waypoints)
         raise PathError(
             "no spline goes through the waypoints: their distances differ too much",
             found=f"distances from {distances.min():.3g} to {distances.max():.3g} (m or rad)",

@@ -291,7 +291,7 @@ def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -
     gaps = np.where(exists, np.abs(gap).max(axis=2), np.inf).min(axis=1)
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]
-    if gaps[branch] > 1e-5 or np.any(margins <= tolerances.ANGLE):
+    if gaps[branch] > tolerances.POSTURE or np.any(margins <= tolerances.ANGLE):
         raise StartError(
             f"the {name} posture is singular for redundant joints [{', '.join(match.redundant_joints)}]",
             where=f"{name}.joints",

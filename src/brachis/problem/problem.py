@@ -43,7 +43,7 @@ class Problem(Summary):
         Postures, None where free; the same one where the motion is periodic. Otherwise the end is the posture nearest
         to the given one that is on the path, which that one may miss by what its digits leave out.
     limits : tuple of Limit
-    further : tuple of LimitModel
+    user_limits : tuple of LimitModel
         Those of the limits that are not in the task, as the user gave them.
     """
 
@@ -54,11 +54,11 @@ class Problem(Summary):
     start: np.ndarray | None
     end: np.ndarray | None
     limits: tuple[Limit, ...]
-    further: tuple[LimitModel, ...] = ()
+    user_limits: tuple[LimitModel, ...] = ()
 
     @classmethod
     def of(
-        cls, robot: Robot, task: Task, further: Sequence[LimitModel] = ()
+        cls, robot: Robot, task: Task, user_limits: Sequence[LimitModel] = ()
     ) -> Problem:
         """Bind robot and task, and check the postures that the task gives.
 
@@ -86,13 +86,13 @@ class Problem(Summary):
             check_closed(task_map, path)
             end = start
         ramp = build_ramp(task, robot, task_map, path, end if start is None else start)
-        limits = limits_of(robot, task, further, ramp)
+        limits = limits_of(robot, task, user_limits, ramp)
         check_smoothness(limits, task.spline)
         tolerance = task.refinement.tolerance
         limits = check_postures(task_map, limits, start, end, path, tolerance)
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
-        return cls(task, robot, task_map, path, start, end, limits, tuple(further))
+        return cls(task, robot, task_map, path, start, end, limits, tuple(user_limits))
 
     @property
     def end_rates(self) -> tuple[float, float]:

@@ -11,8 +11,9 @@ import pinocchio as pin
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError
-from brachis.robot.limits import LARGEST, per_joint_values
+from brachis.robot.limits import per_joint_values
 from brachis.task import FROM_URDF, FrictionSettings
+from brachis.task.fields import LARGEST
 
 
 @dataclass(frozen=True, repr=False)

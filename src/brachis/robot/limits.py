@@ -8,18 +8,16 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError, LimitError, UnknownNameError
 from brachis.task import FROM_URDF, LIMIT_KINDS, LimitScale, LimitSpec
+from brachis.task.fields import LARGEST, LEAST
 
 Curve = tuple[tuple[float, float], ...]
 """Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
 
-LEAST = 1e-6
-LARGEST = 1e12
-"""Least and largest limit of torque, velocity, acceleration or their rates, in SI units; products and squares of such
-figures are still numbers."""
 FARTHEST = 1e6
 """Largest end of a position range, rad or m: there the rounding of numbers is a tenth of a nanometre."""
 MAGNITUDES = tuple(kind for kind, row in LIMIT_KINDS.items() if row.form != "range")
@@ -454,7 +452,7 @@ def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
             allowed=f"torques >= 0, at rest from {LEAST:g} to {LARGEST:g}, scaled too",
         )
     # The same torque may have been rounded to different figures.
-    rising = np.flatnonzero(np.diff(torque) > 1e-12 * torque[0])
+    rising = np.flatnonzero(np.diff(torque) > tolerances.ROUNDING * torque[0])
     if len(rising):
         raise InputError(
             "the torque rises with the speed",

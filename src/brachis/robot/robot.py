@@ -376,11 +376,6 @@ class Robot(Summary):
         )
 
     @property
-    def torque_units(self) -> tuple[str, ...]:
-        """Unit of every joint's torque, ``Nm``, or of its force, ``N``."""
-        return tuple(UNITS["torque"][unit] for unit in self.position_units)
-
-    @property
     def revolute(self) -> np.ndarray:
         """Which joints turn, (n,) bool; the others slide."""
         return np.array([unit == "rad" for unit in self.position_units])

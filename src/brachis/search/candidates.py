@@ -25,6 +25,7 @@ from functools import partial
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
@@ -57,8 +58,6 @@ from brachis.search.phase_plane import initial_guess, initial_knots
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn."""
-WORTH_IT = 2e-4
-"""A further solve that shortens the motion by less than this fraction of its time was not worth it."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
@@ -221,8 +220,8 @@ def solve_by_margin_continuation(
         SolvedProgram(program),
         [partial(use, smaller) for smaller in programs.values()],
         attempt_once(solve),
-        least_gain=WORTH_IT,
-        go_on_above=WORTH_IT,
+        least_gain=tolerances.GAIN,
+        go_on_above=tolerances.GAIN,
     )
 
 
@@ -300,7 +299,7 @@ def solve_in_chart(
     solved = solve_first(program, x)
     if not solved.usable and solved.report.status not in out_of_time:
         solved = improve(solved, [_go_to((program, x))], solve_further)
-    solved = improve(solved, 3 * [follow], solve_first, go_on_above=WORTH_IT)
+    solved = improve(solved, 3 * [follow], solve_first, go_on_above=tolerances.GAIN)
     if solved.usable and _is_held_back(solved):
         point = solved.program, solved.report.x
         solved = improve(solved, [_go_to(point)], solve_further)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis import ik
+from brachis.common import tolerances
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import BrachisError, PathError, PlanningError, Remedy
 from brachis.limits import Limit, Moments
@@ -164,7 +165,9 @@ def _exist(q: np.ndarray) -> np.ndarray:
 
 def _are_within(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Tell which postures, (..., n), are within the joint ranges, (...,) bool."""
-    return np.asarray(_exist(q) & (_excess(robot, q) <= 1e-9).all(axis=-1))
+    return np.asarray(
+        _exist(q) & (_excess(robot, q) <= tolerances.COORDINATE).all(axis=-1)
+    )
 
 
 def _excess(robot: Robot, q: np.ndarray) -> np.ndarray:

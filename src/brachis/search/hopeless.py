@@ -6,7 +6,7 @@ does; and the speed that it has there is what could be asked for. A redundant ro
 those that are known: only what is far from possible is refused before a plan is tried.
 
 A tool speed v along a path with the slope z = |dx/ds| asks for ds/dt = v / z and d2s/dt2 = -(dz/ds / z) (ds/dt)^2. A
-limit a u + b x + c (`Limit.lines`) then bounds v^2 at every place: which one does, and where, is named.
+limit a u + b x + c (`HasPhasePlaneRows`) then bounds v^2 at every place: which one does, and where, is named.
 
 Limits on the jerk are unknown to the phase plane. What they leave is known from the plan without the least speed.
 Friction is unknown to it too: it helps to brake, so that with friction a part near the path's end may be passed faster.

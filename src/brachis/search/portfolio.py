@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.common import interrupts
+from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError, write_count
@@ -30,7 +30,6 @@ from brachis.optimise.backends import SolveStatus
 from brachis.optimise.candidate import Candidate, InitialGuess, coordinates
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import candidates
-from brachis.search.candidates import WORTH_IT
 from brachis.search.failure import (
     Failure,
     explain_first_failures,
@@ -360,8 +359,8 @@ class Search:
         both = candidate, best
         if all(each.keeps_knots and each.in_chart for each in both):
             # What else they gain, both gain.
-            return candidate.coarse < (1.0 - WORTH_IT) * best.coarse
-        return candidate.coarse * self._gain < (1.0 - WORTH_IT) * best.t_end
+            return candidate.coarse < (1.0 - tolerances.GAIN) * best.coarse
+        return candidate.coarse * self._gain < (1.0 - tolerances.GAIN) * best.t_end
 
     def _finish(self, number: int, candidate: Candidate) -> None:
         """Put down what became of a candidate, and keep the best one."""
@@ -411,12 +410,12 @@ def round_end_time(time: float) -> float:
 def is_same_motion(first: Candidate, second: Candidate) -> bool:
     """Tell whether a solved candidate is the same motion as another, and not faster."""
     # Splines of different measures of self-motion have different end times for the same motion.
-    slower = 3e-3 if first.in_chart else 1e-4
+    slower = 3e-3 if first.in_chart else tolerances.END_TIME
     difference = first.coarse / second.coarse - 1.0
     if (
         first.redundant_joints != second.redundant_joints
         or first.branch != second.branch
-        or not -WORTH_IT <= difference <= slower
+        or not -tolerances.GAIN <= difference <= slower
     ):
         return False
     postures = []

@@ -80,7 +80,7 @@ def try_remedies(
             found = _try_numbers(remedy, is_enough, own)
         except KeyboardInterrupt:
             interrupts.clear()
-            return
+            break
         if found:
             advice.append(f"{remedy.verb} {remedy.key} to {found}")
     # One number alone may not be enough.

@@ -47,12 +47,14 @@ from brachis.errors import MissingAttributeError
 REFUSED = "brachis_refused"
 """Error type of a value that a validator of ours refuses; see `refuse`."""
 WRONG_FORM = "brachis_form"
-"""Error type of a value that has none of a union's forms; see `by_form`."""
+"""Error type of a value that has none of a union's forms; see `ByForm`."""
 WRONG_KEYS = "brachis_keys"
-"""Error type of a mapping whose keys do not select one member of a union; see `by_key`."""
+"""Error type of a mapping whose keys do not select one member of a union; see `ByKey`."""
 
+LEAST = 1e-6
+"""Least limit of torque, velocity, acceleration or their rates, in SI units."""
 LARGEST = 1e12
-"""Of a coordinate or angle: beyond it squares and differences lose their meaning or overflow."""
+"""Largest coordinate, angle or limit, in SI units: products and squares of larger numbers may overflow."""
 
 
 class Model(BaseModel):

@@ -27,6 +27,8 @@ from pydantic import (
 
 from brachis.errors import write_count
 from brachis.task.fields import (
+    LARGEST,
+    LEAST,
     ByForm,
     Model,
     Name,
@@ -167,9 +169,7 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
             object.__setattr__(self, each.name, value)
 
 
-_SPEED = {"ge": 1e-6, "le": 1e12}
-
-Speed = Annotated[Positive, Field(**_SPEED)]
+Speed = Annotated[Positive, Field(ge=LEAST, le=LARGEST)]
 _PathCoordinates = Annotated[
     tuple[Annotated[Number, Field(ge=0.0, le=1.0)], ...], BeforeValidator(plain)
 ]

@@ -53,19 +53,19 @@ JointOrder = Annotated[
         description="With task_space: joints, the joint of each coordinate; null: in the order of the chain."
     ),
 ]
-_SMOOTH = 3
+SMOOTHNESS = 3
 """Derivatives that a path must have."""
 
 
 class BSplineCurve(Model):
     """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` makes one of a curve."""
 
-    degree: Annotated[Count, Field(ge=_SMOOTH + 1, le=15)] = 5
+    degree: Annotated[Count, Field(ge=SMOOTHNESS + 1, le=15)] = 5
     """Degree."""
     knots: Vector
     """Knots, ascending: the first and the last one degree + 1 times, others up to degree - 3 times; in m along the
     curve, where blends and speeds are to be so."""
-    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 2)]
+    control_points: Annotated[tuple[Vector, ...], Field(min_length=SMOOTHNESS + 2)]
     """Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or x, y, z, qw, qx,
     qy, qz, whose orientation is that of the quaternion divided by its length."""
     relative: Flag = False
@@ -96,7 +96,7 @@ class BSplineCurve(Model):
             )
         ends = (knots[0], knots[-1])
         clamped = ends == (knots[outer - 1], knots[-outer]) and ends[0] < ends[1]
-        allowed = self.degree - _SMOOTH
+        allowed = self.degree - SMOOTHNESS
         often = [
             count
             for knot, count in Counter(knots).items()

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import UNITS
 from brachis.trajectory import CONTINUOUS_TORQUE
 from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
-
-_WRITTEN = 1e-6
-"""Rounding of postures in tasks, m or rad, which are written with so many digits."""
 
 
 def check_progress(given: Given) -> list[Check]:
@@ -89,7 +87,7 @@ def _check_speed(given: Given, name: str, wanted: float, time: float) -> list[Ch
     jacobian = task_map.jacobian(task_map.twists(trajectory.position(time)[None]))[0]
     position, angle = task_map.norms(jacobian @ trajectory.velocity(time))
     per_s, _ = task_map.norms(given.path.sample(trajectory.path_spline([time])).xi)
-    moves = float(per_s[0]) > _WRITTEN
+    moves = float(per_s[0]) > tolerances.WRITTEN
     unit = "m/s" if moves else "rad/s"
     off = abs(float(position if moves else angle) - wanted)
     allowed = given.options.rest_velocity_tolerance * (1.0 + wanted)
@@ -112,7 +110,7 @@ def _check_speed(given: Given, name: str, wanted: float, time: float) -> list[Ch
 def _move_onto(given: np.ndarray, task_map: TaskMap, target: np.ndarray) -> np.ndarray:
     """Return the posture nearest to a given one, (n,), whose tool is at the target, (1, c), within rounding of it."""
     miss = task_map.difference(target, task_map.values(given[None]))[0]
-    if np.abs(miss).max(initial=0.0) > _WRITTEN:
+    if np.abs(miss).max(initial=0.0) > tolerances.WRITTEN:
         return given
     jacobian = task_map.jacobian(task_map.twists(given[None]))[0]
     return np.asarray(given + np.linalg.lstsq(jacobian, miss, rcond=None)[0])

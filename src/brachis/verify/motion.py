@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.path import Path
 from brachis.robot import Robot, TaskMap
 from brachis.task import Task
@@ -249,5 +250,5 @@ class Given:
         """Return the same with only the states in a part of the path, its ends included."""
         more = self.with_states_at(np.array([begin, end]))
         s = more.states.s
-        inside = (s >= begin - 1e-9) & (s <= end + 1e-9)
+        inside = (s >= begin - tolerances.PATH) & (s <= end + tolerances.PATH)
         return replace(more, states=more.states.only(inside))

@@ -274,17 +274,13 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     assert (tmp_path / "out/unverified.npz").exists()
     data = json.loads(outcome.out)
     assert data["interrupted"]
-    assert (
-        data["undone"][-1]
-        == "what search.effort asks for was not tried to its end"
-    )
+    assert data["undone"][-1] == "what search.effort asks for was not tried to its end"
     assert (
         "brachis: the search was ended early; this is the best motion so far\n"
         in outcome.err
     )
     assert all(
-        f"brachis: not completed: {each}\n" in outcome.err
-        for each in data["undone"]
+        f"brachis: not completed: {each}\n" in outcome.err for each in data["undone"]
     )
 
 
