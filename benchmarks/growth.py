@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 
 from brachis import LimitSpec, Robot, load_task, transcribe
-from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.guess import starting_point
 from brachis.search.differential_ik import differential_ik_paths
 from committed import save
@@ -63,7 +63,7 @@ def main() -> None:
             counts = program.phases[0].evaluations
             before = counts["states"]
             began = sum(os.times()[:4])
-            report = solver_named(name)[0].solve(
+            report = solvers_for(name)[0].solve(
                 program, x, SolverOptions(time_limit=120.0), None
             )
             took = (

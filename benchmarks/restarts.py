@@ -22,7 +22,7 @@ import numpy as np
 import mixed_cases
 from brachis import plan
 from brachis.errors import BrachisError
-from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import PlausibilityWarning
@@ -102,7 +102,7 @@ def main() -> None:
             else random_joint_path(rng, problem, case.joint_path)
         )
         x = program.starting_point(joint_path, rng.uniform(1.0, 3.0))
-        report = solver_named("ipopt")[0].solve(
+        report = solvers_for("ipopt")[0].solve(
             program, x, SolverOptions(max_iterations=1000, time_limit=60.0), None
         )
         status = report.status.name.lower()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from brachis import plan, transcribe
-from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.guess import starting_point
 from brachis.search.differential_ik import differential_ik_paths
 
@@ -29,7 +29,7 @@ def test_plan_solved_once(benchmark, robot, make_task, joint):
 
     def solve():
         program, _ = transcribe(robot, task)
-        return solver_named("uno")[0].solve(
+        return solvers_for("uno")[0].solve(
             program, first_point(program), SolverOptions(), None
         )
 

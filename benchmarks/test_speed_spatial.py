@@ -13,7 +13,7 @@ import pytest
 
 from brachis import Robot, ik, load_task, plan, transcribe
 from brachis.ik.eaik import eaik
-from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.guess import starting_point
 from brachis.robot import task_map_of
 from brachis.search.differential_ik import differential_ik_paths
@@ -44,7 +44,7 @@ def test_plan_solved_once(benchmark, tx90l, task):
 
     def solve():
         program, _ = transcribe(tx90l, task)
-        return solver_named("uno")[0].solve(
+        return solvers_for("uno")[0].solve(
             program, first_point(program), SolverOptions(), None
         )
 

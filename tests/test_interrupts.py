@@ -19,7 +19,7 @@ def presses(monkeypatch):
     before = signal.getsignal(signal.SIGINT)
     monkeypatch.setattr(sys, "unraisablehook", lambda _unraisable: None)
     interrupts.install()
-    yield interrupts.presses()
+    yield interrupts.sigint_handler()
     signal.signal(signal.SIGINT, before)
 
 

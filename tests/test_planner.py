@@ -12,7 +12,7 @@ import pytest
 
 import brachis
 from brachis.errors import StartError
-from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
+from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.search.candidates import MARGINS, solve_by_margin_continuation
 from support.effort import QUICK
@@ -42,7 +42,7 @@ def robot(torque: float = 10.0, **options) -> brachis.Robot:
 
 
 def solve_with_uno(program, x):
-    return solver_named("uno")[0].solve(program, x, SolverOptions(), None)
+    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
@@ -99,7 +99,7 @@ def test_margins_that_change_nothing_are_not_solved_again():
 
     def fail(tried, x):
         solves.append(tried)
-        return solver_named("uno")[0].solve(
+        return solvers_for("uno")[0].solve(
             tried, x, SolverOptions(max_iterations=1), None
         )
 
@@ -188,7 +188,7 @@ def test_ctrl_c_reaches_the_user(name):
         robot(), brachis.load_task(task(spline={"intervals": 60}))
     )
     x = next(starting_points(program))
-    solver = solver_named(name)[0]
+    solver = solvers_for(name)[0]
     handler = signal.getsignal(signal.SIGINT)
     iterations = []
 

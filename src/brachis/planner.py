@@ -39,7 +39,7 @@ from brachis.robot.plausibility import report_issues
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
 from brachis.search import Search, first_map, try_remedies
-from brachis.search.processes import each, ignore, processes
+from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
 from brachis.trajectory import Motion, motion_of
 
@@ -348,11 +348,11 @@ def plan_many(
         )
     check_keywords(keywords, "plan_many", ("jobs", "progress"))
     given = list(tasks)
-    work = each(
+    work = run_in_processes(
         _plan_one,
         given,
         keywords,
-        jobs=processes(count(jobs, "jobs")),
+        jobs=process_count(count(jobs, "jobs")),
         listener=ignore,
     )
     outcomes: list[Outcome] = []

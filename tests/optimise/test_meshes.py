@@ -11,7 +11,7 @@ import pytest
 import brachis
 from brachis.common.deadline import NEVER, Deadline
 from brachis.optimise import mesh
-from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
+from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.mesh import (
     adapt_mesh,
@@ -51,7 +51,7 @@ def robot() -> brachis.Robot:
 
 
 def solve(program, x):
-    return solver_named("uno")[0].solve(program, x, SolverOptions(), None)
+    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from brachis.common.deadline import NEVER
 from brachis.kinematics import DirectJointMap
 from brachis.limits import Role
 from brachis.limits.joint import PositionLimit, TorqueLimit
-from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
+from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.boundary import Boundary
 from brachis.optimise.bspline import clamped_uniform_knots, spread
 from brachis.optimise.grid import FixedGrid
@@ -84,7 +84,7 @@ def first_point(program, stop=0.5):
 
 
 def solve(program, x):
-    return solver_named("uno")[0].solve(program, x, SolverOptions(), None)
+    return solvers_for("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 def bang_bang(*distances):
@@ -94,7 +94,7 @@ def bang_bang(*distances):
 @pytest.mark.parametrize("solver", ["uno", "ipopt", "slsqp"])
 def test_a_given_stop(solver):
     program = two_moves()
-    report = solver_named(solver)[0].solve(
+    report = solvers_for(solver)[0].solve(
         program, first_point(program), SolverOptions(), None
     )
     assert report.status is SolveStatus.OPTIMAL

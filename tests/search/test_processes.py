@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from brachis.errors import BrachisError
-from brachis.search.processes import each
+from brachis.search.processes import run_in_processes
 
 
 class Unsendable:
@@ -20,8 +20,12 @@ def length(item, _listener):
 
 
 def test_work_that_cannot_be_sent_is_said_so():
-    assert list(each(length, ["a", "bc"], jobs=2, listener=print)) == [1, 2]
+    assert list(run_in_processes(length, ["a", "bc"], jobs=2, listener=print)) == [1, 2]
     with pytest.raises(
         BrachisError, match=r"other processes cannot do the work; .*jobs: 1"
     ):
-        list(each(length, [Unsendable(), Unsendable()], jobs=2, listener=print))
+        list(
+            run_in_processes(
+                length, [Unsendable(), Unsendable()], jobs=2, listener=print
+            )
+        )

@@ -59,7 +59,7 @@ def install() -> None:
         sys.unraisablehook = _quiet(sys.unraisablehook)
 
 
-def presses() -> SigintHandler:
+def sigint_handler() -> SigintHandler:
     """Return the handler that remembers presses; within another program, for example, one that knows of none."""
     handler = signal.getsignal(signal.SIGINT)
     return handler if isinstance(handler, SigintHandler) else SigintHandler()
@@ -67,13 +67,13 @@ def presses() -> SigintHandler:
 
 def check() -> None:
     """Raise KeyboardInterrupt if a press went unheard."""
-    if presses().pending:
+    if sigint_handler().pending:
         raise KeyboardInterrupt
 
 
 def clear() -> None:
     """Forget a press that was heard."""
-    presses().pending = False
+    sigint_handler().pending = False
 
 
 @contextlib.contextmanager
@@ -82,7 +82,7 @@ def interruptible() -> Iterator[None]:
 
     A press that was swallowed within ends the block with KeyboardInterrupt, whatever came of it otherwise.
     """
-    handler = presses()
+    handler = sigint_handler()
     handler.raising = True
     try:
         check()

@@ -27,7 +27,7 @@ from brachis.optimise.backends import (
     FEASIBLE,
     SolverOptions,
     SolverReport,
-    solver_named,
+    solvers_for,
 )
 from brachis.optimise.candidate import Candidate, refine_and_verify
 from brachis.optimise.program import LeastAcceleration, Program
@@ -195,7 +195,7 @@ def _session(
     name: str, deadline: Deadline, listener: Listener, patience: int
 ) -> SolverSession:
     """Make a session of a backend; any feasible motion will do, however the solve ended."""
-    (backend,) = solver_named(name)
+    (backend,) = solvers_for(name)
     options = SolverOptions(
         tolerance=1e-6,
         max_iterations=20 if name == _FOR_MANY else 60,

@@ -38,7 +38,7 @@ from brachis.kinematics import (
     transversality,
 )
 from brachis.limits.safeguards import MARGIN
-from brachis.optimise.backends import SolverReport, SolveStatus, solver_named
+from brachis.optimise.backends import SolverReport, SolveStatus, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
 from brachis.optimise.guess import fit_curves, shortest_time
 from brachis.optimise.improve import (
@@ -65,7 +65,7 @@ SELECTABLE = 0.05
 def solvers_of(problem: Problem) -> list[str]:
     """Names of the solvers for a problem, the one that is tried first at the front."""
     curved = any(limit.guarantee.is_mean for limit in problem.limits)
-    found = solver_named(problem.task.solver.name, curved=curved)
+    found = solvers_for(problem.task.solver.name, curved=curved)
     return [solver.name for solver in found]
 
 
@@ -172,7 +172,7 @@ def _open_session(
     start: InitialGuess, deadline: Deadline, listener: Listener
 ) -> SolverSession:
     """Open a session of the guess's solver under the task's bounds."""
-    (backend,) = solver_named(start.solver)
+    (backend,) = solvers_for(start.solver)
     settings = start.problem.task.solver
     return SolverSession.for_task(
         backend, settings, start.joint_map, deadline, listener

@@ -39,7 +39,7 @@ from brachis.search.failure import (
 from brachis.search.given_motion import GIVEN, given_guess
 from brachis.search.hopeless import UNLIKELY, explain_holding, explain_speed
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
-from brachis.search.processes import each, ignore, processes
+from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.search.schedule import Batch, batches
 from brachis.trajectory import Trajectory
 
@@ -160,7 +160,7 @@ class Search:
         # No guess may take more than 15 % of the time.
         share = min(0.15, _COARSE_SHARE / max(1, len(batch.starts)))
         seconds = max(_LEAST_SHARE, share * self._problem.task.search.time_limit)
-        work = each(
+        work = run_in_processes(
             _solve_in_time,
             batch.starts,
             limit,
@@ -194,7 +194,7 @@ class Search:
         left = batch.refined
         while self._waiting and self._goes_on(left):
             numbers = self._waiting[:jobs]
-            work = each(
+            work = run_in_processes(
                 candidates.finish_candidate,
                 [self._solved[number] for number in numbers],
                 self._latest,
@@ -289,7 +289,7 @@ class Search:
 
     @property
     def _jobs(self) -> int:
-        return processes(self._problem.task.search.jobs, self._deadline)
+        return process_count(self._problem.task.search.jobs, self._deadline)
 
     @property
     def _latest(self) -> Deadline:

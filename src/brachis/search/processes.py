@@ -25,7 +25,7 @@ _Given = TypeVar("_Given")
 _Made = TypeVar("_Made")
 
 
-def each(
+def run_in_processes(
     function: Callable[..., _Made],
     given: Sequence[_Given],
     *others: object,
@@ -91,7 +91,7 @@ def each(
                 made.close()
 
 
-def processes(jobs: int, deadline: Deadline = NEVER) -> int:
+def process_count(jobs: int, deadline: Deadline = NEVER) -> int:
     """Return the number of processes that is used where a task asks for `jobs`.
 
     Never more than there are processors; only this one if the others would not have started by the deadline.

@@ -22,7 +22,7 @@ from brachis.search.candidates import solvers_of
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import DeadEnd
-from brachis.search.processes import each, processes
+from brachis.search.processes import process_count, run_in_processes
 from brachis.search.starts import (
     SEARCH_LEVELS,
     SearchLevel,
@@ -215,12 +215,12 @@ def _guess_on_some_branches(
         numeric = (numeric_starts(each, most, deadline) for each in decompositions)
         return list(itertools.chain(*numeric)), ()
     deadline = deadline.part(_LATTICE_SHARE)
-    outcomes = each(
+    outcomes = run_in_processes(
         _starts_of,
         decompositions,
         level,
         deadline,
-        jobs=processes(search.jobs, deadline),
+        jobs=process_count(search.jobs, deadline),
         listener=listener,
     )
     ranked: list[tuple[int, InitialGuess]] = []

@@ -17,13 +17,13 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
-from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.search.candidates import solve_in_chart, solvers_of
 from brachis.search.phase_plane import initial_guess
-from brachis.search.processes import each, processes
+from brachis.search.processes import process_count, run_in_processes
 
 _DEGREE = 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few intervals say most."""
@@ -52,10 +52,12 @@ def screen(
     """
     if len(starts) <= most:
         return list(starts)
-    jobs = processes(starts[0].problem.task.search.jobs, deadline)
+    jobs = process_count(starts[0].problem.task.search.jobs, deadline)
     listener(f"solving quickly from {len(starts)} joint paths")
     solved: list[InitialGuess] = []
-    work = each(_solve_quickly, starts, deadline, jobs=jobs, listener=listener)
+    work = run_in_processes(
+        _solve_quickly, starts, deadline, jobs=jobs, listener=listener
+    )
     with closing(work) as outcomes:
         for start in outcomes:
             solved.append(start)
@@ -92,7 +94,7 @@ def _solve_quickly(
         task=task.model_copy(update={"spline": spline}),
         limits=tuple(limit for limit in start.problem.limits if limit.order <= _DEGREE),
     )
-    (backend,) = solver_named(solvers_of(start.problem)[0])
+    (backend,) = solvers_for(solvers_of(start.problem)[0])
     # An answer that nearly holds the limits will do, and so will one that hardly gets any faster.
     options = SolverOptions(1e-3, 25, np.inf, progress=5e-3, patience=3)
     session = SolverSession(backend, options, deadline, acceptable=1e-2)

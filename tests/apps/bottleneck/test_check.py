@@ -12,7 +12,7 @@ import brachis
 from brachis.apps.bottleneck import check, check_sensitivities
 from brachis.apps.bottleneck.sensitivities import sensitivities
 from brachis.errors import InputError
-from brachis.optimise.backends import solver_named
+from brachis.optimise.backends import solvers_for
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[3]
@@ -161,11 +161,11 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
 
         @staticmethod
         def solve(program, x, options, progress):
-            answer = solver_named("uno")[0].solve(program, x, options, progress)
+            answer = solvers_for("uno")[0].solve(program, x, options, progress)
             broken = program.limits != refined.program.limits
             return dataclasses.replace(answer, violation=np.inf) if broken else answer
 
-    monkeypatch.setattr(check, "solver_named", lambda _name, **_order: (Broken,))
+    monkeypatch.setattr(check, "solvers_for", lambda _name, **_order: (Broken,))
     answers = check_sensitivities(refined)
     found = [entry for entry in answers.entries if entry.predicted]
     assert found

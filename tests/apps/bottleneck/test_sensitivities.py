@@ -15,7 +15,7 @@ from brachis.apps.bottleneck.sensitivities import (
     sensitivities,
     sensitivities_at,
 )
-from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solvers_for
 
 from .conftest import FORCE, LENGTH, MASS, X, Z
 
@@ -226,11 +226,11 @@ def test_branch_boundary_is_told_apart(scara):
     refined = scara("j3").candidate.refined
     program, report = refined.program, refined.reports[-1]
     tight = program.with_margin(0.2)
-    answer = solver_named("uno")[0].solve(tight, report.x, SolverOptions(), None)
+    answer = solvers_for("uno")[0].solve(tight, report.x, SolverOptions(), None)
     assert answer.objective > report.objective + 1e-4
     found = sensitivities_at(tight, multipliers_of(tight, answer.x, answer.multipliers))
     (boundary,) = found.boundaries
-    wider = solver_named("uno")[0].solve(
+    wider = solvers_for("uno")[0].solve(
         program.with_margin(0.198), answer.x, SolverOptions(), None
     )
     assert boundary.derivative * 0.002 == pytest.approx(

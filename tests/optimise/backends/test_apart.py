@@ -16,7 +16,7 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolveStatus,
     child_process,
-    solver_named,
+    solvers_for,
     uno,
 )
 from support.programs import disc
@@ -43,7 +43,7 @@ def own_children() -> list[str]:
 
 
 def solve(options=OPTIONS, progress=None, name="uno"):
-    return solver_named(name)[0].solve(disc(), START, options, progress)
+    return solvers_for(name)[0].solve(disc(), START, options, progress)
 
 
 @pytest.mark.parametrize("name", ["uno", "ipopt", "slsqp"])

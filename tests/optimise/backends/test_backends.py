@@ -15,7 +15,7 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolveStatus,
     residual,
-    solver_named,
+    solvers_for,
 )
 from brachis.optimise.backends.monitor import SolveMonitor
 from support.programs import bounded, corner, curved, disc, impossible
@@ -30,7 +30,7 @@ def name(request):
 
 
 def solve(name, problem, x, options=OPTIONS, progress=None):
-    (backend,) = solver_named(name)
+    (backend,) = solvers_for(name)
     return backend.solve(problem, np.array(x, dtype=float), options, progress)
 
 
@@ -72,7 +72,7 @@ def test_optimal_means_that_first_order_conditions_hold(name):
 
 def test_start_is_not_overwritten(name):
     start = np.array([4.0, 0.5])
-    solver_named(name)[0].solve(disc(), start, OPTIONS, None)
+    solvers_for(name)[0].solve(disc(), start, OPTIONS, None)
     np.testing.assert_array_equal(start, [4.0, 0.5])
 
 
@@ -178,11 +178,11 @@ def test_nothing_is_printed(name, make, capfd):
 
 def test_registry():
     assert NAMES == ("auto", "uno", "ipopt", "slsqp")
-    assert [backend.name for backend in solver_named("auto")] == list(AUTO_ORDER)
+    assert [backend.name for backend in solvers_for("auto")] == list(AUTO_ORDER)
     for each in AUTO_ORDER:
-        assert solver_named(each) == (TABLE[each],)
+        assert solvers_for(each) == (TABLE[each],)
     with pytest.raises(UnknownNameError, match="Did you mean 'ipopt'") as caught:
-        solver_named("ipop")
+        solvers_for("ipop")
     assert caught.value.valid == NAMES
 
 

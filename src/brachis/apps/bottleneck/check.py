@@ -32,7 +32,7 @@ from brachis.apps.bottleneck.sensitivities import (
 )
 from brachis.common.summary import Summary
 from brachis.errors import PlanningError, UnreachableError
-from brachis.optimise.backends import SolverOptions, residual, solver_named
+from brachis.optimise.backends import SolverOptions, residual, solvers_for
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 
@@ -288,7 +288,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     """
     answers: list[np.ndarray] = []
     curved = any(limit.guarantee.is_mean for limit in program.limits)
-    for solver in solver_named("auto", curved=curved):
+    for solver in solvers_for("auto", curved=curved):
         try:
             report = solver.solve(program, x, _OPTIONS, None)
         except ImportError:

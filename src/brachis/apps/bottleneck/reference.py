@@ -32,7 +32,7 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolverReport,
     SolveStatus,
-    solver_named,
+    solvers_for,
 )
 from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
@@ -176,7 +176,7 @@ def _plan_on_mesh(
         options = SolverOptions(max_iterations=200, time_limit=seconds)
         return backend.solve(program, x, options, None)
 
-    backends = solver_named("auto")[:2]
+    backends = solvers_for("auto")[:2]
     for backend in reversed(backends) if phase.degree == _PARABOLAS else backends:
         solve = partial(solve_with, backend)
         try:

@@ -53,7 +53,7 @@ from brachis.kinematics import (
     chart_around,
 )
 from brachis.limits import Role
-from brachis.optimise.backends import solver_named
+from brachis.optimise.backends import solvers_for
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase import Motion
 from brachis.optimise.program import Program
@@ -102,7 +102,7 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
         program, x = _problem(trajectory)
         joint_map = program.phases[0].joint_map
         curved = any(limit.guarantee.is_mean for limit in program.limits)
-        for backend in solver_named(task.solver.name, curved=curved):
+        for backend in solvers_for(task.solver.name, curved=curved):
             if deadline.passed:
                 break
             solve = SolverSession.for_task(

@@ -254,7 +254,7 @@ def task_space_of(text: str | None) -> str | list[str] | None:
     return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
-def changed_task(
+def load_changed_task(
     path: Path, changes: Sequence[str] | None, *, strict: bool | None = None
 ) -> Task:
     """Load a task file with keys set as in ``spline.intervals=40``, and with ``strict`` if it is given.

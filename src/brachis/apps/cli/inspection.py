@@ -17,7 +17,7 @@ from brachis.apps.cli.app import (
     Degrees,
     Json,
     ToolFrame,
-    changed_task,
+    load_changed_task,
     task_space_of,
     urdf_of,
 )
@@ -101,7 +101,7 @@ def inspect(
                     where=option,
                     hint=f"Leave the option away, and {hint}; or inspect the URDF",
                 )
-        task = changed_task(source, changes)
+        task = load_changed_task(source, changes)
         robot = robot_from_settings(task.robot)
         space = space or task.task_space
     else:

@@ -16,7 +16,7 @@ from brachis.apps.cli.app import (
     Json,
     Strict,
     Urdf,
-    changed_task,
+    load_changed_task,
     motion_file,
     urdf_of,
 )
@@ -108,7 +108,7 @@ def _plan_task(
     strict: bool | None,
     listener: Listener,
 ) -> Result:
-    changed = changed_task(task, changes, strict=strict)
+    changed = load_changed_task(task, changes, strict=strict)
     return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
 
 

@@ -190,7 +190,7 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class RecoveredPath:
     """A path, and where on it a motion is.
 
     Attributes
@@ -209,7 +209,7 @@ class Followed:
     miss: float
 
 
-def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Followed:
+def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> RecoveredPath:
     """Recover the path that a motion prescribes in a task space, within a tolerance, m and rad.
 
     Raises
@@ -261,7 +261,7 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Followed:
     path = build_path(segments, values[0], task_map.rows)
     s = _nearest(task_map, path, values, length / length[-1])
     miss = np.max(task_map.norms(task_map.difference(values, path.sample(s).target)))
-    return Followed(tuple(segments), t, s, float(miss))
+    return RecoveredPath(tuple(segments), t, s, float(miss))
 
 
 def _tool_speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
@@ -370,7 +370,7 @@ def _deviations(
 
 
 def _notes(
-    recording: Recording, nodes: Nodes, followed: Followed, tolerance: float
+    recording: Recording, nodes: Nodes, followed: RecoveredPath, tolerance: float
 ) -> tuple[str, ...]:
     h = 1e3 * float(np.median(np.diff(recording.t)))
     return (

@@ -24,7 +24,7 @@ __all__ = [
     "SolverOptions",
     "SolverReport",
     "residual",
-    "solver_named",
+    "solvers_for",
 ]
 TABLE = {
     backend.NAME: Solver(backend.NAME, backend.run) for backend in (uno, ipopt, slsqp)
@@ -36,7 +36,7 @@ CURVED_ORDER = ("slsqp", "uno", "ipopt")
 NAMES = ("auto", *TABLE)
 
 
-def solver_named(name: str, *, curved: bool = False) -> tuple[Solver, ...]:
+def solvers_for(name: str, *, curved: bool = False) -> tuple[Solver, ...]:
     """Backends to try for a name, in order: one, or all for ``auto``.
 
     Parameters
