@@ -52,7 +52,7 @@ from brachis.task import LIMIT_KINDS, Task
 Build = Callable[[Robot, Task], Limit | None]
 """Makes the limit of a kind for a task on a robot; None where nothing is limited."""
 
-_BEHIND: dict[str, dict[str, Build]] = {
+_AFTER: dict[str, dict[str, Build]] = {
     "position": {
         "tool_speed": build_tool_speed,
         "tool_acceleration": build_tool_acceleration,
@@ -66,10 +66,10 @@ _BEHIND: dict[str, dict[str, Build]] = {
     },
 }
 TABLE: dict[str, Build] = {}
-"""By kind, in the order in which limits are built: joint limits, with the others behind some of them."""
+"""By kind, in the order of the rows of the program: a joint limit, then those that `_AFTER` lists for it."""
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_LIMITS[_kind].build
-    TABLE |= _BEHIND.get(_kind, {})
+    TABLE |= _AFTER.get(_kind, {})
 
 
 def limits_of(

@@ -23,7 +23,7 @@ from brachis.verify.limits.tool import TOOL_CHECKS
 from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
 
-_BEHIND: dict[str, dict[str, LimitCheck]] = {
+_AFTER: dict[str, dict[str, LimitCheck]] = {
     "position": TOOL_CHECKS,
     "power": {
         "total_power": worst_total_power,
@@ -31,10 +31,10 @@ _BEHIND: dict[str, dict[str, LimitCheck]] = {
     },
 }
 TABLE: dict[str, LimitCheck] = {}
-"""By kind, in the order in which limits are checked: joint limits, with the others behind some of them."""
+"""By kind, in the order of the checks: a joint limit, then those that `_AFTER` lists for it."""
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_CHECKS[_kind]
-    TABLE |= _BEHIND.get(_kind, {})
+    TABLE |= _AFTER.get(_kind, {})
 
 
 def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]:
