@@ -160,6 +160,11 @@ def _positions(
         )
 
 
+def of_posture(robot: Robot, key: str, q: np.ndarray) -> tuple[Issue, ...]:
+    """Look at a posture, (n,)."""
+    return tuple(find_issues(_positions(robot, key, q, may_wind=False)))
+
+
 def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
     """Look at a motion's end time, s, beside the `least` that the planner allows, s."""
     if t_end > 1.01 * least:

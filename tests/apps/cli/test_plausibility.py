@@ -86,3 +86,11 @@ def test_inspect_shows_them_as_remarks(run, tmp_path):
         "warning" in remark
         for remark in json.loads(run("inspect", SCARA, "--json").out)["remarks"]
     )
+
+
+def test_a_posture_in_degrees_is_warned_of(run):
+    outcome = run("inspect", "scara3", "--posture", "30, -120, 120")
+    assert outcome.code == 0
+    assert (
+        "--posture.j2: the position looks like degrees; found -120 rad" in outcome.out
+    )

@@ -333,7 +333,7 @@ def _draw(make: Drawing, path: Path) -> None:
 def exit_code(verified: bool, failures: Iterable[InputError]) -> int:
     """Print which figures could not be written, and return the exit code of a motion."""
     code = 0
-    for failure in failures:
-        print_error(f"the result is written, this figure is not: {failure}")
+    for reason in dict.fromkeys(map(str, failures)):
+        print_error(f"the result is written, its figures are not: {reason}")
         code = 3
     return code if verified else 1

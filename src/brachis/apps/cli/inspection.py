@@ -26,6 +26,8 @@ from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
 from brachis.errors import InputError, write_count
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from brachis import ik
     from brachis.robot import Robot
     from brachis.task import FitReport, Task
@@ -80,7 +82,7 @@ def inspect(
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
     from brachis.limits import describe_guarantees, joint_limits_of, limits_of
-    from brachis.problem.plausibility import of_robot
+    from brachis.problem.plausibility import of_posture, of_robot
     from brachis.robot import bind
     from brachis.robot.from_task import in_use, robot_from_settings
 
@@ -120,7 +122,9 @@ def inspect(
     if missing := ik.missing_eaik(candidates):
         remarks.append(missing)
     if posture is not None:
-        remarks.append(_tool_pose(robot, posture))
+        q = _read_posture(robot, posture)
+        remarks += [f"warning: {each}" for each in of_posture(robot, "--posture", q)]
+        remarks.append(_tool_pose(robot, q))
     limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     data = {
         "robot": str(source),
@@ -351,10 +355,8 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
         print_lines(f"  ... and {more} more, which --json lists")
 
 
-def _tool_pose(robot: Robot, text: str) -> str:
-    """Say where the tool is at a posture given as numbers, in the form of ``path_start`` in a task of poses."""
-    import pinocchio as pin
-
+def _read_posture(robot: Robot, text: str) -> np.ndarray:
+    """Read the numbers of a posture, (n,)."""
     try:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
@@ -364,7 +366,14 @@ def _tool_pose(robot: Robot, text: str) -> str:
             found=text,
             allowed="numbers, rad or m",
         ) from error
-    placement = robot.tool_placement(robot.posture(values, "--posture"))
+    return robot.posture(values, "--posture")
+
+
+def _tool_pose(robot: Robot, q: np.ndarray) -> str:
+    """Say where the tool is in a posture, (n,), in the form of ``path_start`` in a task of poses."""
+    import pinocchio as pin
+
+    placement = robot.tool_placement(q)
     x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
     position = ", ".join(f"{value:.9g}" for value in (x, y, z))
     turn = ", ".join(f"{value:.9g}" for value in (qw, qx, qy, qz))

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from brachis.apps.bottleneck.saturation import dense_samples
+from brachis.apps.export.rows import require_library
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import draw_holding, lines_of
 from brachis.apps.plots.postures import (
@@ -175,12 +176,11 @@ def film_of(
 
 def write_gif(film: Film, stream: BinaryIO) -> None:
     """Write a film that is shown again and again; the last picture stands for 1 s."""
-    from PIL import Image
-
-    images = [Image.fromarray(picture) for picture in film.pictures]
+    pillow = require_library("PIL.Image", "a GIF", library="Pillow", extra="plots")
+    images = [pillow.fromarray(picture) for picture in film.pictures]
     palette = images[len(images) // 2].quantize(128)
     first, *others = (
-        image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images
+        image.quantize(palette=palette, dither=pillow.Dither.NONE) for image in images
     )
     first.save(
         stream,
