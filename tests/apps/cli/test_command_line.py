@@ -238,7 +238,7 @@ def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
     outcome = run("plan", write(task))
     assert outcome.code == 1
     assert "Traceback" not in outcome.err
-    assert "fault of brachis; run again with --verbose" in outcome.err
+    assert "bug in brachis; run again with --verbose" in outcome.err
     assert "Traceback" in run("plan", write(task), "--verbose").err
 
 
