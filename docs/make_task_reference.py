@@ -82,34 +82,35 @@ INTRODUCTION = """# Task files
 
 <!-- Made by docs/make_task_reference.py. -->
 
-A task file is YAML. Units are SI. File names are relative to the task file. Unknown keys are errors. Editors can complete
-keys: `brachis schema --out task.schema.json` writes a JSON schema; save it next to the task file and begin the task file
-with `# yaml-language-server: $schema=task.schema.json`.
+A task file is YAML. Units are SI. File names are relative to the task file. Unknown keys are errors. Editors can
+complete keys: `brachis schema --out task.schema.json` writes a JSON schema; save it next to the task file and begin
+the task file with `# yaml-language-server: $schema=task.schema.json`.
 
-**Limits.** If a key is absent, the URDF's limit holds; `null` removes the limit. A number holds for all joints. A list is
-in chain order. A mapping names joints; the others keep the limits of the URDF. For torque and velocity, lists and mappings
-may contain a pair `[lower, upper]` with lower < 0 < upper instead of a number. All these numbers, also after scaling, must
-lie between 1e-6 and 1e12 in SI units. Ends of position ranges must be within 1e6 rad or m of zero, or open (`null`).
+**Limits.** If a key is absent, the URDF's limit holds; `null` removes the limit. A number holds for all joints. A list
+is in chain order. A mapping names joints; the others keep the limits of the URDF. For torque and velocity, lists and
+mappings may contain a pair `[lower, upper]` with lower < 0 < upper instead of a number. Numbers must be from 1e-6 to
+1e12 in SI units, also after scaling; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
 
-Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`; they then hold at both ends too. With
-`rest: jerk` (degree >= 4) jerk and torque rate are zero at both ends. The torque rate includes that of Coulomb friction,
-so choose a `coulomb_velocity` over which the friction may change.
+Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`; they then hold at both ends too.
+With `rest: jerk` (degree >= 4) jerk and torque rate are zero at both ends. The torque rate includes that of Coulomb
+friction, so choose a `coulomb_velocity` over which the friction may change.
 
-**Friction.** If `viscous` or `coulomb` is absent, `damping` or `friction` of the URDF's `<dynamics>` holds. `null` switches
-them off.
+**Friction.** If `viscous` or `coulomb` is absent, `damping` or `friction` of the URDF's `<dynamics>` holds. `null`
+switches them off.
 
-**Payload, tool offset, mounting** change the robot without a change of the URDF. The tool offset and the payload's `com`
-and `inertia` are in the URDF's tool frame; mounting and gravity are in the world frame.
+**Frames.** The tool offset and the payload's `com` and `inertia` are in the URDF's tool frame; mounting and gravity
+are in the world frame. The URDF itself does not change.
 
-A plan prints the values in use. They are also in its JSON, under `in_use`, and in the saved motion. `brachis inspect
+A plan prints the values in use; they are also in the saved motion and, under `in_use`, in the JSON. `brachis inspect
 task.yaml` shows them without planning.
 
-**A `Robot` in Python.** `brachis.plan(robot, task)` uses the robot in place of the `urdf` key and adds the settings of the
-task's `robot` part. A setting that contradicts the robot is an error that names its key.
+**A `Robot` in Python.** `brachis.plan(robot, task)` uses the robot in place of the `urdf` key and adds the settings of
+the task's `robot` part. A setting that contradicts the robot is an error that names its key.
 
-**`torque_speed`** is a curve at the joint, not at the motor. It is the same for driving and braking; if a drive brakes with
-more torque, the plan is too cautious. An example: a data sheet gives 1.27 N m at 3000 rpm, and 4500 rpm without load. The
-gear is 1:50 with an efficiency of 0.8. Then speed = rpm * 2 pi / 60 / ratio, torque = torque * ratio * efficiency, and
+**`torque_speed`** is a curve at the joint, not at the motor. It is the same for driving and braking; for a drive that
+brakes with more torque the plan is too cautious. Example: a data sheet gives 1.27 N m at 3000 rpm, and 4500 rpm
+without load; the gear is 1:50 with efficiency 0.8. With speed = rpm * 2 pi / 60 / ratio and torque = torque * ratio *
+efficiency:
 
 ```yaml
 robot:
@@ -118,8 +119,8 @@ robot:
       j1: [[0, 50.8], [6.28, 50.8], [9.42, 0]]   # rad/s, N m: 3000 and 4500 rpm behind 1:50
 ```
 
-**Implausible figures** are degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors above 10, or an end
-time at the planner's lower bound. They cause warnings on standard error, in `warnings` of the JSON and in
+**Implausible figures** are degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors above 10, or an
+end time at the planner's lower bound. They cause warnings on standard error, in `warnings` of the JSON and in
 `result.warnings`. A start posture that looks like degrees is an error. `strict: true` (`--strict`, `brachis.plan(...,
 strict=True)`) makes all of them errors, `strict: false` (`--no-strict`) all of them warnings.
 """
@@ -127,11 +128,11 @@ strict=True)`) makes all of them errors, `strict: false` (`--no-strict`) all of 
 LIMITS_FILE = """
 ## Limits files
 
-`robot.limits_file` names a YAML file of joint limits. An example is `robots/panda_limits.yaml` with the published figures
-of the Franka Emika Panda. `robot.limits` of the task comes before the file, and the file before the URDF. If the task names
-joints, this holds for each joint. The file may contain joints of the URDF that do not move (locked, or not on the chain to
-the tool); their limits have no effect. The file is read with the task, so a saved task does not need it. In Python,
-`brachis.read_limits(path)` returns a `LimitSpec`.
+`robot.limits_file` names a YAML file of joint limits. An example is `robots/panda_limits.yaml` with the published
+figures of the Franka Emika Panda. `robot.limits` of the task comes before the file, and the file before the URDF. If
+the task names joints, this holds for each joint. Limits of joints that do not move (locked, or not on the chain to the
+tool) have no effect. A saved task does not need the file. In Python, `brachis.read_limits(path)` returns a
+`LimitSpec`.
 
 **`joint_limits.yaml`** of MoveIt, ros2_control and Universal Robots can be used unchanged, also with `!degrees` and
 `!radians`:
@@ -151,11 +152,11 @@ joint_limits:
     max_effort: 330.0              # N m
 ```
 
-`has_..._limits: false` removes a limit, also that of the URDF. Limits that are not in the file come from the URDF. Every
-joint that moves the tool needs an entry in the file or in the task's `robot.limits`. `default_velocity_scaling_factor` and
-`default_acceleration_scaling_factor` are used as `limits.scale`. MoveIt's Setup Assistant sets them to 0.1; with
-`robot.limits.scale: {velocity: 1, acceleration: 1}` the task uses the full limits. Files of Universal Robots may omit
-`_joint` at the end of joint names.
+`has_..._limits: false` removes a limit, also that of the URDF. Limits that are not in the file come from the URDF.
+Every joint that moves the tool needs an entry in the file or in the task's `robot.limits`.
+`default_velocity_scaling_factor` and `default_acceleration_scaling_factor` are used as `limits.scale`. MoveIt's Setup
+Assistant sets them to 0.1; with `robot.limits.scale: {velocity: 1, acceleration: 1}` the task uses the full limits.
+Files of Universal Robots may omit `_joint` at the end of joint names.
 
 A limits file in the format of brachis has these keys:
 """
@@ -163,18 +164,18 @@ PATH = """
 ## `path`
 
 A path is a list of segments. Each segment is a mapping with one kind (`line`, `arc`, `circle`, `helix`, `spline`,
-`bspline`, `csv` or `turn`) and, optionally, the keys of the table below. A segment starts at the end of the one before.
-The first one starts at `path_start`, or at the tool's place in the start posture. The path must be smooth up to its third
-derivative; a corner between two segments needs a `blend`.
+`bspline`, `csv` or `turn`) and, optionally, the keys of the table below. A segment starts at the end of the one
+before. The first one starts at `path_start`, at the tool's place in the start posture, or at its first waypoint. The
+path must be smooth up to its third derivative; a corner between two segments needs a `blend`.
 
 Points have all task coordinates: m, and rad for yaw. For poses (`pose`, `pose_free_roll`) these are x, y, z, and
 `orientation` says how the tool turns.
 
-Points are in the world frame, or in one of the `frames`, for example that of a workpiece. Write `path: {frame: workpiece,
-segments: [...]}`, or the key `path_frame` next to `path`. All segments, splines, files of points, directions, orientations
-and `path_start` are then in this frame. If the workpiece moves, only one key changes; a sweep over `frames.workpiece.xyz`
-finds its best place. If the task space has only some of x, y, z, the frame may be rotated only within these coordinates.
-Results, plots and exports are in the world frame.
+Points are in the world frame, or in one of the `frames`, for example that of a workpiece. Write `path: {frame:
+workpiece, segments: [...]}`, or the key `path_frame` next to `path`. All segments, splines, files of points,
+directions, orientations and `path_start` are then in this frame. If the workpiece moves, only one key changes; a sweep
+over `frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be rotated
+only within these coordinates. Results, plots and exports are in the world frame.
 
 ```yaml
 frames:
@@ -195,15 +196,15 @@ With `task_space: joints` points are the positions of all joints, rad (m), in ch
 TURN = """
 ### `turn: {...}`
 
-For poses only: the tool turns on the spot, by `rotate: {...}` or `to: {...}` as described below. A turn can follow another
-turn about the same axis, or about any axis with `profile: smooth`. It cannot follow or precede a segment with a moving
-position.
+For poses only: the tool turns on the spot, by `rotate: {...}` or `to: {...}` as described below. A turn can follow
+another turn about the same axis, or about any axis with `profile: smooth`. It cannot follow or precede a segment with
+a moving position.
 """
 ORIENTATION = """## `orientation`
 
-For poses, every segment except `turn` can have an `orientation`: how the tool turns along the segment. The segment starts
-with the orientation at the end of the one before. Orientations are those of the tool frame in the frame of the path (the
-world or `path_frame`).
+For poses, every segment except `turn` can have an `orientation`: how the tool turns along the segment. The segment
+starts with the orientation at the end of the one before. Orientations are those of the tool frame in the frame of the
+path (the world or `path_frame`).
 
 ```yaml
 task_space: pose
@@ -223,15 +224,14 @@ path:
 | `{to: {...}}` | The tool turns to an orientation about one axis, the shortest way, by less than 180 degrees. |
 | `tangent` or `{tangent: {up: ...}}` | The tool turns with the tangent of the path; see below. |
 
-Position and orientation advance together. With `profile: uniform` the tool turns by the same angle for every metre of the
-path. If the next segment turns differently, the turning rate jumps. Such a jump is refused, like a corner. There are two
-remedies: with `profile: smooth` the rate and its first two derivatives are zero at both ends of the segment; a `blend`
-rounds both position and orientation.
+Position and orientation advance together. With `profile: uniform` the tool turns by the same angle for every metre of
+the path. If the next segment turns differently, the turning rate jumps, which is refused like a corner. Then use
+`profile: smooth` (the rate and its first two derivatives are zero at both ends) or a `blend` (it rounds position and
+orientation).
 
-With `tangent` the tool does not move relative to a frame that moves along the path. Its x axis is the tangent, its y axis
-is up x tangent. So the tool turns about `up` if the path turns, and pitches if the path rises. The tool keeps the
-orientation in this frame that it has at the start of the segment. If the tangent is parallel to `up` (within 1 degree), the
-frame is not defined; give another `up`.
+With `tangent` the tool keeps its orientation in a frame that moves along the path: x along the tangent, y along up x
+tangent. So the tool turns about `up` if the path turns, and pitches if the path rises. If the tangent is parallel to
+`up` (within 1 degree), the frame is not defined; give another `up`.
 
 A spline passes its waypoints with the orientations of `orientations`, one for each waypoint. They do not include the
 orientation at the segment's start. Between waypoints the orientation is smooth up to the third derivative and does not
@@ -246,9 +246,9 @@ path:
       orientations: [{rpy_deg: [0, 0, 20]}, {rpy_deg: [0, 10, 60]}, {quaternion_xyzw: [0, 0, 0.707, 0.707]}]
 ```
 
-Write an orientation in exactly one of the conventions below. brachis does not guess: the key states the order of a
-quaternion's numbers, or the robot maker whose angles are meant. The keys are the same wherever an orientation can be given,
-also in `path_start`. For files of points, `csv.orientation` takes the same names without `_deg`.
+Write an orientation in exactly one of these conventions. brachis guesses none: the key states the order of a
+quaternion's numbers or whose angles are meant. The keys hold for every orientation, also in `path_start`. For files of
+points, `csv.orientation` takes the same names without `_deg`.
 
 | key | meaning |
 |---|---|
@@ -256,39 +256,40 @@ also in `path_start`. For files of points, `csv.orientation` takes the same name
 CSV = """
 ## Files of points
 
-`csv: {file: poses.csv}` is a smooth curve along the points of a file, one point per row. The first line names the columns,
-in any order. Empty lines and lines that begin with `#` are skipped. If the task space is a list of coordinates, they are
-the names of the columns (`x,y`, `x,z,yaw`, ...). For a path of joints the columns have the names of the joints (rad, m);
-`units` and `tolerance` are not allowed there. For poses the columns are
+`csv: {file: poses.csv}` is a smooth curve along the points of a file, one point per row. The first line names the
+columns, in any order. Empty lines and lines that begin with `#` are skipped. If the task space is a list of
+coordinates, they are the names of the columns (`x,y`, `x,z,yaw`, ...). For a path of joints the columns have the names
+of the joints (rad, m); `units` and `tolerance` are not allowed there. For poses the columns are
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
 - `x,y,z,roll,pitch,yaw`, or `x,y,z,w,p,r` (Fanuc): positions and angles;
-- `x,y,z,rx,ry,rz`, `x,y,z,a,b,c` or `x,y,z,q1,q2,q3,q4`: positions and orientations. Their meaning depends on the robot's
-  maker, so `orientation` must state it: `rotation_vector`, `rpy`, `staubli_xyz` or `fanuc_wpr` for `rx,ry,rz`; `kuka_abc`
-  or `rpy` (Mitsubishi) for `a,b,c`; `quaternion_wxyz` (ABB) or `quaternion_xyzw` for `q1` to `q4`.
+- `x,y,z,rx,ry,rz`, `x,y,z,a,b,c` or `x,y,z,q1,q2,q3,q4`: positions and orientations. Their meaning depends on the
+  robot's maker, so `orientation` must state it: `rotation_vector`, `rpy`, `staubli_xyz` or `fanuc_wpr` for `rx,ry,rz`;
+  `kuka_abc` or `rpy` (Mitsubishi) for `a,b,c`; `quaternion_wxyz` (ABB) or `quaternion_xyzw` for `q1` to `q4`.
 
-An extra column `feed` (or `f`, `speed`, `v`) gives the tool's speed on the way to each point. Columns are separated by
-commas, semicolons, tabs or spaces. Numbers may have decimal commas unless commas separate the columns. Units are part of the
-column names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are given by `units`. Lengths without a unit are in m, yaw and
-rotation vectors in rad. Other angles and speeds need a unit. brachis reports how it understood the file.
+An extra column `feed` (or `f`, `speed`, `v`) gives the tool's speed on the way to each point; it needs a `tolerance`.
+Columns are separated by commas, semicolons, tabs or spaces. Numbers may have decimal commas unless commas separate the
+columns. Units are part of the column names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are given by `units`.
+Lengths without a unit are in m, yaw and rotation vectors in rad. Other angles and speeds need a unit. brachis reports
+how it understood the file.
 
 The segment starts at the first point. With `start: free` and without `path_start`, the path begins there too. If the
-segment before ends more than 1e-4 m or rad away, the file is refused. With `relative: true` the points are moved so that
-the first one is at the segment's start. Displacements keep their direction in the path's frame; rotations are in the tool
-frame.
+segment before ends more than 1e-4 m or rad away, the file is refused. With `relative: true` the points are moved so
+that the first one is at the segment's start. Displacements keep their direction in the path's frame; rotations are in
+the tool frame.
 
 **Without a tolerance** the path passes through all points. Two successive points with the same position would stop the
-motion, so the file is refused, unless the position never changes in the file. Points that are rounded or noisy are refused
-if the curvature of a curve through them is only noise; then give a tolerance.
+motion, so the file is refused, unless the position never changes in the file. Points that are rounded or noisy are
+refused if the curvature of a curve through them is only noise; then give a tolerance.
 
-**With a tolerance** the path is a quintic B-spline (C4) with few knots. It passes through the first and the last point, and
-within the tolerance of all others; 100,000 points and more are possible. Repeated points are left out and reported. Spikes
-and changes of unit are refused, with their line. If the distance between two points is more than five times the usual one,
-the path between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within
-`tolerance.corner`; the smaller this tolerance, the slower the robot passes them. An independent formula measures the
-distance of every point from the curve. `brachis inspect TASK` and `brachis plan` print the findings; they are also in
-`result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
+**With a tolerance** the path is a quintic B-spline (C4) with few knots. It passes through the first and last point and
+within the tolerance of all others (100,000 and more). Repeated points are left out and reported. Spikes and changes of
+unit are refused, with their line. If the distance between two points is more than five times the usual one, the path
+between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within `tolerance.corner`;
+the smaller this tolerance, the slower the robot passes them. An independent formula measures the distance of every
+point from the curve. `brachis inspect TASK` and `brachis plan` print the findings; they are also in `result.fits` and
+the JSON. `brachis plot --kind fit` draws the errors.
 
 ```yaml
 start: free
@@ -302,16 +303,16 @@ path:
       corner: blend
 ```
 
-G-code files (`.nc`, `.ngc`, `.gcode`, `.tap`) are read in the same way: G0 to G3 with I, J, K or R, G17 to G21, G90, G91
-and F. The default unit is mm. Words that do not move the tool are skipped and reported. Cycles, cutter compensation and
-rotary axes are refused.
+G-code files (`.nc`, `.ngc`, `.gcode`, `.tap`) are read in the same way: G0 to G3 with I, J, K or R, G17 to G21, G90,
+G91 and F. The default unit is mm. Commands that do not move the tool are skipped and reported. Cycles, cutter
+compensation and rotary axes are refused.
 
-Feed rates are largest speeds of the tool, linear between the first and the last point that has one. They hold in addition
-to those of `tool_limits`.
+Feed rates are largest speeds of the tool, linear between the first and the last point that has one. They hold in
+addition to those of `tool_limits`.
 
-The file is read with the task and becomes one `spline`, or one `bspline` for each section between corners. A saved task no
-longer needs the file. For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments of a path, including the
-first point. It takes positions, 4x4 matrices, SE3 objects, or positions with SciPy's rotations.
+The file is read with the task and becomes one `spline`, or one `bspline` for each section between corners; a saved
+task does not need it. For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments of a path, including
+the first point. It takes positions, 4x4 matrices, SE3 objects, or positions with SciPy's rotations.
 """
 
 
@@ -359,7 +360,11 @@ def page() -> str:
     ]
     parts += ["\n### `rotate: {axis: ..., angle_deg: ...}`\n", *rows(Rotation)]
     profile = Target.model_fields["profile"]
-    parts += ["\n### `to: {...}`\n", "The keys of an orientation as above, and\n", *TABLE_HEAD]
+    parts += [
+        "\n### `to: {...}`\n",
+        "The keys of an orientation as above, and\n",
+        *TABLE_HEAD,
+    ]
     parts += [
         _row("profile", profile),
         "\n### `tangent: {...}`\n",

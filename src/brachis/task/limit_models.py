@@ -147,7 +147,7 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
     N). The first speed is 0, and no torque is above the one before. The limit is linear between points; the last slope
-    continues to zero torque. It is the same in both directions, for driving and braking. Absent or null: none."""
+    continues to zero torque. It holds for both directions, driving and braking. Absent or null: none."""
 
     __pydantic_config__ = Model.model_config
 

@@ -152,8 +152,8 @@ class Task(Model):
     begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
     path_start: PathStart = None
     """Point at which the path begins: a list of all task coordinates (m, yaw in rad). For a pose: {position: [x, y, z],
-    rpy_deg: [...]}, or another orientation convention. Null: the tool's place in the start posture. If both are given,
-    they must agree. With start: free it is required, unless the path begins with a waypoint."""
+    rpy_deg: [...]}, or another orientation convention. Null: the tool's place in the start posture, or the first
+    waypoint. It must agree with a given start posture."""
     end: FreePosture = "free"
     """Configuration at the end of the path: free or {joints: ...}. Its tool must be at the path's end, to 1e-6 m or
     rad; the nearest posture on the path is then used."""
@@ -165,13 +165,11 @@ class Task(Model):
         json_schema_extra=_add_forms_of_paths
     )
     """Segments of the path, in order. A list of points, each with all task coordinates, is the spline through them from
-    the first one on. For a file of points: [{csv: {file: ...}}]. For segments in a frame other than the world: {frame:
-    NAME, segments: [...]}."""
+    the first one on. For a file of points: [{csv: {file: ...}}]. For another frame: {frame: NAME, segments: [...]}."""
     frames: dict[Name, Placement] = Field(default={})
     """Places of frames in the world, such as those of workpieces, by name: {xyz: ..., rpy_deg: ...}."""
     path_frame: Name | None = None
-    """Name of the frame in which path and path_start are given, with all points, directions and orientations. Null: the
-    world."""
+    """Name of the frame of path and path_start, with all their points, directions and orientations. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
@@ -186,18 +184,18 @@ class Task(Model):
     """Label of the branch of the closed form. auto: the branch of the start posture, or all branches with start: free.
     """
     search: SearchSettings = Field(default_factory=SearchSettings)
-    """The search for the fastest motion."""
+    """Search for the fastest motion."""
     spline: SplineSettings = Field(default_factory=SplineSettings)
-    """The B-splines of the motion."""
+    """B-splines of the motion."""
     solver: Annotated[SolverSettings, BeforeValidator(expand_solver_name)] = Field(
         default_factory=SolverSettings, json_schema_extra=or_form({"type": "string"})
     )
-    """The solver: its name or a mapping."""
+    """Solver: its name or a mapping."""
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
-    """The refinement of the collocation points."""
+    """Refinement of the collocation points."""
     strict: bool | None = None
-    """How implausible figures (degrees for rad, mm for m) are treated. true: all are errors. false: all are warnings.
-    null: a start posture that looks like degrees is an error, the others are warnings."""
+    """true: all implausible figures (degrees for rad, mm for m) are errors. false: all are warnings. null: only a start
+    posture that looks like degrees is an error."""
 
     @field_validator("brachis", mode="before")
     @classmethod

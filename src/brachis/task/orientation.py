@@ -38,8 +38,8 @@ Direction = Annotated[
 Profile = Annotated[
     Literal["uniform", "smooth"],
     Field(
-        description="How the angle grows along the segment. uniform: at a constant rate. smooth: the rate starts and "
-        "ends at zero, so that segments with a fixed orientation can follow."
+        description="Rate of the angle along the segment. uniform: constant. smooth: zero at both ends, so that "
+        "segments with a fixed orientation can follow."
     ),
 ]
 
@@ -170,7 +170,7 @@ class Rotation(Model):
     """A rotation about an axis."""
 
     axis: Direction
-    """Axis of the rotation, by the right-hand rule. Its length does not matter, but is not zero."""
+    """Axis of the rotation, right-hand rule; any length except zero."""
     angle_deg: Number
     """Angle of the rotation with its sign, degrees. It may be more than 360."""
     frame: Literal["path", "tool"] = "path"

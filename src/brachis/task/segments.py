@@ -127,14 +127,13 @@ class BSplineCurve(Model):
 Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(
-        description="Yaw along the segment, for task spaces with yaw. fixed: as at the start. tangent: it turns with the tangent."
+        description="Yaw along the segment, for task spaces with yaw: fixed, or turning with the tangent."
     ),
 ]
 Normal = Annotated[
     Direction | None,
     Field(
-        description="Axis of rotation by the right-hand rule, for three position coordinates. Its length does not matter, but is not "
-        "zero."
+        description="Axis of rotation, right-hand rule, for three position coordinates; any length except zero."
     ),
 ]
 Centre = Annotated[
@@ -218,7 +217,7 @@ class HelixTurns(Model):
     pitch: Number
     """Rise of each turn along the normal, m; negative against it."""
     normal: Direction = (0.0, 0.0, 1.0)
-    """Axis of rotation, by the right-hand rule. Its length does not matter, but is not zero."""
+    """Axis of rotation, right-hand rule; any length except zero."""
 
 
 class SplineThrough(Model):

@@ -175,13 +175,12 @@ class RobotSettings(Model):
     """Rigid body fixed to the tool frame. Null: none."""
     limits_file: Name | None = None
     """File of joint limits, relative to the task file's folder, for example MoveIt's joint_limits.yaml. Values in
-    limits override it; a mapping in limits overrides it only for the joints that it names. Null: none."""
+    limits override it, mappings only for the joints that they name. Null: none."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
     speed_override: Annotated[Share, Field(gt=0.0)] = 1.0
-    """Factor on all joint velocity limits, in addition to limits.scale; for example 50 % or 0.5. The motion is planned
-    for these lower limits; it is not the same motion played more slowly. Torque, acceleration and tool limits do not
-    change."""
+    """Factor on all joint velocity limits, in addition to limits.scale; for example 50 % or 0.5. The plan uses these
+    lower limits; it is not the same motion played more slowly. Other limits do not change."""
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     """Drive inertia and friction."""
 
@@ -200,7 +199,7 @@ class SplineSettings(Model):
     """Degree of the splines; 3 gives continuous torque, 4 continuous torque rate."""
     intervals: Intervals = "auto"
     """Number of knot intervals. auto halves the intervals that lose most time, until two rounds together gain less than
-    half the tolerance. A number makes planning faster and the motion slower. knots: free needs a number."""
+    half the tolerance. A number plans faster, for a slower motion; knots: free needs one."""
     tolerance: Positive = Field(default=1.0e-3, le=0.1)
     """With intervals: auto, the accepted loss against very many intervals, as a fraction of the end time t_E."""
     knots: Literal["uniform", "free"] = "uniform"
@@ -247,21 +246,21 @@ class SearchSettings(Model):
     """The search over redundant joints, branches and initial guesses."""
 
     effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
-    """How far the search goes: single, fast, thorough or exhaustive. single plans once, from the most promising guess,
-    and continues like fast only if that fails. thorough and exhaustive add more guesses and take longer."""
+    """How far the search goes: single, fast, thorough or exhaustive. single plans once, from the best guess, and
+    continues like fast only if that fails. The last two use more guesses."""
     guesses: Literal["lattice", "numeric"] = "lattice"
     """Source of the initial guesses: lattice (a lattice of postures) or numeric (inverse kinematics from the start
     posture)."""
     jobs: Count = Field(default=1, ge=1)
     """Number of processes that plan at the same time, limited to the number of processors."""
     time_limit: Positive = Field(default=60.0, le=1e6)
-    """Time after which the best verified motion is returned, s. If no motion is verified by then, the best unverified
-    one is returned, perhaps a second later."""
+    """Time after which the best verified motion is returned, s. If none is verified, an unverified one is returned,
+    perhaps a second later."""
     seed: Count = Field(default=0, ge=0)
     """Seed of the random numbers."""
     least_motion: Flag = True
-    """Whether the smoothest of all equally fast motions is chosen: the one with the least joint accelerations whose end
-    time is within 1e-4 (relative) of the fastest."""
+    """Whether the smoothest motion is chosen: least joint accelerations, with an end time within 1e-4 (relative) of the
+    fastest."""
     slower: Share = 0.0
     """How much slower the smoothest motion may be, for example 1 % or 0.01."""
 
@@ -312,8 +311,8 @@ class BoundarySettings(Model):
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
     """Speed along the path at its start, m/s. It is in rad/s if the tool only turns there; along a path of joints it is
-    the norm of their velocities. If it is not zero, the redundant joints' velocities are free there, and spline.rest:
-    full means that the speed does not change at that instant."""
+    the norm of their velocities. If it is not zero, velocities of redundant joints are free there, and with
+    spline.rest: full the speed begins constant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
     """The same at the path's end."""
     periodic: Flag = False

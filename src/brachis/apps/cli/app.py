@@ -203,8 +203,8 @@ Strict = Annotated[
     bool | None,
     Option(
         "--strict/--no-strict",
-        help="Implausible figures, such as degrees for rad, are errors, or only warnings. Default: a start posture that "
-        "looks like degrees is an error, the others are warnings.",
+        help="Treat implausible figures, such as degrees for rad, as errors or as warnings. Default: only a start "
+        "posture that looks like degrees is an error.",
     ),
 ]
 Changes = Annotated[
@@ -212,11 +212,13 @@ Changes = Annotated[
     Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Change a key of the task, for example spline.intervals=40 or path.0.line.length=0.5. The value is YAML. Repeat "
-        "the option for more keys.",
+        help="Change a key of the task, for example spline.intervals=40 or path.0.line.length=0.5. The value is YAML. "
+        "Repeatable.",
     ),
 ]
-Urdf = Annotated[Path | None, Option(help="URDF file to use instead of the one in the task.")]
+Urdf = Annotated[
+    Path | None, Option(help="URDF file to use instead of the one in the task.")
+]
 ToolFrame = Annotated[str | None, Option(help="Link at the end of the chain.")]
 BaseFrame = Annotated[str | None, Option(help="Link at the start of the chain.")]
 _MOTIONS = ("result.npz", "unverified.npz")

@@ -89,8 +89,8 @@ def export(
     last: Annotated[
         str | None,
         Option(
-            help="Time of the last sample. exact: the end time, even if it is no multiple of the period. hold: the next "
-            "multiple of the period; the end posture is held at rest until then. Default: exact; hold for URScript."
+            help="Time of the last sample. exact: the end time, even if it is not a multiple of the period. hold: the "
+            "next multiple of the period; the end posture is held until then. Default: exact; hold for URScript."
         ),
     ] = None,
     joints: Annotated[
@@ -271,7 +271,10 @@ def schema(
         Path | None, Option(help="File to write instead of standard output.")
     ] = None,
     of: Annotated[
-        str, Option(help="Which schema: task (task files) or trajectory (motions exported as JSON).")
+        str,
+        Option(
+            help="Which schema: task (task files) or trajectory (motions exported as JSON)."
+        ),
     ] = "task",
 ) -> None:
     """Print the JSON schema of tasks, or of exported JSON."""

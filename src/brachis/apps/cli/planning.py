@@ -288,7 +288,9 @@ def sweep(
     ] = None,
     jobs: Annotated[
         int | None,
-        Option(help="Number of processes. Default and maximum: the number of processors."),
+        Option(
+            help="Number of processes. Default and maximum: the number of processors."
+        ),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -296,9 +298,7 @@ def sweep(
             help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file."
         ),
     ] = None,
-    retry: Annotated[
-        bool, Option("--retry", help="Plan failed plans again.")
-    ] = False,
+    retry: Annotated[bool, Option("--retry", help="Plan failed plans again.")] = False,
     json: Json = False,
 ) -> None:
     """Plan a task many times with different values of its keys."""

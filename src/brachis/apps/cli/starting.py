@@ -62,13 +62,11 @@ def _describe_robot(urdf: Path) -> str:
 def new(
     urdf: Annotated[
         Path,
-        Argument(
-            help="URDF file, or the name of an included robot.", metavar="URDF"
-        ),
+        Argument(help="URDF file, or the name of an included robot.", metavar="URDF"),
     ],
-    out: Annotated[Path, Option(help="Task file to write; it must not exist yet.")] = Path(
-        "task.yaml"
-    ),
+    out: Annotated[
+        Path, Option(help="Task file to write; it must not exist yet.")
+    ] = Path("task.yaml"),
     tool_frame: ToolFrame = None,
     base_frame: BaseFrame = None,
     json: Json = False,
@@ -151,7 +149,10 @@ def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
 def compose(
     arm: Annotated[
         Path,
-        Argument(help="URDF file of the arm, or the name of an included robot.", metavar="ARM"),
+        Argument(
+            help="URDF file of the arm, or the name of an included robot.",
+            metavar="ARM",
+        ),
     ],
     travel: Annotated[
         tuple[float, float],
