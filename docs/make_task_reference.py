@@ -92,14 +92,10 @@ mappings may contain a pair `[lower, upper]` with lower < 0 < upper instead of a
 1e12 in SI units, also after scaling; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
 
 Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`; they then hold at both ends too.
-With `rest: jerk` (degree >= 4) jerk and torque rate are zero at both ends. The torque rate includes that of Coulomb
-friction, so choose a `coulomb_velocity` over which the friction may change.
+With `rest: jerk` (degree >= 4) jerk and torque rate are zero at both ends. The torque rate includes the change of
+Coulomb friction; choose a `coulomb_velocity` over which this friction may change.
 
-**Friction.** If `viscous` or `coulomb` is absent, `damping` or `friction` of the URDF's `<dynamics>` holds. `null`
-switches them off.
-
-**Frames.** The tool offset and the payload's `com` and `inertia` are in the URDF's tool frame; mounting and gravity
-are in the world frame. The URDF itself does not change.
+**Friction.** If `viscous` or `coulomb` is absent, the URDF's `<dynamics>` has the value. `null` switches it off.
 
 A plan prints the values in use; they are also in the saved motion and, under `in_use`, in the JSON. `brachis inspect
 task.yaml` shows them without planning.
@@ -172,10 +168,10 @@ Points have all task coordinates: m, and rad for yaw. For poses (`pose`, `pose_f
 `orientation` says how the tool turns.
 
 Points are in the world frame, or in one of the `frames`, for example that of a workpiece. Write `path: {frame:
-workpiece, segments: [...]}`, or the key `path_frame` next to `path`. All segments, splines, files of points,
-directions, orientations and `path_start` are then in this frame. If the workpiece moves, only one key changes; a sweep
-over `frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be rotated
-only within these coordinates. Results, plots and exports are in the world frame.
+workpiece, segments: [...]}`, or the key `path_frame` next to `path`. Segments, files of points, directions,
+orientations and `path_start` are then in this frame. If the workpiece moves, only one key changes; a sweep over
+`frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be rotated only
+within these coordinates. Results, plots and exports are in the world frame.
 
 ```yaml
 frames:
@@ -275,21 +271,20 @@ Lengths without a unit are in m, yaw and rotation vectors in rad. Other angles a
 how it understood the file.
 
 The segment starts at the first point. With `start: free` and without `path_start`, the path begins there too. If the
-segment before ends more than 1e-4 m or rad away, the file is refused. With `relative: true` the points are moved so
-that the first one is at the segment's start. Displacements keep their direction in the path's frame; rotations are in
-the tool frame.
+segment would have to start more than 1e-4 m or rad away from it, the file is refused. With `relative: true` all points
+are moved so that the first one is at the segment's start.
 
-**Without a tolerance** the path passes through all points. Two successive points with the same position would stop the
-motion, so the file is refused, unless the position never changes in the file. Points that are rounded or noisy are
-refused if the curvature of a curve through them is only noise; then give a tolerance.
+**Without a tolerance** the path passes through all points. Two successive points with the same position are refused,
+because the motion would have to stop there. A file in which the position never changes is allowed. Points that are
+rounded or noisy are refused if the curvature of a curve through them is only noise; then give a tolerance.
 
 **With a tolerance** the path is a quintic B-spline (C4) with few knots. It passes through the first and last point and
 within the tolerance of all others (100,000 and more). Repeated points are left out and reported. Spikes and changes of
 unit are refused, with their line. If the distance between two points is more than five times the usual one, the path
-between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within `tolerance.corner`;
-the smaller this tolerance, the slower the robot passes them. An independent formula measures the distance of every
-point from the curve. `brachis inspect TASK` and `brachis plan` print the findings; they are also in `result.fits` and
-the JSON. `brachis plot --kind fit` draws the errors.
+between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within `tolerance.corner`.
+The smaller this tolerance, the slower the robot passes them. A formula that the fit does not use measures the distance
+of every point from the curve. `brachis inspect TASK` and `brachis plan` print the findings; they are also in
+`result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
 
 ```yaml
 start: free
@@ -312,7 +307,7 @@ addition to those of `tool_limits`.
 
 The file is read with the task and becomes one `spline`, or one `bspline` for each section between corners; a saved
 task does not need it. For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments of a path, including
-the first point. It takes positions, 4x4 matrices, SE3 objects, or positions with SciPy's rotations.
+the first point. Points may be positions, 4x4 matrices, SE3 objects, or positions with SciPy's rotations.
 """
 
 

@@ -194,8 +194,8 @@ class Task(Model):
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: bool | None = None
-    """true: all implausible figures (degrees for rad, mm for m) are errors. false: all are warnings. null: only a start
-    posture that looks like degrees is an error."""
+    """true: all implausible figures are errors. false: all are warnings. null: only a start posture that looks like
+    degrees is an error."""
 
     @field_validator("brachis", mode="before")
     @classmethod

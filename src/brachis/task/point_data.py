@@ -100,7 +100,7 @@ class FitTolerance(Model):
     position: Length
     """Largest distance of a point from the path."""
     orientation: Angle = ANGLES["deg"] / 10.0
-    """Largest angle between a given orientation or yaw and that of the path; the default is 0.1 deg."""
+    """Largest angle between a given orientation or yaw and the path's; 0.1 deg by default."""
     corner: Length | None = None
     """Largest distance of a point from the path at a rounded corner. Null: as `position`."""
 

@@ -175,12 +175,12 @@ class RobotSettings(Model):
     """Rigid body fixed to the tool frame. Null: none."""
     limits_file: Name | None = None
     """File of joint limits, relative to the task file's folder, for example MoveIt's joint_limits.yaml. Values in
-    limits override it, mappings only for the joints that they name. Null: none."""
+    limits come first; a mapping there counts only for the joints that it names. Null: none."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
     speed_override: Annotated[Share, Field(gt=0.0)] = 1.0
-    """Factor on all joint velocity limits, in addition to limits.scale; for example 50 % or 0.5. The plan uses these
-    lower limits; it is not the same motion played more slowly. Other limits do not change."""
+    """Factor on all joint velocity limits, in addition to limits.scale; for example 50 % or 0.5. The motion is planned
+    for these lower limits, not played more slowly. Other limits do not change."""
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     """Drive inertia and friction."""
 
@@ -199,7 +199,7 @@ class SplineSettings(Model):
     """Degree of the splines; 3 gives continuous torque, 4 continuous torque rate."""
     intervals: Intervals = "auto"
     """Number of knot intervals. auto halves the intervals that lose most time, until two rounds together gain less than
-    half the tolerance. A number plans faster, for a slower motion; knots: free needs one."""
+    half the tolerance. A number makes planning faster and the motion slower. knots: free needs a number."""
     tolerance: Positive = Field(default=1.0e-3, le=0.1)
     """With intervals: auto, the accepted loss against very many intervals, as a fraction of the end time t_E."""
     knots: Literal["uniform", "free"] = "uniform"
@@ -312,7 +312,7 @@ class BoundarySettings(Model):
     start_speed: NonNegative = Field(default=0.0, le=1e6)
     """Speed along the path at its start, m/s. It is in rad/s if the tool only turns there; along a path of joints it is
     the norm of their velocities. If it is not zero, velocities of redundant joints are free there, and with
-    spline.rest: full the speed begins constant."""
+    spline.rest: full the speed does not change at that instant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
     """The same at the path's end."""
     periodic: Flag = False
