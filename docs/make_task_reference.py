@@ -82,9 +82,9 @@ INTRODUCTION = """# Task files
 
 <!-- Made by docs/make_task_reference.py. -->
 
-A task file is YAML. Units are SI. File names are relative to the task file. Unknown keys are errors. Editors can
-complete keys: `brachis schema --out task.schema.json` writes a JSON schema; save it next to the task file and begin
-the task file with `# yaml-language-server: $schema=task.schema.json`.
+A task file is YAML. Units are SI. File names are relative to the task file. Unknown keys are errors. For completion in
+editors, save a JSON schema next to the task file with `brachis schema --out task.schema.json`, and begin the task file
+with `# yaml-language-server: $schema=task.schema.json`.
 
 **Limits.** If a key is absent, the URDF's limit holds; `null` removes the limit. A number holds for all joints. A list
 is in chain order. A mapping names joints; the others keep the limits of the URDF. For torque and velocity, lists and
@@ -126,9 +126,9 @@ LIMITS_FILE = """
 
 `robot.limits_file` names a YAML file of joint limits. An example is `robots/panda_limits.yaml` with the published
 figures of the Franka Emika Panda. `robot.limits` of the task comes before the file, and the file before the URDF. If
-the task names joints, this holds for each joint. Limits of joints that do not move (locked, or not on the chain to the
-tool) have no effect. A saved task does not need the file. In Python, `brachis.read_limits(path)` returns a
-`LimitSpec`.
+the task names joints, this holds for each joint. Limits of joints that do not move (locked, or off the chain to the
+tool) have no effect. The file is read with the task; a saved task does not need it. In Python,
+`brachis.read_limits(path)` returns a `LimitSpec`.
 
 **`joint_limits.yaml`** of MoveIt, ros2_control and Universal Robots can be used unchanged, also with `!degrees` and
 `!radians`:

@@ -140,7 +140,7 @@ _ROWS = (
     LimitKind(
         "acceleration",
         {"rad": "rad/s^2", "m": "m/s^2"},
-        "Largest acceleration, rad/s^2 (m/s^2). Absent or null: none.",
+        "Largest acceleration, rad/s^2 (m/s^2). Null: none.",
         scale="acceleration limits",
         # Wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2.
         usual=UsualLimit(
@@ -156,27 +156,27 @@ _ROWS = (
     LimitKind(
         "power",
         {"rad": "W", "m": "W"},
-        "Largest mechanical power (torque x speed), drawn or returned, W. Absent or null: none.",
+        "Largest mechanical power (torque x speed), drawn or returned, W. Null: none.",
         scale="power limits, also total_power",
     ),
     LimitKind(
         "rms_torque",
         _TORQUE,
         "Largest root mean square of the torque over the whole motion, N m (force, N); it determines the heat in a "
-        "motor. Absent or null: none.",
+        "motor. Null: none.",
         scale="limits of root-mean-square torques",
         usual=_USUAL_TORQUE,
     ),
     LimitKind(
         "jerk",
         {"rad": "rad/s^3", "m": "m/s^3"},
-        "Largest jerk, rad/s^3 (m/s^3). Absent or null: none.",
+        "Largest jerk, rad/s^3 (m/s^3). Null: none.",
         scale="jerk limits",
     ),
     LimitKind(
         "torque_rate",
         {"rad": "Nm/s", "m": "N/s"},
-        "Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none.",
+        "Largest rate of change of the torque, N m/s (force, N/s). Null: none.",
         scale="limits of torque rates",
     ),
 )

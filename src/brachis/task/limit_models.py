@@ -143,11 +143,11 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     scale: LimitScale = field(default_factory=LimitScale)
     """Factors on the limits."""
     total_power: Positive | None = None
-    """Largest sum of the powers of all joints, drawn or returned, W. Absent or null: none."""
+    """Largest sum of the powers of all joints, drawn or returned, W. Null: none."""
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
     N). The first speed is 0, and no torque is above the one before. The limit is linear between points; the last slope
-    continues to zero torque. It holds for both directions, driving and braking. Absent or null: none."""
+    continues to zero torque. It holds in both directions, for driving and braking. Null: none."""
 
     __pydantic_config__ = Model.model_config
 
@@ -257,7 +257,7 @@ class ToolLimits(Model):
     acceleration: Speed | None = None
     """Largest acceleration, m/s^2. Null: none."""
     angular_speed: Speed | None = None
-    """Largest angular speed of the tool, rad/s, without its free roll. Null: none."""
+    """Largest angular speed of the tool, rad/s; its free roll does not count. Null: none."""
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
     ] = ()

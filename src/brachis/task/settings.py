@@ -175,7 +175,7 @@ class RobotSettings(Model):
     """Rigid body fixed to the tool frame. Null: none."""
     limits_file: Name | None = None
     """File of joint limits, relative to the task file's folder, for example MoveIt's joint_limits.yaml. Values in
-    limits come first; a mapping there counts only for the joints that it names. Null: none."""
+    limits come first, for each joint named there. Null: none."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
     speed_override: Annotated[Share, Field(gt=0.0)] = 1.0
@@ -254,8 +254,8 @@ class SearchSettings(Model):
     jobs: Count = Field(default=1, ge=1)
     """Number of processes that plan at the same time, limited to the number of processors."""
     time_limit: Positive = Field(default=60.0, le=1e6)
-    """Time after which the best verified motion is returned, s. If none is verified, an unverified one is returned,
-    perhaps a second later."""
+    """Time limit of the whole plan, s. The best verified motion found by then is returned; if there is none, an
+    unverified one, perhaps a second later."""
     seed: Count = Field(default=0, ge=0)
     """Seed of the random numbers."""
     least_motion: Flag = True
@@ -284,7 +284,7 @@ class SolverSettings(Model):
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
     """Maximum number of iterations."""
     time_limit: Positive = Field(default=20.0, le=1e6)
-    """Maximum time of one solve, s. search.time_limit is for the whole plan."""
+    """Maximum time of one solve, s."""
     tolerance: Positive = 1.0e-6
     """Tolerance of the optimality conditions."""
 
@@ -311,7 +311,7 @@ class BoundarySettings(Model):
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
     """Speed along the path at its start, m/s. It is in rad/s if the tool only turns there; along a path of joints it is
-    the norm of their velocities. If it is not zero, velocities of redundant joints are free there, and with
+    the norm of the joint velocities. If it is not zero, velocities of redundant joints are free there, and with
     spline.rest: full the speed does not change at that instant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
     """The same at the path's end."""
