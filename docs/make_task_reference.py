@@ -82,30 +82,31 @@ INTRODUCTION = """# Task files
 
 <!-- Made by docs/make_task_reference.py. -->
 
-A task file is YAML. Paths in it are relative to the file; SI units; unknown keys are refused. `brachis schema` prints a
-JSON schema that editors use for completion: put `# yaml-language-server: $schema=task.schema.json` at the top of a task
-file, with the schema saved beside it by `brachis schema --out task.schema.json`.
+A task file is YAML. Units are SI. File names are relative to the task file. Unknown keys are errors. For completion in
+editors, save a JSON schema next to the task file with `brachis schema --out task.schema.json`, and begin the task file
+with `# yaml-language-server: $schema=task.schema.json`.
 
-Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
-of the chain, a mapping names joints (others keep the URDF's). Torque and velocity limits may differ in both directions:
-in a list or mapping a pair `[lower, upper]`, lower < 0 < upper, stands for a number. Such numbers lie between 1e-6 and
-1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`). Limits on
-`jerk` and `torque_rate` need splines of degree 3 at least and `rest: full`, so that they hold over the ends too; with
-`rest: jerk` (degree 4 at least) both begin and end at zero. Coulomb friction counts in the torque's rate by its slope:
-give it a `coulomb_velocity` over which it may change.
+**Limits.** If a key is absent, the URDF's limit holds; `null` removes the limit. A number holds for all joints. A list
+is in chain order. A mapping names joints; the others keep the limits of the URDF. For torque and velocity, lists and
+mappings may contain a pair `[lower, upper]` with lower < 0 < upper instead of a number. Numbers must be from 1e-6 to
+1e12 in SI units, also after scaling; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
 
-Friction is written likewise: absent, `viscous` and `coulomb` are `damping` and `friction` of the URDF's `<dynamics>`;
-`null` switches them off. Payload, tool offset and mounting change the robot without the URDF: the payload's `com` and
-`inertia` and the tool offset are in the tool frame of the URDF, mounting and gravity in the world frame. What is in use
-is printed with a plan, stands under `in_use` in its JSON, and is saved with the motion; `brachis inspect task.yaml`
-shows it without planning.
+Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`; they then hold at both ends too.
+With `rest: jerk` (degree >= 4) jerk and torque rate are zero at both ends. The torque rate includes the change of
+Coulomb friction; choose a `coulomb_velocity` over which this friction may change.
 
-`brachis.plan(robot, task)` with a `Robot` adds what the task's `robot` part sets to what the robot was made with; the
-robot stands for the `urdf` key, and what contradicts it is refused with its key.
+**Friction.** If `viscous` or `coulomb` is absent, the URDF's `<dynamics>` has the value. `null` switches it off.
 
-A `torque_speed` curve is that of the joint, not of its motor, and the same for driving and braking (a drive that brakes
-with more is planned too cautiously). A data sheet that states 3000 rpm at 1.27 N m, 4500 rpm without load, and a gear
-of 1:50 with an efficiency of 0.8 is, with speed = rpm * 2 pi / 60 / ratio and torque = torque * ratio * efficiency,
+A plan prints the values in use; they are also in the saved motion and, under `in_use`, in the JSON. `brachis inspect
+task.yaml` shows them without planning.
+
+**A `Robot` in Python.** `brachis.plan(robot, task)` uses the robot in place of the `urdf` key and adds the settings of
+the task's `robot` part. A setting that contradicts the robot is an error that names its key.
+
+**`torque_speed`** is a curve at the joint, not at the motor. It is the same for driving and braking; for a drive that
+brakes with more torque the plan is too cautious. Example: a data sheet gives 1.27 N m at 3000 rpm, and 4500 rpm
+without load; the gear is 1:50 with efficiency 0.8. With speed = rpm * 2 pi / 60 / ratio and torque = torque * ratio *
+efficiency:
 
 ```yaml
 robot:
@@ -114,22 +115,22 @@ robot:
       j1: [[0, 50.8], [6.28, 50.8], [9.42, 0]]   # rad/s, N m: 3000 and 4500 rpm behind 1:50
 ```
 
-Implausible figures (degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors above 10, an end time at
-the planner's least) are warned of on standard error and listed as `warnings` in the JSON and as `result.warnings`. A
-start posture that looks like degrees is an error. `strict: true` (`--strict`, `brachis.plan(..., strict=True)`) makes
-all of them errors, `strict: false` (`--no-strict`) all of them warnings.
+**Implausible figures** are degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors above 10, or an
+end time at the planner's lower bound. They cause warnings on standard error, in `warnings` of the JSON and in
+`result.warnings`. A start posture that looks like degrees is an error. `strict: true` (`--strict`, `brachis.plan(...,
+strict=True)`) makes all of them errors, `strict: false` (`--no-strict`) all of them warnings.
 """
 
 LIMITS_FILE = """
 ## Limits files
 
-`robot.limits_file` names a YAML file of joint limits, such as `robots/panda_limits.yaml`, which has the published
-figures of the Franka Emika Panda. Limits count in this order: what the task says in `robot.limits`, the file, the URDF;
-where the task names joints, joint by joint. Limits of joints that the URDF has and that stand still (locked, or off the
-chain to the tool) have no effect. The file is read with the task: a saved task does not need it any more. In Python:
-`brachis.read_limits(path)` gives a `LimitSpec`.
+`robot.limits_file` names a YAML file of joint limits. An example is `robots/panda_limits.yaml` with the published
+figures of the Franka Emika Panda. `robot.limits` of the task comes before the file, and the file before the URDF. If
+the task names joints, this holds for each joint. Limits of joints that do not move (locked, or off the chain to the
+tool) have no effect. The file is read with the task; a saved task does not need it. In Python,
+`brachis.read_limits(path)` returns a `LimitSpec`.
 
-**`joint_limits.yaml`** of MoveIt, of ros2_control and of Universal Robots is read as it is, with `!degrees` and
+**`joint_limits.yaml`** of MoveIt, ros2_control and Universal Robots can be used unchanged, also with `!degrees` and
 `!radians`:
 
 ```yaml
@@ -147,28 +148,30 @@ joint_limits:
     max_effort: 330.0              # N m
 ```
 
-`has_..._limits: false` switches a limit off, the URDF's too; what is not stated is the URDF's. Every joint that moves
-the tool needs an entry, there or in the task's `robot.limits`. `default_velocity_scaling_factor` and
-`default_acceleration_scaling_factor`, 0.1 in files of MoveIt's Setup Assistant, count as `limits.scale`: with
-`robot.limits.scale: {velocity: 1, acceleration: 1}` the task uses the limits in full. The joints of Universal Robots
-may lack the `_joint` at the end of their names. A limits file of our own has these keys:
+`has_..._limits: false` removes a limit, also that of the URDF. Limits that are not in the file come from the URDF.
+Every joint that moves the tool needs an entry in the file or in the task's `robot.limits`.
+`default_velocity_scaling_factor` and `default_acceleration_scaling_factor` are used as `limits.scale`. MoveIt's Setup
+Assistant sets them to 0.1; with `robot.limits.scale: {velocity: 1, acceleration: 1}` the task uses the full limits.
+Files of Universal Robots may omit `_joint` at the end of joint names.
+
+A limits file in the format of brachis has these keys:
 """
 PATH = """
 ## `path`
 
-A list of segments. Each is a mapping with one of the kinds below (`line`, `arc`, `circle`, `spline`, `bspline`, `csv`,
-`turn`) and, beside it, the keys of this table. A segment starts where its predecessor ends, the first one where the
-tool is at the start posture. The path must be smooth to the third derivative: segments that do not continue each other
-need a `blend`.
+A path is a list of segments. Each segment is a mapping with one kind (`line`, `arc`, `circle`, `helix`, `spline`,
+`bspline`, `csv` or `turn`) and, optionally, the keys of the table below. A segment starts at the end of the one
+before. The first one starts at `path_start`, at the tool's place in the start posture, or at its first waypoint. The
+path must be smooth up to its third derivative; a corner between two segments needs a `blend`.
 
-Coordinates are those of the rows of the task space, m, and rad for yaw. In task spaces of poses (`pose`,
-`pose_free_roll`) they are x, y, z, and `orientation` says how the tool turns.
+Points have all task coordinates: m, and rad for yaw. For poses (`pose`, `pose_free_roll`) these are x, y, z, and
+`orientation` says how the tool turns.
 
-They are in the world frame, or in a frame of `frames`, such as that of a workpiece: `path: {frame: workpiece, segments:
-[...]}`, or the key `path_frame` beside `path`. Segments, splines, files of points, directions, orientations and
-`path_start` are all in it. A workpiece that stands elsewhere is then one
-changed key; a sweep over `frames.workpiece.xyz` finds its best place. In task spaces of fewer rows than x, y, z the
-frame may only turn within these rows. Results, plots and exports are in the world frame.
+Points are in the world frame, or in one of the `frames`, for example that of a workpiece. Write `path: {frame:
+workpiece, segments: [...]}`, or the key `path_frame` next to `path`. Segments, files of points, directions,
+orientations and `path_start` are then in this frame. If the workpiece moves, only one key changes; a sweep over
+`frames.workpiece.xyz` finds its best place. If the task space has only some of x, y, z, the frame may be rotated only
+within these coordinates. Results, plots and exports are in the world frame.
 
 ```yaml
 frames:
@@ -182,22 +185,22 @@ path:
     orientation: {rotate: {axis: [0, 0, 1], angle_deg: 20}}
 ```
 
-With `task_space: joints` they are the positions of all joints, rad (m), in the order of the chain, and the segments
-are `line: {to: ...}`, `line: {by: ...}`, `spline`, `bspline` and `csv`; lengths along the path, those of blends too,
-are in rad (m). `docs/from_toppra.md` has an example.
+With `task_space: joints` points are the positions of all joints, rad (m), in chain order. The segments are `line: {to:
+...}`, `line: {by: ...}`, `spline`, `bspline` and `csv`. Lengths along the path and of blends are in rad (m).
+`docs/from_toppra.md` has an example.
 """
 TURN = """
 ### `turn: {...}`
 
-In task spaces of poses: the tool turns on the spot, by `rotate: {...}` or `to: {...}` as described below. A turn joins
-other turns about the same axis, or, with `profile: smooth`, about any axis; it does not join a segment whose position
-moves.
+For poses only: the tool turns on the spot, by `rotate: {...}` or `to: {...}` as described below. A turn can follow
+another turn about the same axis, or about any axis with `profile: smooth`. It cannot follow or precede a segment with
+a moving position.
 """
 ORIENTATION = """## `orientation`
 
-In task spaces of poses every segment but `turn` may say how the tool turns along it. The tool's orientation at the
-start of a segment is the one at the end of its predecessor. Orientations are those of the tool frame in the frame of
-the path: the world, or `path_frame`.
+For poses, every segment except `turn` can have an `orientation`: how the tool turns along the segment. The segment
+starts with the orientation at the end of the one before. Orientations are those of the tool frame in the frame of the
+path (the world or `path_frame`).
 
 ```yaml
 task_space: pose
@@ -213,23 +216,22 @@ path:
 | form | meaning |
 |---|---|
 | `fixed` | The tool keeps its orientation. This is the default. |
-| `{rotate: {axis: ..., angle_deg: ...}}` | It turns about an axis that stands still. |
-| `{to: {...}}` | It turns to an orientation, about one axis and the shortest way; less than 180 degrees. |
-| `tangent` or `{tangent: {up: ...}}` | It turns with the tangent of the path, see below. |
+| `{rotate: {axis: ..., angle_deg: ...}}` | The tool turns about a fixed axis. |
+| `{to: {...}}` | The tool turns to an orientation about one axis, the shortest way, by less than 180 degrees. |
+| `tangent` or `{tangent: {up: ...}}` | The tool turns with the tangent of the path; see below. |
 
-Position and orientation advance together: with `profile: uniform` the tool turns by the same angle for every metre of
-the path. Then its turning rate jumps where the next segment turns otherwise, which is refused like a corner. Either
-give `profile: smooth`, with which the rate and its first two derivatives start and end at zero, or a `blend`, which
-rounds position and orientation alike.
+Position and orientation advance together. With `profile: uniform` the tool turns by the same angle for every metre of
+the path. If the next segment turns differently, the turning rate jumps, which is refused like a corner. Then use
+`profile: smooth` (the rate and its first two derivatives are zero at both ends) or a `blend` (it rounds position and
+orientation).
 
-With `tangent` the tool stays at rest in a frame that moves along the path: x along the tangent, y along up x tangent.
-So it turns about `up` as the path turns, and pitches as the path rises, while up stays up; how it is oriented at the
-start of the segment is kept. Where the tangent is parallel to `up` (within 1 degree) the frame is not defined; then
-give another `up`.
+With `tangent` the tool keeps its orientation in a frame that moves along the path: x along the tangent, y along up x
+tangent. So the tool turns about `up` if the path turns, and pitches if the path rises. If the tangent is parallel to
+`up` (within 1 degree), the frame is not defined; give another `up`.
 
-A spline passes its waypoints in given orientations with `orientations`, one for each waypoint. Between them the
-orientation is smooth, to the third derivative, and does not depend on the choice of the world frame or the tool frame.
-The orientation at the segment's start is not listed. Successive orientations must be less than 180 degrees apart.
+A spline passes its waypoints with the orientations of `orientations`, one for each waypoint. They do not include the
+orientation at the segment's start. Between waypoints the orientation is smooth up to the third derivative and does not
+depend on the choice of the world frame or tool frame. Successive orientations must differ by less than 180 degrees.
 
 ```yaml
 task_space: pose
@@ -240,9 +242,9 @@ path:
       orientations: [{rpy_deg: [0, 0, 20]}, {rpy_deg: [0, 10, 60]}, {quaternion_xyzw: [0, 0, 0.707, 0.707]}]
 ```
 
-An orientation is written in exactly one of these conventions. None is guessed: quaternions state the order of their
-numbers, and so do the angles of robots' makers, which differ. The keys hold wherever an orientation stands, in
-`path_start` too; in files of points the same words, without `_deg`, are values of `csv.orientation`.
+Write an orientation in exactly one of these conventions. brachis guesses none: the key states the order of a
+quaternion's numbers or whose angles are meant. The keys hold for every orientation, also in `path_start`. For files of
+points, `csv.orientation` takes the same names without `_deg`.
 
 | key | meaning |
 |---|---|
@@ -250,39 +252,39 @@ numbers, and so do the angles of robots' makers, which differ. The keys hold whe
 CSV = """
 ## Files of points
 
-`csv: {file: poses.csv}` is a smooth curve along the rows of a file. Its first line names the columns, in any order;
-lines that are empty or begin with `#` are skipped. In task spaces of rows the columns are the rows (`x,y`, `x,z,yaw`,
-...), and for paths of joints the joints' names (rad, m; without `units` and `tolerance`). In task spaces of poses they
-are
+`csv: {file: poses.csv}` is a smooth curve along the points of a file, one point per row. The first line names the
+columns, in any order. Empty lines and lines that begin with `#` are skipped. If the task space is a list of
+coordinates, they are the names of the columns (`x,y`, `x,z,yaw`, ...). For a path of joints the columns have the names
+of the joints (rad, m); `units` and `tolerance` are not allowed there. For poses the columns are
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
 - `x,y,z,roll,pitch,yaw`, or `x,y,z,w,p,r` (Fanuc): positions and angles;
-- `x,y,z,rx,ry,rz`, `x,y,z,a,b,c` or `x,y,z,q1,q2,q3,q4`: positions and orientations whose meaning differs from maker to
-  maker, so that `orientation` must state it: `rotation_vector`, `rpy`, `staubli_xyz` or `fanuc_wpr` for `rx,ry,rz`;
+- `x,y,z,rx,ry,rz`, `x,y,z,a,b,c` or `x,y,z,q1,q2,q3,q4`: positions and orientations. Their meaning depends on the
+  robot's maker, so `orientation` must state it: `rotation_vector`, `rpy`, `staubli_xyz` or `fanuc_wpr` for `rx,ry,rz`;
   `kuka_abc` or `rpy` (Mitsubishi) for `a,b,c`; `quaternion_wxyz` (ABB) or `quaternion_xyzw` for `q1` to `q4`.
 
-A column `feed` (or `f`, `speed`, `v`) may stand beside them: the speed of the tool on the way to each row. Columns are
-separated by commas, semicolons, tabs or spaces; with all but commas, decimal commas are understood. Units follow names
-(`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are stated by `units`; lengths without a unit are in metres, yaw and
-rotation vectors in radians; the unit of other angles and of speeds must be stated. What was found out about the file is
-told.
+An extra column `feed` (or `f`, `speed`, `v`) gives the tool's speed on the way to each point; it needs a `tolerance`.
+Columns are separated by commas, semicolons, tabs or spaces. Numbers may have decimal commas unless commas separate the
+columns. Units are part of the column names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are given by `units`.
+Lengths without a unit are in m, yaw and rotation vectors in rad. Other angles and speeds need a unit. brachis reports
+how it understood the file.
 
-The first row is where the segment starts, and where the path begins with `start: free` if the task has no `path_start`.
-A segment that starts elsewhere, by more than 1e-4 m or rad, is refused; with `relative: true` the rows are moved so
-that the first one is at the segment's start: displacements keep their direction in the path's frame, rotations are
-those in the tool frame.
+The segment starts at the first point. With `start: free` and without `path_start`, the path begins there too. If the
+segment would have to start more than 1e-4 m or rad away from it, the file is refused. With `relative: true` all points
+are moved so that the first one is at the segment's start.
 
-**Without a tolerance** the path passes all rows. Where successive rows have the same position, the curve would have to
-stop, and the file is refused, unless the position stands still in the whole file. Rows that are rounded or scatter so
-much that the curvature of a curve through them is noise are refused with the reason: give a tolerance.
+**Without a tolerance** the path passes through all points. Two successive points with the same position are refused,
+because the motion would have to stop there. A file in which the position never changes is allowed. Points that are
+rounded or noisy are refused if the curvature of a curve through them is only noise; then give a tolerance.
 
-**With a tolerance** the path is a quintic B-spline, C4, within the tolerance of all rows (up to 100,000 and more), with
-few knots, through the first and the last one. Repeated rows are left out and told; spikes and changes of unit are
-refused with their line. Ways five times longer than usual are taken as straight, as CAM means them. Corners are found
-and listed, and rounded by blends within `tolerance.corner`; the tighter, the slower a robot passes them. The distance
-of every row from the curve is measured by a formula that the fit does not use. `brachis inspect TASK` prints what was
-found, `brachis plan` too; `result.fits` and the JSON have it, `brachis plot --kind fit` draws the errors.
+**With a tolerance** the path is a quintic B-spline (C4) with few knots. It passes through the first and last point and
+within the tolerance of all others (100,000 and more). Repeated points are left out and reported. Spikes and changes of
+unit are refused, with their line. If the distance between two points is more than five times the usual one, the path
+between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within `tolerance.corner`.
+The smaller this tolerance, the slower the robot passes them. A formula that the fit does not use measures the distance
+of every point from the curve. `brachis inspect TASK` and `brachis plan` print the findings; they are also in
+`result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
 
 ```yaml
 start: free
@@ -296,16 +298,16 @@ path:
       corner: blend
 ```
 
-G-code (`.nc`, `.ngc`, `.gcode`, `.tap`) is read likewise: G0 to G3 with I, J, K or R, G17 to G21, G90, G91, F.
-Millimetres are taken where it does not say. What has no say in where the tool goes is skipped and told; cycles, cutter
+G-code files (`.nc`, `.ngc`, `.gcode`, `.tap`) are read in the same way: G0 to G3 with I, J, K or R, G17 to G21, G90,
+G91 and F. The default unit is mm. Commands that do not move the tool are skipped and reported. Cycles, cutter
 compensation and rotary axes are refused.
 
-Feed rates are largest speeds of the tool, from the first to the last row that has one and linear between them; they
-stand beside those of `tool_limits`.
+Feed rates are largest speeds of the tool, linear between the first and the last point that has one. They hold in
+addition to those of `tool_limits`.
 
-The file is read with the task, and becomes a `spline` or one `bspline` for every stretch between corners: a saved task
-does not need it any more. Arrays take the same way: `brachis.fit_path(points, tolerance=...)` returns the segments of a
-path along positions, 4x4 matrices, SE3 or positions with SciPy's rotations, the first one included.
+The file is read with the task and becomes one `spline`, or one `bspline` for each section between corners; a saved
+task does not need it. For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments of a path, including
+the first point. Points may be positions, 4x4 matrices, SE3 objects, or positions with SciPy's rotations.
 """
 
 
@@ -353,7 +355,11 @@ def page() -> str:
     ]
     parts += ["\n### `rotate: {axis: ..., angle_deg: ...}`\n", *rows(Rotation)]
     profile = Target.model_fields["profile"]
-    parts += ["\n### `to: {...}`\n", "An orientation as above, and\n", *TABLE_HEAD]
+    parts += [
+        "\n### `to: {...}`\n",
+        "The keys of an orientation as above, and\n",
+        *TABLE_HEAD,
+    ]
     parts += [
         _row("profile", profile),
         "\n### `tangent: {...}`\n",

@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import time
+import types
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 
 import brachis
 from brachis.apps.plots import plot_candidates
+from brachis.common import tolerances
 from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
@@ -557,7 +559,8 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monke
     monkeypatch.setitem(
         SEARCH_LEVELS, "fast", (dataclasses.replace(fast, refined=100),)
     )
-    monkeypatch.setattr(portfolio, "WORTH_IT", -100.0)
+    never_enough = types.SimpleNamespace(GAIN=-100.0, END_TIME=tolerances.END_TIME)
+    monkeypatch.setattr(portfolio, "tolerances", never_enough)
     every = brachis.plan(robot, task())
     finished = [
         candidate for candidate in every.candidates if math.isfinite(candidate.t_end)

@@ -34,6 +34,8 @@ class Nodes:
     q, qdot, qddot : (L + 1, n) ndarray
     qddot_before : (L + 1, n) ndarray
         Acceleration just before the nodes; differs from `qddot` where it jumps.
+    position_error : float
+        Largest difference found between the quintic pieces and the closed form, rad or m.
     """
 
     times: np.ndarray
@@ -41,6 +43,7 @@ class Nodes:
     qdot: np.ndarray
     qddot: np.ndarray
     qddot_before: np.ndarray
+    position_error: float
 
 
 def interpolate(
@@ -97,7 +100,7 @@ def interpolate(
         raise UnreachableError("the motion is too sharp for polynomial pieces")
     # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
     q = _sum_positions(joint_map, curves, merged, state, before)
-    return Nodes(merged, q, state.qdot, state.qddot, before)
+    return Nodes(merged, q, state.qdot, state.qddot, before, error)
 
 
 def _sum_positions(

@@ -115,16 +115,16 @@ _ROWS = (
     LimitKind(
         "torque",
         _TORQUE,
-        "Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none.",
+        "Largest torque, N m (force, N); for a joint also a pair [lower, upper]. Absent: URDF. Null: none.",
         form="pair",
-        scale="torque and force limits, curves too",
+        scale="torque and force limits and torque-speed curves",
         urdf="effort",
         usual=replace(_USUAL_TORQUE, by_curve=True),
     ),
     LimitKind(
         "velocity",
         {"rad": "rad/s", "m": "m/s"},
-        "Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none.",
+        "Largest speed, rad/s (m/s); for a joint also a pair [lower, upper]. Absent: URDF. Null: none.",
         form="pair",
         scale="velocity limits",
         urdf="velocity",
@@ -140,7 +140,7 @@ _ROWS = (
     LimitKind(
         "acceleration",
         {"rad": "rad/s^2", "m": "m/s^2"},
-        "Largest acceleration, rad/s^2 (m/s^2). Absent or null: none.",
+        "Largest acceleration, rad/s^2 (m/s^2). Null: none.",
         scale="acceleration limits",
         # Wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2.
         usual=UsualLimit(
@@ -150,33 +150,33 @@ _ROWS = (
     LimitKind(
         "position",
         {"rad": "rad", "m": "m"},
-        "[low, high], rad (m); null for an open end. Absent: URDF. Null: none.",
+        "Range [low, high], rad (m); null stands for an open end. Absent: URDF. Null: none.",
         form="range",
     ),
     LimitKind(
         "power",
         {"rad": "W", "m": "W"},
-        "Largest mechanical power, torque x speed either way, W. Absent or null: none.",
-        scale="power limits, the total one too",
+        "Largest mechanical power (torque x speed), drawn or returned, W. Null: none.",
+        scale="power limits, also total_power",
     ),
     LimitKind(
         "rms_torque",
         _TORQUE,
-        "Largest root mean square of the torque over the whole motion, N m (force, N): what heats a motor. "
-        "Absent or null: none.",
+        "Largest root mean square of the torque over the whole motion, N m (force, N); it determines the heat in a "
+        "motor. Null: none.",
         scale="limits of root-mean-square torques",
         usual=_USUAL_TORQUE,
     ),
     LimitKind(
         "jerk",
         {"rad": "rad/s^3", "m": "m/s^3"},
-        "Largest jerk, rad/s^3 (m/s^3). Absent or null: none.",
+        "Largest jerk, rad/s^3 (m/s^3). Null: none.",
         scale="jerk limits",
     ),
     LimitKind(
         "torque_rate",
         {"rad": "Nm/s", "m": "N/s"},
-        "Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none.",
+        "Largest rate of change of the torque, N m/s (force, N/s). Null: none.",
         scale="limits of torque rates",
     ),
 )

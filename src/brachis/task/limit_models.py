@@ -145,11 +145,11 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     scale: LimitScale = field(default_factory=LimitScale)
     """Factors on the limits."""
     total_power: Positive | None = None
-    """Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."""
+    """Largest sum of the powers of all joints, drawn or returned, W. Null: none."""
     torque_speed: dict[Name, TorqueCurve | None] | None = None
-    """Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, rad/s and N m at the
-    joint (m/s, N), joined by a line that never rises; the last slope goes on to zero torque. The same both ways,
-    driving and braking. Absent or null: none."""
+    """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
+    N). The first speed is 0, and no torque is above the one before. The limit is linear between points; the last slope
+    continues to zero torque. It holds in both directions, for driving and braking. Null: none."""
 
     __pydantic_config__ = Model.model_config
 
@@ -182,9 +182,9 @@ class SpeedTable(Model):
     """
 
     s: Annotated[_PathCoordinates, Field(min_length=1)]
-    """Path coordinates, 0 to 1, ascending; the same one twice in a row is a step."""
+    """Path coordinates from 0 to 1, ascending. A value given twice is a step."""
     speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
-    """Largest speed at each of them, m/s."""
+    """Largest speed at each path coordinate, m/s."""
 
     @model_validator(mode="after")
     def _is_a_table(self) -> SpeedTable:
@@ -236,10 +236,11 @@ class ProcessSpeed(Model):
             "[begin, end] with begin < end",
         ),
     ]
-    """[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. A part may begin
-    or end with the path where boundary.start_speed or end_speed is its speed, or the motion is periodic."""
+    """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
+    allow. A part may begin at 0 or end at 1 only if the speed of the boundary there equals its speed, or the motion is
+    periodic."""
     tolerance: Annotated[Share, Field(ge=1e-3, le=0.5)] = 0.01
-    """Largest deviation either way, as a share of the speed: 1 %, or 0.01."""
+    """Largest deviation in either direction, as a share of the speed: 1 % or 0.01."""
 
 
 class ToolLimits(Model):
@@ -249,19 +250,19 @@ class ToolLimits(Model):
         Speed | SpeedTable | None,
         ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
     ] = None
-    """Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. Null: none."""
+    """Largest speed, m/s: one number, or a table over the path {s: [...], speed: [...]}. Null: none."""
     feed: tuple[SpeedTable, ...] = ()
-    """Tables of largest speeds over parts of the path, and none beyond their first and last places; written by brachis
-    from the feed rates of the path's points."""
+    """Tables of largest speeds over parts of the path; outside these parts they limit nothing. brachis writes them from
+    the feed rates of the path's points."""
     acceleration: Speed | None = None
     """Largest acceleration, m/s^2. Null: none."""
     angular_speed: Speed | None = None
-    """Largest speed at which the tool turns, rad/s; its free roll does not count. Null: none."""
+    """Largest angular speed of the tool, rad/s; its free roll does not count. Null: none."""
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
     ] = ()
-    """Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such, in order and with a gap in
-    between in which the speed may change."""
+    """Parts of the path with a constant speed: {speed, s, tolerance}, or a list of these in order. Between two parts
+    there must be a gap in which the speed can change."""
 
     @field_validator("process_speed")
     @classmethod

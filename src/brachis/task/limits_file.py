@@ -32,11 +32,12 @@ class LimitsFile(Model):
     brachis_limits: Literal[1]
     """Version of the format."""
     source: Name
-    """Where the figures are from."""
+    """Origin of the figures."""
     joints: NonEmpty[Name]
-    """The joints that the file limits."""
+    """Joints that the file limits."""
     limits: LimitSpec
-    """As robot.limits, without scale; a list is in the order of joints, one number holds for all."""
+    """Limits as in robot.limits, without scale. A list is in the order of `joints`; one number holds for all of them.
+    """
 
 
 _ROS_KINDS = {
@@ -103,9 +104,9 @@ class RosLimitsFile(Model):
     joint_limits: Annotated[dict[Name, RosJointLimits], Field(min_length=1)]
     """Limits by joint: has_velocity_limits, max_velocity and so on."""
     default_velocity_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
-    """Counts as limits.scale.velocity, where the task does not give it."""
+    """Used as limits.scale.velocity if the task does not give it."""
     default_acceleration_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
-    """Counts as limits.scale.acceleration, where the task does not give it."""
+    """Used as limits.scale.acceleration if the task does not give it."""
 
     @property
     def joints(self) -> dict[str, RosJointLimits]:

@@ -148,55 +148,54 @@ class Task(Model):
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot."""
     start: FreePosture
-    """Configuration at the start of the path: {joints: ...}, or free, which needs path_start. A path of joints that
-    begins with a waypoint needs none."""
+    """Configuration at the start of the path: {joints: ...} or free. With free, path_start is required unless the path
+    begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
     path_start: PathStart = None
-    """Where the path begins: a list of all rows of the task space (m, yaw in rad); of a pose {position: [x, y, z],
-    rpy_deg: [...]}, or another convention of an orientation. Null: where the start posture's tool is; otherwise a start
-    posture whose tool is elsewhere is refused. With start: free it must be given, unless the path begins with a
-    waypoint."""
+    """Point at which the path begins: a list of all task coordinates (m, yaw in rad). For a pose: {position: [x, y, z],
+    rpy_deg: [...]}, or another orientation convention. Null: the tool's place in the start posture, or the first
+    waypoint. It must agree with a given start posture."""
     end: FreePosture = "free"
-    """Configuration at the end of the path: free, or {joints: ...}. Where its tool is up to 1e-6 m or rad off the
-    path's end, the nearest posture on the path is taken; where it is farther off, it is refused."""
+    """Configuration at the end of the path: free or {joints: ...}. Its tool must be at the path's end, to 1e-6 m or
+    rad; the nearest posture on the path is then used."""
     task_space: TaskSpace
-    """What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all of x, y, z); pose;
-    pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is one of all joints, in the
-    order of the chain (rad, m), and only its timing is planned."""
+    """What the path prescribes: a list of coordinates out of x, y, z, yaw (yaw last, with two others); position (x, y
+    and z); pose; pose_free_roll (the tool may roll about its z axis); or joints. A path of joints gives all joint
+    positions (rad, m) in chain order, and only its timing is planned."""
     path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)] = Field(
         json_schema_extra=_add_forms_of_paths
     )
-    """Segments of the path, in order; a list of points, all rows of the task space each, is the spline through them
-    that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame of their own: {frame:
-    NAME, segments: [...]}."""
+    """Segments of the path, in order. A list of points, each with all task coordinates, is the spline through them from
+    the first one on. For a file of points: [{csv: {file: ...}}]. For another frame: {frame: NAME, segments: [...]}."""
     frames: dict[Name, Placement] = Field(default={})
-    """Where frames such as those of workpieces are in the world: by name, {xyz: ..., rpy_deg: ...}."""
+    """Places of frames in the world, such as those of workpieces, by name: {xyz: ..., rpy_deg: ...}."""
     path_frame: Name | None = None
-    """The one of the frames in which path and path_start are given: points, directions, orientations. Null: the world.
-    """
+    """Name of the frame of path and path_start, with all their points, directions and orientations. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
-    """Speeds at both ends, or a motion that goes round for ever."""
+    """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
     """Limits on the motion of the tool."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
-    """Limits of kinds that installed packages add (see docs/own_limit.md): their parameters, by kind."""
+    """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"
-    """Joints that are free along the path; auto tries every choice that has a closed form. With pose_free_roll the
-    virtual joint tool_roll, which rolls the tool, is one of the robot's; it may be left out."""
+    """Joints that are free along the path. auto plans in charts; closed forms are tried as coordinates only while no
+    motion is verified. With pose_free_roll the robot has one more joint, tool_roll, which rolls the tool; the list may
+    leave it out."""
     branch: Name = "auto"
-    """Label of the branch of the closed form; auto: the start's, and all of them with start: free."""
+    """Label of the branch of the closed form. auto: the branch of the start posture, or all branches with start: free.
+    """
     search: SearchSettings = Field(default_factory=SearchSettings)
-    """Search."""
+    """Search for the fastest motion."""
     spline: SplineSettings = Field(default_factory=SplineSettings)
-    """B-splines."""
+    """B-splines of the motion."""
     solver: Annotated[SolverSettings, BeforeValidator(expand_solver_name)] = Field(
         default_factory=SolverSettings, json_schema_extra=or_form({"type": "string"})
     )
-    """Solver: its name, or a mapping."""
+    """Solver: its name or a mapping."""
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
-    """Refinement."""
+    """Refinement of the collocation points."""
     strict: bool | None = None
-    """Whether implausible figures (degrees for rad, mm for m) are errors: true, all of them; false: all are warnings;
-    null: a start posture that looks like degrees is an error, the others are warnings."""
+    """true: all implausible figures are errors. false: all are warnings. null: only a start posture that looks like
+    degrees is an error."""
 
     @field_validator("brachis", mode="before")
     @classmethod

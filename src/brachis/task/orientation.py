@@ -38,8 +38,8 @@ Direction = Annotated[
 Profile = Annotated[
     Literal["uniform", "smooth"],
     Field(
-        description="How the angle grows along the segment: at a constant rate, or from rate zero to rate zero, so "
-        "that it joins segments that keep their orientation."
+        description="Rate of the angle along the segment. uniform: constant. smooth: zero at both ends, so that "
+        "segments with a fixed orientation can follow."
     ),
 ]
 
@@ -170,11 +170,11 @@ class Rotation(Model):
     """A rotation about an axis."""
 
     axis: Direction
-    """Axis of the rotation, right-hand rule; any length but zero."""
+    """Axis of the rotation, right-hand rule; any length except zero."""
     angle_deg: Number
-    """Angle of the rotation, degrees, signed; it may exceed a turn."""
+    """Angle of the rotation with its sign, degrees. It may be more than 360."""
     frame: Literal["path", "tool"] = "path"
-    """Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's."""
+    """Frame of the axis: path (the world, or path_frame) or tool."""
     profile: Profile = "uniform"
 
 
@@ -182,8 +182,8 @@ class Tangent(Model):
     """Turning with the tangent."""
 
     up: Direction | None = None
-    """Direction, in the path's frame, that the tool keeps its attitude to; not along the tangent. Null: the axis of an
-    arc or circle, z for other segments."""
+    """Direction in the path's frame that stays up for the tool. It must not be parallel to the tangent. Null: the axis
+    of an arc or circle; z for other segments."""
 
 
 class Rotate(Model):

@@ -86,12 +86,12 @@ class FileUnits(Model):
     """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
 
     length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = None
-    """Of positions. Null: as the header says, else m."""
+    """Unit of positions. Null: the header's unit, or m."""
     angle: Literal["rad", "mrad", "deg"] | None = None
-    """Of yaw and orientations. Null: as the header says; else rad, but for roll, pitch and yaw and the angles of KUKA,
-    Staubli and Fanuc, whose unit must be stated."""
+    """Unit of yaw and orientations. Null: the header's unit, or rad. Roll, pitch and yaw, and the angles of KUKA,
+    Staubli and Fanuc, have no default: state their unit."""
     speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = None
-    """Of a column of feed rates. Null: as the header says, which then must."""
+    """Unit of feed rates. Null: the header's unit, which is then required."""
 
 
 class FitTolerance(Model):
@@ -100,9 +100,9 @@ class FitTolerance(Model):
     position: Length
     """Largest distance of a point from the path."""
     orientation: Angle = ANGLES["deg"] / 10.0
-    """Largest angle between a given orientation, or yaw, and the path's. 0.1 deg unless given."""
+    """Largest angle between a given orientation or yaw and the path's; 0.1 deg by default."""
     corner: Length | None = None
-    """Largest distance of a point from the path where a corner is rounded. Null: `position`."""
+    """Largest distance of a point from the path at a rounded corner. Null: as `position`."""
 
     @property
     def at_corners(self) -> float:
@@ -114,23 +114,24 @@ class PointFile(Model):
     """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
 
     file: Name
-    """CSV file, or G-code (.nc, .ngc, .gcode, .tap), relative to the task file's folder; its first row is where the
-    segment starts."""
+    """CSV or G-code file (.nc, .ngc, .gcode, .tap), relative to the task file's folder. The segment starts at the first
+    point of the file."""
     relative: Flag = False
-    """Whether the rows count from the first one, so that the path may start anywhere: displacements along the axes of
-    the path's frame, rotations in the tool frame."""
+    """Whether points are relative to the first one, so that the segment may start anywhere. Displacements are along the
+    axes of the path's frame, rotations are in the tool frame."""
     orientation: OrientationWord | None = Field(
         default=None,
-        description="What the columns of the orientation mean (task spaces of poses), where their names do not say "
-        f"it: {', '.join(CONVENTIONS)}.",
+        description="Convention of the orientation columns, for poses, if their names do not define it: "
+        f"{', '.join(CONVENTIONS)}.",
     )
     units: FileUnits = Field(default_factory=FileUnits)
-    """Units of its numbers."""
+    """Units of the numbers in the file."""
     tolerance: FitTolerance | None = None
-    """How far the rows may be from the path, which is then a fit with as few knots as that takes; for many rows, and
-    for such as scatter. Null: the path passes all of them."""
+    """Largest distance of the points from the path. The path is then a fit with few knots, suitable for many or noisy
+    points. Null: the path passes through all points."""
     corner: Literal["blend", "refuse"] = "blend"
-    """With a tolerance, what becomes of corners: rounded within the tolerance, or refused and listed."""
+    """What happens to corners if a tolerance is given. blend: they are rounded within the tolerance. refuse: they are
+    listed in an error."""
 
     @field_validator("corner", mode="before")
     @classmethod

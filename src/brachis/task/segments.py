@@ -50,7 +50,7 @@ from brachis.task.point_data import FitReport, PointFile
 JointOrder = Annotated[
     tuple[Name, ...] | None,
     Field(
-        description="With task_space: joints, the joint of each coordinate; null: in the order of the chain."
+        description="With task_space: joints, the joint of each coordinate. Null: chain order."
     ),
 ]
 SMOOTHNESS = 3
@@ -61,21 +61,21 @@ class BSplineCurve(Model):
     """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` makes one of a curve."""
 
     degree: Annotated[Count, Field(ge=SMOOTHNESS + 1, le=15)] = 5
-    """Degree."""
+    """Degree of the spline."""
     knots: Vector
-    """Knots, ascending: the first and the last one degree + 1 times, others up to degree - 3 times; in m along the
-    curve, where blends and speeds are to be so."""
+    """Knots in ascending order: the first and the last one degree + 1 times, others up to degree - 3 times. Lengths of
+    blends and speeds are in m only if the knots are in m along the curve."""
     control_points: Annotated[tuple[Vector, ...], Field(min_length=SMOOTHNESS + 2)]
-    """Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or x, y, z, qw, qx,
-    qy, qz, whose orientation is that of the quaternion divided by its length."""
+    """Control points with all task coordinates (m, yaw in rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz; the
+    curve of quaternions is divided by its length."""
     relative: Flag = False
-    """Whether the curve is moved to the segment's start, wherever that is; as for csv."""
+    """Whether the curve is moved to the segment's start, wherever that is, as with csv."""
     joints: JointOrder = None
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = ()
-    """Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in between;
-    elsewhere no speed is prescribed."""
+    """Tables of the prescribed tool speed along the curve: pairs [distance along the curve in m, speed in m/s], linear
+    in between. Outside the tables no speed is prescribed."""
     fit: FitReport | None = None
-    """What the curve was fitted to; written by brachis."""
+    """The points that the curve was fitted to; written by brachis."""
 
     @property
     def has_quaternions(self) -> bool:
@@ -127,17 +127,17 @@ class BSplineCurve(Model):
 Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(
-        description="Yaw along the segment: as at its start, or turning with the tangent (task spaces with yaw)."
+        description="Yaw along the segment, for task spaces with yaw: fixed, or turning with the tangent."
     ),
 ]
 Normal = Annotated[
     Direction | None,
     Field(
-        description="Axis of rotation, for three position rows; right-hand rule. Any length but zero."
+        description="Axis of rotation, right-hand rule, for three position coordinates; any length except zero."
     ),
 ]
 Centre = Annotated[
-    Vector, Field(description="Centre, m: the position rows, without yaw.")
+    Vector, Field(description="Centre, m: the position coordinates, without yaw.")
 ]
 
 
@@ -159,14 +159,14 @@ class LineTo(Model):
     """A straight line to a point."""
 
     to: Coordinates
-    """End point: all rows of the task space (m, yaw in rad)."""
+    """End point: all task coordinates (m, yaw in rad)."""
 
 
 class LineBy(Model):
     """A straight line by a displacement."""
 
     by: Coordinates
-    """Displacement: all rows of the task space (m, yaw in rad)."""
+    """Displacement: all task coordinates (m, yaw in rad)."""
 
 
 class LineHeading(Model):
@@ -175,7 +175,7 @@ class LineHeading(Model):
     length: NonNegative
     """Length, m."""
     angle_deg: Number
-    """Direction, degrees, from the first towards the second position row."""
+    """Direction, degrees, from the first towards the second position coordinate."""
 
 
 class ArcCenter(Model):
@@ -183,7 +183,7 @@ class ArcCenter(Model):
 
     center: Centre
     angle_deg: Number
-    """Swept angle, degrees, signed: positive from the first towards the second position row, or about the normal."""
+    """Swept angle, degrees. Positive: about the normal, or from the first towards the second position coordinate."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -192,9 +192,9 @@ class ArcVia(Model):
     """A circular arc through a point to another one."""
 
     via: Vector
-    """A point between start and end, m: the position rows, without yaw."""
+    """A point between start and end, m: the position coordinates, without yaw."""
     to: Vector
-    """End point, m: the position rows, without yaw."""
+    """End point, m: the position coordinates, without yaw."""
     yaw: Yaw = "fixed"
 
 
@@ -203,7 +203,7 @@ class CircleTurns(Model):
 
     center: Centre
     turns: Turns = 1.0
-    """Number of turns, signed as an arc's angle; not zero."""
+    """Number of turns, not zero; its sign is as for the angle of an arc."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -213,31 +213,30 @@ class HelixTurns(Model):
 
     center: Centre
     turns: Turns = 1.0
-    """Number of turns, signed about the normal; not zero."""
+    """Number of turns, not zero; positive about the normal."""
     pitch: Number
-    """Climb of each turn along the normal, m; negative: against it."""
+    """Rise of each turn along the normal, m; negative against it."""
     normal: Direction = (0.0, 0.0, 1.0)
-    """Axis of rotation; right-hand rule. Any length but zero."""
+    """Axis of rotation, right-hand rule; any length except zero."""
 
 
 class SplineThrough(Model):
     """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
     through: NonEmpty[Coordinates]
-    """Waypoints: all rows of the task space each (m, yaw in rad)."""
+    """Waypoints, each with all task coordinates (m, yaw in rad)."""
     orientations: tuple[Attitude, ...] | None = None
-    """Orientation of the tool at each waypoint (task spaces of poses). Null: the segment's `orientation` says how the
-    tool turns."""
+    """Orientation of the tool at each waypoint, for poses. Null: the segment's `orientation` counts."""
     relative: Flag = False
-    """Whether the waypoints are relative to the segment's start: displacements along the axes of the path's frame,
-    rotations in the tool frame."""
+    """Whether waypoints are relative to the segment's start. Displacements are along the axes of the path's frame,
+    rotations are in the tool frame."""
     starts_at: Vector | None = None
-    """Where the waypoints expect the segment to start: all rows of the task space. A start that is elsewhere (by more
-    than 1e-4 m or rad) is refused; with `relative` it is what the waypoints are relative to."""
+    """Expected start of the segment: all task coordinates. A start more than 1e-4 m or rad away is refused. With
+    `relative`, waypoints are relative to this point."""
     starts_oriented: Attitude | None = None
-    """As `starts_at`, the orientation of the tool; beside `orientations`."""
+    """Expected orientation of the tool at the start; only with `orientations`."""
     fit: FitReport | None = None
-    """Where the waypoints come from; written by brachis."""
+    """Origin of the waypoints; written by brachis."""
     joints: JointOrder = None
 
     @model_validator(mode="before")
@@ -293,7 +292,8 @@ class SegmentModel(Model):
     """What all segments share."""
 
     blend: Positive | None = None
-    """Rounds the corner at the END of this segment: metres taken from it and from the next one."""
+    """Rounds the corner at the END of this segment: the length, m, that is cut from this segment and from the next one.
+    """
 
     def __add__(
         self, other: SegmentModel | tuple[SegmentModel, ...]
@@ -336,8 +336,8 @@ class MovingSegment(SegmentModel):
     """What all segments share along which the position moves."""
 
     orientation: OrientationMode = None
-    """How the tool turns along the segment (task spaces of poses): fixed, tangent, {rotate: ...}, {to: ...} or
-    {tangent: ...}. Null: fixed, or as a spline's `orientations` say."""
+    """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
+    Null: the `orientations` of a spline, else fixed."""
 
 
 class LineSegment(MovingSegment):

@@ -56,28 +56,28 @@ class InertiaMatrix(Model):
     """Moments and products of inertia about the centre of mass, in the axes of the tool frame."""
 
     ixx: NonNegative
-    """Moment, kg m^2."""
+    """Moment of inertia, kg m^2."""
     iyy: NonNegative
-    """Moment, kg m^2."""
+    """Moment of inertia, kg m^2."""
     izz: NonNegative
-    """Moment, kg m^2."""
+    """Moment of inertia, kg m^2."""
     ixy: Number = 0.0
-    """Product, kg m^2, with the sign that URDFs have."""
+    """Product of inertia, kg m^2, with the sign as in a URDF."""
     ixz: Number = 0.0
-    """Product, kg m^2."""
+    """Product of inertia, kg m^2."""
     iyz: Number = 0.0
-    """Product, kg m^2."""
+    """Product of inertia, kg m^2."""
 
 
 class Payload(Model):
     """A rigid body that is held to the tool frame."""
 
     mass: Positive
-    """kg."""
+    """Mass, kg."""
     com: Vector3 = (0.0, 0.0, 0.0)
-    """Centre of mass in the tool frame as the URDF has it, m."""
+    """Centre of mass in the tool frame of the URDF, m."""
     inertia: InertiaMatrix | None = None
-    """Moments about the centre of mass, axes of the tool frame. Null: a point mass."""
+    """Inertia about the centre of mass, in the axes of the tool frame. Null: a point mass."""
 
 
 _WORDS: Final = {
@@ -139,18 +139,18 @@ class FrictionSettings(Model):
     """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
     armature: PerJoint = 0.0
-    """Inertia of the drive seen at the joint, kg m^2 (kg)."""
+    """Inertia of the drive as seen at the joint, kg m^2 (kg)."""
     rotor_inertia: PerJoint = 0.0
-    """Inertia of the rotor about its own axis, kg m^2. With gear_ratio it takes the place of armature, which is
-    rotor_inertia * gear_ratio^2."""
+    """Inertia of the rotor about its own axis, kg m^2. With gear_ratio it replaces armature: armature = rotor_inertia *
+    gear_ratio^2."""
     gear_ratio: PerJointPositive | None = None
-    """Turns of the rotor per turn of the joint (prismatic: rad per m). Null: none."""
+    """Turns of the rotor per turn of the joint (prismatic joints: rad per m). Null: none."""
     viscous: UrdfFriction = FROM_URDF
-    """Viscous friction, N m s/rad (N s/m). Absent: URDF's damping. Null: none."""
+    """Viscous friction, N m s/rad (N s/m). Absent: damping of the URDF. Null: none."""
     coulomb: UrdfFriction = FROM_URDF
-    """Coulomb friction, N m (N). Absent: URDF's friction. Null: none."""
+    """Coulomb friction, N m (N). Absent: friction of the URDF. Null: none."""
     coulomb_velocity: PerJointPositive = 0.01
-    """Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s)."""
+    """Speed at which Coulomb friction reaches 76 % (tanh 1) of its value, rad/s (m/s)."""
 
 
 class RobotSettings(Model):
@@ -161,27 +161,26 @@ class RobotSettings(Model):
     tool_frame: Name | None = None
     """Frame that follows the path. Null: the only leaf link."""
     tool_offset: Placement = Field(default_factory=Placement)
-    """Where the frame that follows the path is in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}."""
+    """Place of the frame that follows the path, in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}."""
     base_frame: Name | None = None
     """First frame of the chain. Null: the root of the URDF."""
     mounting: Mounting = Field(default_factory=Placement)
-    """Where the URDF's root link is in the world: floor, wall (its z axis along the world's x axis), ceiling (upside
-    down, about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame."""
+    """Place of the URDF's root link in the world: floor, wall (its z axis along the world's x axis), ceiling (turned
+    upside down about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame."""
     gravity: tuple[Number, Number, Number] = (0.0, 0.0, -9.81)
-    """Gravity [x, y, z], m/s^2, world frame."""
+    """Gravity [x, y, z] in the world frame, m/s^2."""
     locked_joints: dict[Name, Number] = Field(default={})
-    """Joints that stay at a value, rad (m), by name."""
+    """Joints that do not move: their positions by name, rad (m)."""
     payload: Payload | None = None
-    """Rigid body held to the tool frame. Null: none."""
+    """Rigid body fixed to the tool frame. Null: none."""
     limits_file: Name | None = None
-    """File of joint limits, relative to the task file's folder, such as a maker's, or MoveIt's joint_limits.yaml. What
-    limits says itself counts, joint by joint where it names joints. Null: none."""
+    """File of joint limits, relative to the task file's folder, for example MoveIt's joint_limits.yaml. Values in
+    limits come first, for each joint named there. Null: none."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
     speed_override: Annotated[Share, Field(gt=0.0)] = 1.0
-    """Factor on all joint velocity limits beside limits.scale, for example 50 %, or 0.5. The motion is planned anew for
-    the slower joints, and is not the same motion played more slowly; torque, acceleration and tool limits stay what
-    they are."""
+    """Factor on all joint velocity limits, in addition to limits.scale; for example 50 % or 0.5. The motion is planned
+    for these lower limits, not played more slowly. Other limits do not change."""
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     """Drive inertia and friction."""
 
@@ -197,19 +196,19 @@ class SplineSettings(Model):
     """The B-splines of the path coordinate and the redundant joints."""
 
     degree: Count = Field(default=3, ge=2, le=7)
-    """Degree; 3 gives continuous torque, 4 continuous torque rate."""
+    """Degree of the splines; 3 gives continuous torque, 4 continuous torque rate."""
     intervals: Intervals = "auto"
-    """Number of knot intervals; auto halves those that lose most time until two rounds together gain less than half the
-    tolerance. A number plans sooner, and gives a slower motion; knots: free needs one."""
+    """Number of knot intervals. auto halves the intervals that lose most time, until two rounds together gain less than
+    half the tolerance. A number makes planning faster and the motion slower. knots: free needs a number."""
     tolerance: Positive = Field(default=1.0e-3, le=0.1)
-    """With intervals: auto, how near, as a fraction of t_E, the end time is to be to that of many."""
+    """With intervals: auto, the accepted loss against very many intervals, as a fraction of the end time t_E."""
     knots: Literal["uniform", "free"] = "uniform"
-    """Equal intervals, or their lengths as variables of the optimisation."""
+    """uniform: intervals of equal length; free: their lengths are variables of the optimisation."""
     shortest_interval: Positive = Field(default=0.1, lt=1.0)
-    """With knots: free, the least length of an interval, in mean intervals; never less than 5e-5 t_E."""
+    """With knots: free, the shortest interval as a fraction of the mean one; never less than 5e-5 t_E."""
     rest: Literal["velocity", "full", "jerk"] = "full"
-    """What vanishes at both ends: velocity alone; velocity and acceleration (full); or velocity, acceleration and jerk,
-    and with them the rates of the torques (jerk; degree 4 at least)."""
+    """What is zero at both ends. velocity: the velocity. full: velocity and acceleration. jerk: velocity, acceleration,
+    jerk, and with them the torque rates; needs degree >= 4."""
     points_per_interval: Count = Field(default=3, ge=1, le=100)
     """Collocation points per knot interval."""
 
@@ -247,21 +246,23 @@ class SearchSettings(Model):
     """The search over redundant joints, branches and initial guesses."""
 
     effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
-    """How far the search goes: single plans once, from the most promising guess, and goes on only if that fails."""
+    """How far the search goes: single, fast, thorough or exhaustive. single plans once, from the best guess, and
+    continues like fast only if that fails. The last two use more guesses."""
     guesses: Literal["lattice", "numeric"] = "lattice"
-    """Where initial guesses come from: a lattice of postures, or numeric inverse kinematics from the start posture."""
+    """Source of the initial guesses: lattice (a lattice of postures) or numeric (inverse kinematics from the start
+    posture)."""
     jobs: Count = Field(default=1, ge=1)
-    """Processes that plan at the same time; no more than there are processors are used."""
+    """Number of processes that plan at the same time, limited to the number of processors."""
     time_limit: Positive = Field(default=60.0, le=1e6)
-    """Time from the call after which the best motion so far is returned, s; one that is not verified where none is, a
-    second later perhaps."""
+    """Time limit of the whole plan, s. The best verified motion found by then is returned; if there is none, an
+    unverified one, perhaps a second later."""
     seed: Count = Field(default=0, ge=0)
-    """Seed of what is drawn at random."""
+    """Seed of the random numbers."""
     least_motion: Flag = True
-    """Whether, of motions that are as fast as the fastest one to 1e-4, the calmest one is taken: that with the least
-    joint accelerations."""
+    """Whether the smoothest motion is chosen: least joint accelerations, with an end time within 1e-4 (relative) of the
+    fastest."""
     slower: Share = 0.0
-    """How much slower the calmest motion may be, for example 1 %, or 0.01."""
+    """How much slower the smoothest motion may be, for example 1 % or 0.01."""
 
     @model_validator(mode="after")
     def _slower_is_for_least_motion(self) -> Self:
@@ -279,11 +280,11 @@ class SolverSettings(Model):
     """The solver of the optimisation problem and its bounds."""
 
     name: Name = "auto"
-    """Solver; auto takes the best one installed."""
+    """Name of the solver; auto takes the best one installed."""
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
-    """Largest number of iterations."""
+    """Maximum number of iterations."""
     time_limit: Positive = Field(default=20.0, le=1e6)
-    """Largest time of one solve, s; search.time_limit bounds the whole plan."""
+    """Maximum time of one solve, s."""
     tolerance: Positive = 1.0e-6
     """Tolerance of the optimality conditions."""
 
@@ -292,12 +293,12 @@ class RefinementSettings(Model):
     """Adding collocation points until the limits hold in between them as well."""
 
     tolerance: Positive = Field(default=1.0e-4, ge=1.0e-5, le=0.01)
-    """Largest relative violation of a limit, anywhere; of a position, beyond its range, in rad (m), or in half ranges
-    where these are shorter. What is less than 1e-5 the checks do not show."""
+    """Largest accepted violation of a limit at any time, relative to the limit. For a position: in rad (m), or relative
+    to half its range if that is less than 1 rad (m). The checks do not resolve less than 1e-5."""
     density: Count = Field(default=10, ge=10, le=1000)
-    """Grid points for checking limits, per collocation point."""
+    """Number of points per collocation point at which limits are checked."""
     max_rounds: Count = Field(default=10, ge=0, le=1000)
-    """Largest number of rounds; 0 switches refinement off."""
+    """Maximum number of rounds; 0 switches refinement off."""
 
 
 def expand_solver_name(solver: object) -> object:
@@ -309,14 +310,14 @@ class BoundarySettings(Model):
     """Speeds at both ends of the path, or a motion that goes round for ever."""
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
-    """Speed along the path at its start, m/s (rad/s where the position stands still; along a path of joints the norm of
-    their velocities). At an end in motion the redundant joints' velocities are free, and spline.rest: full says that
-    the speed begins, or ends, constant."""
+    """Speed along the path at its start, m/s. It is in rad/s if the tool only turns there; along a path of joints it is
+    the norm of the joint velocities. If it is not zero, velocities of redundant joints are free there, and with
+    spline.rest: full the speed does not change at that instant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
-    """As start_speed, at the path's end."""
+    """The same at the path's end."""
     periodic: Flag = False
-    """Whether a closed path is gone round for ever: posture, velocity and acceleration at its end are those at its
-    start (with spline.degree: 2 the acceleration jumps)."""
+    """Whether a closed path is repeated without stopping: posture, velocity and acceleration at its end equal those at
+    its start. With spline.degree: 2 the acceleration jumps there."""
 
     @model_validator(mode="after")
     def _periodic_has_no_ends(self) -> Self:

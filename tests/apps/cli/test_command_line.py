@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from brachis import planner
+from brachis import planner, plots
 from brachis.apps.cli.app import EXAMPLES, app
 from support.effort import QUICK
 
@@ -72,6 +72,11 @@ def test_help_of_the_program(run):
     assert "130  interrupted" in outcome.out
     nothing = run(columns=80)
     assert (nothing.code, nothing.out, nothing.err) == (2, "", outcome.out)
+
+
+def test_help_of_plot_lists_every_figure(run):
+    text = run("plot", "--help", columns=80).out
+    assert all(kind in text.split("--kind")[1] for kind in plots.PLOTS)
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -238,7 +243,7 @@ def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
     outcome = run("plan", write(task))
     assert outcome.code == 1
     assert "Traceback" not in outcome.err
-    assert "fault of brachis; run again with --verbose" in outcome.err
+    assert "bug in brachis; run again with --verbose" in outcome.err
     assert "Traceback" in run("plan", write(task), "--verbose").err
 
 

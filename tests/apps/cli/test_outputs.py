@@ -163,7 +163,7 @@ def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
         "brachis: standard output cannot be written: No space left on device\n"
         in done.stderr
     )
-    assert "fault of brachis" not in done.stderr
+    assert "bug in brachis" not in done.stderr
     assert "Exception ignored" not in done.stderr
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 EXIT_CODES = (
     "0    done; of a plan: planned and verified",
-    "1    no verified plan; a fault of brachis; output that cannot be written",
+    "1    no verified plan; a bug in brachis; output that cannot be written",
     "2    wrong input: a file, a key, an option",
     "3    planned and verified, but a figure could not be written",
     "130  interrupted (Ctrl-C) before there was a motion",
@@ -31,7 +31,7 @@ EXIT_CODES = (
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "": (
-        "brachis new scara3                # a task for a robot that comes along",
+        "brachis new scara3                # a task for an included robot",
         "brachis plan task.yaml --out out  # plan, verify, draw",
     ),
     "robots": ("brachis robots", "brachis robots --json"),
@@ -67,7 +67,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "sweep": (
         "brachis sweep lines.yaml --jobs 2",
-        "brachis sweep lines.yaml --retry  # goes on where it was ended",
+        "brachis sweep lines.yaml --retry  # continues a sweep, plans failures again",
     ),
 }
 """Examples in the help, by command; those of the whole program under "". They work in this order, with a sweep file."""
@@ -174,7 +174,7 @@ def options(
             "-q",
             callback=_set_verbosity,
             expose_value=False,
-            help="Print errors only, and JSON if asked for.",
+            help="Print only errors, and JSON with --json.",
         ),
     ] = False,
     verbose: Annotated[
@@ -184,7 +184,7 @@ def options(
             "-v",
             callback=_set_verbosity,
             expose_value=False,
-            help="Say on standard error what is done and when; tracebacks.",
+            help="Write every step and its time to standard error, and tracebacks of errors.",
         ),
     ] = False,
 ) -> None:
@@ -197,14 +197,14 @@ Json = Annotated[
 ]
 Degrees = Annotated[
     bool,
-    Option("--degrees", help="Show angles in degrees; files and JSON stay in rad."),
+    Option("--degrees", help="Show angles in degrees; files and JSON keep rad."),
 ]
 Strict = Annotated[
     bool | None,
     Option(
         "--strict/--no-strict",
-        help="Refuse all implausible figures, such as degrees for rad, or only warn of them. Default: only a start "
-        "posture that looks like degrees is refused.",
+        help="Treat implausible figures, such as degrees for rad, as errors or as warnings. Default: only a start "
+        "posture that looks like degrees is an error.",
     ),
 ]
 Changes = Annotated[
@@ -212,11 +212,13 @@ Changes = Annotated[
     Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Change a key of the task, dotted as in spline.intervals=40 or path.0.line.length=0.5; the value is YAML. "
+        help="Change a key of the task, for example spline.intervals=40 or path.0.line.length=0.5. The value is YAML. "
         "Repeatable.",
     ),
 ]
-Urdf = Annotated[Path | None, Option(help="URDF file to use instead of the task's.")]
+Urdf = Annotated[
+    Path | None, Option(help="URDF file to use instead of the one in the task.")
+]
 ToolFrame = Annotated[str | None, Option(help="Link at the end of the chain.")]
 BaseFrame = Annotated[str | None, Option(help="Link at the start of the chain.")]
 _MOTIONS = ("result.npz", "unverified.npz")

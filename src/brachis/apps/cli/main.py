@@ -100,7 +100,7 @@ def _run(output: StandardOutput, *, as_json: bool) -> int | str | None:
         if get_verbosity() is Verbosity.VERBOSE:
             traceback.print_exc()
         message = (
-            f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
+            f"internal error: {type(error).__name__}: {error}. This is a bug in brachis; "
             "run again with --verbose for the traceback and report it"
         )
         return print_failure(message, 1, as_json=as_json)

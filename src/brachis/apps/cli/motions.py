@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 ResultFile = Annotated[
     Path,
     Argument(
-        help="Result file (npz) written by 'brachis plan --out', or its folder.",
+        help="Result file (npz) of 'brachis plan --out', or its folder.",
         metavar="RESULT",
     ),
 ]
@@ -69,7 +69,7 @@ def export(
     out: Annotated[
         Path,
         Option(
-            help="File to write; its suffix says the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every "
+            help="File to write. Its suffix sets the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every "
             "joint; SI units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4."
         ),
     ],
@@ -77,21 +77,20 @@ def export(
         str | None,
         Option(
             "--format",
-            help="Format, by name: csv, parquet, json, ros2, mcap, urscript, gif or mp4.",
+            help="Name of the format: csv, parquet, json, ros2, mcap, urscript, gif or mp4.",
         ),
     ] = None,
     dt: Annotated[
         float | None,
         Option(
-            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations."
+            help="Sampling period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations."
         ),
     ] = None,
     last: Annotated[
         str | None,
         Option(
-            help="Where the rows end: exact, at the end time, which need not be a multiple of the period; or hold, at "
-            "the first multiple of it that is not before the end time, with the end posture held at rest. Default: "
-            "exact; hold for URScript."
+            help="Time of the last sample. exact: the end time, even if it is not a multiple of the period. hold: the "
+            "next multiple of the period; the end posture is held until then. Default: exact; hold for URScript."
         ),
     ] = None,
     joints: Annotated[
@@ -128,7 +127,7 @@ def plot(
     kind: Annotated[
         str,
         Option(
-            help="Which figure: torques, postures, motion, overview, timeline or limits."
+            help="Figure to draw: torques, postures, motion, overview, timeline, limits or fit."
         ),
     ] = "overview",
 ) -> None:
@@ -153,15 +152,15 @@ def report(
     result: ResultFile,
     out: Annotated[
         Path | None,
-        Option(help="HTML file to write; default: beside the result, as result.html."),
+        Option(help="HTML file to write. Default: result.html next to the result."),
     ] = None,
     title: Annotated[
         str | None,
-        Option(help="Title of the page; default: the robot's name and the file's."),
+        Option(help="Title of the page. Default: the names of the robot and the file."),
     ] = None,
     degrees: Degrees = False,
 ) -> None:
-    """Write a saved motion as one HTML page to judge it by."""
+    """Write a report of a saved motion as one HTML page."""
     result, trajectory = _load(result)
     out = result.with_suffix(".html") if out is None else out
     if title is None:
@@ -214,14 +213,14 @@ def view(
         bool,
         Option(
             "--browser/--no-browser",
-            help="Open the browser, where there is a screen and a terminal.",
+            help="Open the browser if there is a screen and a terminal.",
         ),
     ] = True,
     degrees: Degrees = False,
 ) -> None:
     """Show a saved motion in the browser.
 
-    Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
+    It shows robot, path, tool trace and ghost postures, and plots of the limits with a time slider. Ctrl-C ends it.
     """
     from brachis.apps.view import Viewer
 
@@ -272,7 +271,10 @@ def schema(
         Path | None, Option(help="File to write instead of standard output.")
     ] = None,
     of: Annotated[
-        str, Option(help="Of what: task files, or trajectory (exported as JSON).")
+        str,
+        Option(
+            help="Which schema: task (task files) or trajectory (motions exported as JSON)."
+        ),
     ] = "task",
 ) -> None:
     """Print the JSON schema of tasks, or of exported JSON."""

@@ -54,8 +54,8 @@ def plan(
     out: Annotated[
         Path | None,
         Option(
-            help="Folder for result.npz, result.json, overview.png and candidates.png (and fit.png, where the path was "
-            "fitted to points); of a motion that fails the verification the names begin with unverified."
+            help="Folder for result.npz, result.json, overview.png and candidates.png, and fit.png if the path was "
+            "fitted to points. If the verification fails, the names begin with unverified."
         ),
     ] = None,
     urdf: Urdf = None,
@@ -67,7 +67,7 @@ def plan(
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
-    """Plan a task, verify the motion, and show what came out."""
+    """Plan a task, verify the motion, and print the result."""
     from brachis.apps.view import Viewer, require_viser
 
     if view:
@@ -178,29 +178,29 @@ def bottleneck(
     task: Annotated[
         Path,
         Argument(
-            help="Task file (YAML), or result file (npz) of a motion planned before.",
+            help="Task file (YAML), or result file (npz) of a saved motion.",
             metavar="TASK|RESULT",
         ),
     ],
     check: Annotated[
         bool,
         Option(
-            "--check", help="Solve again with every limit raised by 1 %, and compare."
+            "--check", help="Solve again with each limit raised by 1 %, and compare."
         ),
     ] = False,
     reference: Annotated[
         bool,
         Option(
             "--reference",
-            help="Compare with the best value known: the same problem with discontinuous torque allowed, on a fine "
-            "mesh; not a proven bound. Takes seconds.",
+            help="Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best "
+            "known value, not a proven bound, and takes seconds.",
         ),
     ] = False,
     out: Annotated[
         Path | None,
         Option(
-            help="Folder for bottleneck.json and timeline.png; of a motion that fails the verification the names "
-            "begin with unverified_."
+            help="Folder for bottleneck.json and timeline.png. If the verification fails, the names begin with "
+            "unverified_."
         ),
     ] = None,
     urdf: Urdf = None,
@@ -209,9 +209,10 @@ def bottleneck(
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
-    """Say what holds a motion back: which limits cost time.
+    """Report which limits cost time.
 
-    How much each of them costs, and when it is active, of a task that is planned for it or of a saved motion.
+    For each limit: how much time it costs, and when it is active. A task is planned first; a saved motion is used as it
+    is.
     """
     from brachis.optimise.candidate import coordinates
 
@@ -281,13 +282,15 @@ def sweep(
     out: Annotated[
         Path | None,
         Option(
-            help="Folder for plans, table.parquet, table.csv and sweep.png. Default: one in the current folder, named "
-            "as the file. A sweep that was ended continues with what is missing there."
+            help="Folder for plans, table.parquet, table.csv and sweep.png. Default: a folder in the current one with "
+            "the name of the file. An interrupted sweep continues there with the missing plans."
         ),
     ] = None,
     jobs: Annotated[
         int | None,
-        Option(help="Processes. Default and largest: the number of processors."),
+        Option(
+            help="Number of processes. Default and maximum: the number of processors."
+        ),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -295,12 +298,10 @@ def sweep(
             help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file."
         ),
     ] = None,
-    retry: Annotated[
-        bool, Option("--retry", help="Plan stored failures again.")
-    ] = False,
+    retry: Annotated[bool, Option("--retry", help="Plan failed plans again.")] = False,
     json: Json = False,
 ) -> None:
-    """Plan a task many times, with its keys varied."""
+    """Plan a task many times with different values of its keys."""
     from brachis.apps.sweeps.plans import VERIFIED
 
     with end_cleanly(), show_progress(in_logs=True) as listener:

@@ -27,7 +27,7 @@ from brachis.errors import InputError
 
 
 def list_robots(json: Json = False) -> None:
-    """List the robots that come with brachis."""
+    """List the included robots."""
     robots = brachis.robots
     listed = [
         {
@@ -46,7 +46,7 @@ def list_robots(json: Json = False) -> None:
         (each["name"], each["what"], len(each["joints"]), ", ".join(each["joints"]))
         for each in listed
     ]
-    print_table("robots that come with brachis", columns, rows, numbers=("joints",))
+    print_table("included robots", columns, rows, numbers=("joints",))
     print_lines(
         *(f"{each['name']}: {each['urdf']}" for each in listed),
         "A name may stand for the URDF: brachis inspect scara3, brachis new scara3",
@@ -62,21 +62,19 @@ def _describe_robot(urdf: Path) -> str:
 def new(
     urdf: Annotated[
         Path,
-        Argument(
-            help="URDF file, or the name of a robot that comes along.", metavar="URDF"
-        ),
+        Argument(help="URDF file, or the name of an included robot.", metavar="URDF"),
     ],
-    out: Annotated[Path, Option(help="Task file to write, a new one.")] = Path(
-        "task.yaml"
-    ),
+    out: Annotated[
+        Path, Option(help="Task file to write; it must not exist yet.")
+    ] = Path("task.yaml"),
     tool_frame: ToolFrame = None,
     base_frame: BaseFrame = None,
     json: Json = False,
 ) -> None:
     """Write a first task for a robot, with comments.
 
-    It has a posture away from limits and singularities and a short line that can be reached from it, and it has been
-    planned and verified.
+    The task starts in a posture away from limits and singularities and follows a short line. It has been planned and
+    verified.
     """
     from brachis.apps.starter import starter_task
 
@@ -151,14 +149,17 @@ def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
 def compose(
     arm: Annotated[
         Path,
-        Argument(help="URDF file of the arm, or the name of a robot.", metavar="ARM"),
+        Argument(
+            help="URDF file of the arm, or the name of an included robot.",
+            metavar="ARM",
+        ),
     ],
     travel: Annotated[
         tuple[float, float],
         Option("--range", help="Lowest and highest position on the rail, m."),
     ],
-    velocity: Annotated[float, Option(help="Limit of the rail's speed, m/s.")],
-    force: Annotated[float, Option(help="Limit of the rail's drive force, N.")],
+    velocity: Annotated[float, Option(help="Velocity limit of the rail, m/s.")],
+    force: Annotated[float, Option(help="Force limit of the rail's drive, N.")],
     mass: Annotated[float, Option(help="Mass of the carriage, kg.")],
     out: Annotated[Path, Option(help="URDF file to write.")],
     axis: Annotated[
@@ -170,19 +171,19 @@ def compose(
     mount_rpy_deg: Annotated[
         Triple,
         Option(
-            help="Its roll, pitch and yaw, degrees; 180 0 0 hangs the arm upside down."
+            help="Roll, pitch and yaw of this link, degrees; 180 0 0 hangs the arm upside down."
         ),
     ] = _ZERO,
     name: Annotated[str, Option(help="Name of the rail's joint.")] = "rail",
     root: Annotated[
-        str, Option(help="Name of the root link, the world frame.")
+        str, Option(help="Name of the root link, which is the world frame.")
     ] = "world",
-    meshes: Annotated[bool, Option(help="Keep the arm's meshes, or drop them.")] = True,
+    meshes: Annotated[bool, Option(help="Keep or remove the arm's meshes.")] = True,
     json: Json = False,
 ) -> None:
     """Mount an arm on a linear axis, as a new URDF.
 
-    No figure of the axis is guessed.
+    You state all figures of the axis; none is guessed.
     """
     rail = brachis.compose.Rail(
         axis=axis,
