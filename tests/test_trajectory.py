@@ -367,7 +367,7 @@ BROKEN = {
     ),
     "q too large": (
         {"q": put((3, 1), 1e300)},
-        "q: not all are finite numbers of a usable size",
+        "q: some numbers are not finite or are too large",
     ),
     "too many times": (
         {"times": np.linspace(0.0, 1.0, 50_001)},

@@ -356,7 +356,7 @@ def rows(robot, *names):
             (),
             "J_nr is singular everywhere: there is always a motion of the tool that needs j4",
         ),
-        (iiwa, (0, 1, 2, 3), ("x", "y", "z"), "no whole pose is prescribed"),
+        (iiwa, (0, 1, 2, 3), ("x", "y", "z"), "this family solves only poses"),
         (rail_arm, (1,), (), "j1 would be left over and not revolute"),
         *((panda_lengths, (i,), (), "EAIK knows no decomposition") for i in (0, 1, 2)),
         *((gen3, (i,), (), "EAIK knows no decomposition") for i in range(7)),

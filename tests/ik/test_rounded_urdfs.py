@@ -249,7 +249,7 @@ def test_what_is_farther_off_is_refused_and_the_reason_named(name, joint):
     ]
     assert re.search(r"its axes are up to 1\.\de-03 rad", reasons[0])
     assert (
-        "at most 1e-04 is taken for rounding. If the URDF rounds angles" in reasons[0]
+        "at most 1e-04 is accepted as rounding. If the URDF rounds angles" in reasons[0]
     )
 
 

@@ -226,7 +226,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"points": wave(5), "orientations": np.ones((5, 2))},
-        r"orientations of the wrong shape",
+        r"the orientations have the wrong shape",
     ),
     (
         {"points": wave(5), "orientations": np.ones(4)},

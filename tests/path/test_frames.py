@@ -250,7 +250,7 @@ def test_a_path_says_its_frame() -> None:
 def test_frames_that_do_not_fit() -> None:
     with pytest.raises(
         TaskError,
-        match=r"path_frame: this frame is not among frames; found 'table' .*allowed: workpiece",
+        match=r"path_frame: this frame is not defined in frames; found 'table' .*allowed: workpiece",
     ):
         written(SEGMENTS, path_frame="table")
     with pytest.raises(
@@ -265,7 +265,7 @@ def test_frames_that_do_not_fit() -> None:
         written(SEGMENTS, frames={"workpiece": {"xy": [0, 0]}})
     with pytest.raises(
         TaskError,
-        match=r"path_frame: another frame than in path.frame; found 'workpiece' .*allowed: table, or one of both keys",
+        match=r"path_frame: this frame differs from path.frame; found 'workpiece' .*allowed: table, or only one of the two keys",
     ):
         written(
             {"frame": "table", "segments": SEGMENTS},

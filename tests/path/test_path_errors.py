@@ -155,12 +155,12 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"spline": {"through": [[1, 1], [1, 1]]}},
         XY,
-        ["spline.through[1]: a waypoint repeats its predecessor"],
+        ["spline.through[1]: a waypoint repeats the one before"],
     ),
     (
         {"spline": {"through": [[0, 0], [1, 1], [1, 1]]}},
         XY,
-        ["spline.through[2]: a waypoint repeats its predecessor"],
+        ["spline.through[2]: a waypoint repeats the one before"],
     ),
     (
         {"spline": {"through": [[0, 0]]}},
@@ -204,7 +204,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
         {"spline": {"through": [[1, 1]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
         XY,
         [
-            "path[0].spline.orientations: orientations are for task spaces of poses",
+            "path[0].spline.orientations: orientations need a task space of poses",
             "[x, y]",
             "Set task_space: pose",
         ],

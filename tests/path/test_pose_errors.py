@@ -133,7 +133,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
                 "orientations": [{"rpy_deg": [0, 0, 9]}, {"rpy_deg": [0, 0, 0]}],
             }
         },
-        ["path[0].spline.through[1]: a waypoint repeats its predecessor"],
+        ["path[0].spline.through[1]: a waypoint repeats the one before"],
     ),
     (
         {"spline": {"through": [[0, 0, 0]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},

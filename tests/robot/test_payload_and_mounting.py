@@ -270,7 +270,9 @@ def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
     for wrong in (0.0, 1.2, -1.0):
         with pytest.raises(TaskError, match="speed_override: out of range"):
             of(plain, tool_frame="tool", speed_override=wrong)
-    with pytest.raises(InputError, match="has no velocity limit to act on"):
+    with pytest.raises(
+        InputError, match="the speed override has no velocity limit to scale"
+    ):
         of(
             plain,
             tool_frame="tool",

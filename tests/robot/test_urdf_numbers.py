@@ -76,12 +76,12 @@ def test_an_inertia_that_parsers_drop_in_silence_is_refused():
         (
             "effort='60.0'",
             "effort='10 Nm'",
-            'Write numbers alone, in Nm or N, such as effort="10"',
+            'Write only numbers, in Nm or N, such as effort="10"',
         ),
         (
             "effort='60.0'",
             "effort='10Nm'",
-            'Write numbers alone, in Nm or N, such as effort="10"',
+            'Write only numbers, in Nm or N, such as effort="10"',
         ),
         ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0, 0, 1'/>", 'Write xyz="0 0 1"'),
         (
@@ -92,7 +92,7 @@ def test_an_inertia_that_parsers_drop_in_silence_is_refused():
         (
             "xyz='0.4 0.0 0.0'",
             "xyz='0.4m 0.0m 0.0m'",
-            'Write numbers alone, in m, such as xyz="0.4 0.0 0.0"',
+            'Write only numbers, in m, such as xyz="0.4 0.0 0.0"',
         ),
     ],
 )

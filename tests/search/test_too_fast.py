@@ -62,7 +62,7 @@ def test_a_run_up_that_is_too_short_is_told_with_what_would_do(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path before s = 0\.1 is too short for the way to it",
+        match=r"the path before s = 0\.1 is too short to reach it",
     ) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
     possible = np.sqrt(2.0 * 0.1 * LENGTH)
@@ -117,7 +117,7 @@ def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path behind s = 0\.9 is too short for the way to it",
+        match=r"the path behind s = 0\.9 is too short to reach it",
     ):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits))
 
@@ -127,7 +127,7 @@ def test_of_several_parts_the_one_is_told_that_is_too_fast(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path behind s = 0\.9 is too short for the way to it",
+        match=r"the path behind s = 0\.9 is too short to reach it",
     ) as caught:
         brachis.plan(
             slide(

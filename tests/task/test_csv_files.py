@@ -406,13 +406,13 @@ AMBIGUOUS = [
     (
         "x,y,z",
         {"orientation": "rpy"},
-        ["csv.orientation is rpy, which the columns", "Leave csv.orientation away"],
+        ["csv.orientation is rpy, which the columns", "Remove csv.orientation"],
     ),
     (
         "x,y,z",
         {"orientation": "kuka"},
         [
-            "csv.orientation: this convention of an orientation is not known",
+            "csv.orientation: this convention of an orientation is unknown",
             "kuka_abc (A",
         ],
     ),

@@ -116,11 +116,11 @@ def test_a_program_reads_the_file_too(tmp_path):
         ),
         (
             {"limits": {"torque": [1, 2, [3, 4]]}},
-            ["limits.torque[2]: a pair of limits lies around zero"],
+            ["limits.torque[2]: a pair of limits must lie around zero"],
         ),
         (
             {"limits": {"scale": {"torque": 0.5}}},
-            ["limits.scale: factors on limits belong to the task"],
+            ["limits.scale: a limits file cannot contain factors on limits"],
         ),
     ],
     ids=str,
@@ -135,9 +135,9 @@ def test_files_that_are_none(tmp_path, loaded):
     with pytest.raises(TaskError, match=r"robot\.limits_file: the file does not exist"):
         loaded({"limits_file": "nowhere.yaml"})
     (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
-    with pytest.raises(TaskError, match="a limits file is a mapping"):
+    with pytest.raises(TaskError, match="the limits file is not a mapping of keys"):
         read_limits(tmp_path / "list.yaml")
-    with pytest.raises(TaskError, match="the file of limits was not read"):
+    with pytest.raises(TaskError, match="the limits file was not read"):
         robot_from_settings(RobotSettings(urdf="x.urdf", limits_file="limits.yaml"))
 
 

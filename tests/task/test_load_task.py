@@ -308,7 +308,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (
         {"search": {"slower": 0.1, "least_motion": False}},
         [
-            "search.slower: a slower motion is of use for least motion alone",
+            "search.slower: a slower motion is possible only with least_motion: true",
             "least_motion: true",
         ],
     ),
@@ -532,8 +532,8 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
             "robot: {limits: {torque: 1, torque: 2}}",
             ["line 1, column 29", "'torque' occurs twice"],
         ),
-        ("[1, 2]", ["a task is a mapping; found [1, 2] (a list)"]),
-        ("", ["a task is a mapping; found null"]),
+        ("[1, 2]", ["the task is not a mapping of keys; found [1, 2] (a list)"]),
+        ("", ["the task is not a mapping of keys; found null"]),
         ("a: 1\n---\nb: 2", ["not valid YAML"]),
         ("a: !!python/object:os.system {}", ["not valid YAML"]),
         ("when: 2024-13-45", ["not valid YAML"]),

@@ -275,16 +275,14 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     data = json.loads(outcome.out)
     assert data["interrupted"]
     assert (
-        data["undone"][-1]
-        == "what search.effort asks for was not tried to its end"
+        data["undone"][-1] == "the search that search.effort requires was not completed"
     )
     assert (
         "brachis: the search was ended early; this is the best motion so far\n"
         in outcome.err
     )
     assert all(
-        f"brachis: not completed: {each}\n" in outcome.err
-        for each in data["undone"]
+        f"brachis: not completed: {each}\n" in outcome.err for each in data["undone"]
     )
 
 
@@ -320,7 +318,7 @@ def test_the_folder_of_a_motion_stands_for_it(run, planned, tmp_path):
     outcome = run("verify", tmp_path / "empty")
     assert outcome.code == 2
     assert (
-        "is a folder without a motion; allowed: result.npz or unverified.npz"
+        "this folder contains no motion; allowed: result.npz or unverified.npz"
         in outcome.err
     )
 
@@ -393,7 +391,7 @@ def test_the_saved_motion_is_not_written_over(run, planned):
     assert run("export", saved, "--out", saved).code == 2
     outcome = run("export", saved, "--out", saved, "--format", "csv")
     assert outcome.code == 2
-    assert "would be written over an input" in outcome.err
+    assert "the output would overwrite an input file" in outcome.err
     assert run("plot", saved, "--out", saved).code == 2
     assert saved.read_bytes() == before
 

@@ -162,7 +162,7 @@ def test_wrong_files(run, tmp_path):
         (gone, tmp_path / "new.urdf", "gone.urdf: the file does not exist"),
         (broken, tmp_path / "new.urdf", "not well-formed XML"),
         (SCARA, tmp_path / "no/new.urdf", "new.urdf: cannot be written"),
-        (SCARA, SCARA, "would be written over an input"),
+        (SCARA, SCARA, "the output would overwrite an input file"),
     ):
         outcome = run("compose", arm, *FIGURES, "--out", out)
         assert outcome.code == 2

@@ -53,7 +53,10 @@ def test_import(run, recorded, tmp_path):
     assert run("verify", out).code == 0
     outcome = run("bottleneck", out)
     assert outcome.code == 0, outcome.err
-    assert "the motion was not planned: what a limit costs is not known" in outcome.out
+    assert (
+        "the motion was not planned, so the cost of its limits is unknown"
+        in outcome.out
+    )
     assert run("export", out, "--out", tmp_path / "again.json").code == 0
     assert (
         run("import", file, "--robot", cell, "--angle", "deg", "--out", cell).code == 2

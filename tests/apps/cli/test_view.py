@@ -79,7 +79,7 @@ def test_a_folder_without_a_motion_is_refused(run, tmp_path):
     refused = run("view", tmp_path)
     assert refused.code == 2
     assert (
-        "is a folder without a motion; allowed: result.npz or unverified.npz"
+        "this folder contains no motion; allowed: result.npz or unverified.npz"
         in refused.err
     )
 

@@ -176,7 +176,8 @@ def test_arm_is_never_overwritten(arm, tmp_path, monkeypatch):
     monkeypatch.chdir(arm.parent)
     for output in (arm, alias, Path("arm.urdf"), Path("../arm/arm.urdf")):
         with pytest.raises(
-            InputError, match=r"output .*: is the arm's own file; allowed: another file"
+            InputError,
+            match=r"output .*: the output would overwrite the arm's URDF; allowed: another file",
         ):
             on_rail(arm, Rail(**RAIL), output=output)
     assert arm.read_text() == before

@@ -134,7 +134,7 @@ def test_standing_still_before_and_after_does_not_count(table, write):
         (
             "t,j1 [deg],j2,j3",
             {"angle": "rad"},
-            "the header contradicts the units asked for; found deg",
+            "the unit in the header is not the requested unit; found deg",
         ),
         ("t,j1,j2,j3", {"angle": "grad"}, "unknown unit of angle; found grad"),
     ],

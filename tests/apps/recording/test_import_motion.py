@@ -133,7 +133,7 @@ def test_bottlenecks_are_when_limits_are_active(imported):
     assert found.to_dict()["sensitivities"] is None
     text = str(found)
     assert text.startswith(
-        "the motion was not planned: what a limit costs is not known\n"
+        "the motion was not planned, so the cost of its limits is unknown\n"
     )
     assert "is at its torque limit for" in text
     with pytest.raises(InputError, match="nothing of it can be solved again"):

@@ -85,7 +85,7 @@ def test_a_port_that_somebody_takes_in_between_is_refused_as_well(server, monkey
 def test_what_is_no_port_is_refused(port):
     with pytest.raises(
         InputError,
-        match=rf"--port: the port does not exist; found {port}; allowed: 0 to 65535",
+        match=rf"--port: the port is out of range; found {port}; allowed: 0 to 65535",
     ):
         start_server(LOOPBACK, port)
 

@@ -123,7 +123,7 @@ def test_mistakes_are_named(text, message):
 
 def test_positions_alone_are_given():
     with pytest.raises(
-        TaskError, match=r"G-code gives positions alone; found x, y, yaw"
+        TaskError, match=r"G-code contains only positions; found x, y, yaw"
     ):
         points_of(PROGRAM, ("x", "y", "yaw"))
 

@@ -35,7 +35,7 @@ def in_words(
 ) -> list[str]:
     """Say what a report found, a line each; see `BottleneckReport` for its parts."""
     if sensitivities is None:
-        lines = ["the motion was not planned: what a limit costs is not known"]
+        lines = ["the motion was not planned, so the cost of its limits is unknown"]
     else:
         lines = _costs(sensitivities, t_end, degrees=degrees)
     if knots is not None:
@@ -60,7 +60,7 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     lines = []
     if not found.reliable:
         lines.append(
-            f"beware: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
+            f"warning: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
             "motion is not an optimum, and the savings below are rough"
         )
     costly = [
@@ -108,11 +108,11 @@ def _knots(found: KnotCost, t_end: float) -> list[str]:
         f"{_figures(100.0 * found.saved)} % ({_figures(1e3 * found.saved * t_end)} ms)"
     )
     hint = (
-        "; spline.intervals: auto, or more of them, come nearer to that"
+        "; to come closer, set spline.intervals: auto or a larger number"
         if found.given
         else ""
     )
-    again = f"timed anew in the phase plane, where torques jump, the same joint path takes {found.t_end:.4g} s"
+    again = f"with torques that may jump, the same joint path takes {found.t_end:.4g} s"
     return [
         f"the knots cost about {saved} with {write_count(found.intervals, 'interval')}: {again}{hint}"
     ]

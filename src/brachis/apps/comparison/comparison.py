@@ -144,7 +144,7 @@ class Comparison(Summary):
         """What has to be known of the recorded motion besides the times."""
         remarks = [
             f"the recorded motion exceeds the {use.limit} limit of {use.recorded_at} by "
-            f"{100.0 * (use.recorded - 1.0):.2g} % at {use.recorded_time:.4f} s, as its rows prove; between them it "
+            f"{100.0 * (use.recorded - 1.0):.2g} % at {use.recorded_time:.4f} s, as its rows prove; between the rows the "
             f"may be by up to {100.0 * (use.recorded_up_to - 1.0):.2g} %"
             for use in self.exceeded
         ]
