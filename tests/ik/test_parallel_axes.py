@@ -269,7 +269,7 @@ def test_reasons():
     assert (
         refusal(tx90l().robot(), ()) == "no three successive joints have parallel axes"
     )
-    assert refusal(ON_RAIL.robot(), ()) == "7 joints would be left over, not six"
+    assert refusal(ON_RAIL.robot(), ()) == "7 joints left to solve for, not six"
     assert refusal(UR.robot(), (0, 1, 2), ["x", "y", "z"]) == "only for poses"
     steps = list(UR.steps)
     steps[5] = steps[5] @ placement((0.1, 0.0, 0.0))

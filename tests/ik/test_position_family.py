@@ -204,7 +204,7 @@ def test_refusals():
         ):
             positioning.build(geometry, space, (0, 4, 5, 6))
     with pytest.raises(
-        NotApplicableError, match="4 joints would be left over, not three"
+        NotApplicableError, match="4 joints left to solve for, not three"
     ):
         positioning.build(geometry, position, (0, 4, 5))
     with pytest.raises(NotApplicableError) as caught:

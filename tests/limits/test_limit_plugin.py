@@ -196,7 +196,11 @@ LINE = ROOT / "examples/01_scara_line.yaml"
     [
         ({"labels": ()}, "own_limits[0].lower", "found (1,); allowed: (0,)"),
         ({"lower": np.ones(2)}, "own_limits[0].lower", "(2,)"),
-        ({"lower": np.ones(1)}, "own_limits[0]", "lower is not below upper"),
+        (
+            {"lower": np.ones(1)},
+            "own_limits[0]",
+            "the lower bounds are not below the upper bounds",
+        ),
         (
             {"values": lambda motion: motion.qdot[:, 2]},
             "own_limits[0].values",
@@ -215,7 +219,7 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         (
             {"partials": lambda _motion: Partials()},
             "own_limits[0].partials",
-            "all None",
+            "all partial derivatives are None",
         ),
         (
             {"partials": lambda _motion: None},
@@ -240,9 +244,7 @@ def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
 
 @pytest.mark.parametrize("wrong", [Rate, 3.0, "torque"], ids=str)
 def test_what_is_no_limit_is_refused(wrong):
-    with pytest.raises(
-        InputError, match=r"limits\[0\]: is not a limit that can be bound"
-    ):
+    with pytest.raises(InputError, match=r"limits\[0\]: this object is not a limit"):
         brachis.plan(LINE, own_limits=[wrong])
 
 

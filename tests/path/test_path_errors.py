@@ -85,7 +85,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"arc": {"center": [0, 0], "angle_deg": 9}},
         XY,
-        ["path[0].arc.center: ", "zero length", "centre is its start"],
+        ["path[0].arc.center: ", "zero length", "centre is at its start"],
     ),
     (
         {"arc": {"center": [1, 0], "angle_deg": 0}},
@@ -178,7 +178,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
         [
             "no spline goes through the waypoints",
             "found distances from 1e-06 to 1e+12",
-            "like distances",
+            "similar distances",
         ],
     ),
     (
@@ -217,12 +217,12 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
         XYZ,
-        ["path[0].turn: a turn is for", "Set task_space: pose"],
+        ["path[0].turn: a turn needs", "Set task_space: pose"],
     ),
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
         XYW,
-        ["path[0].turn: a turn is for", "line: {by: [0, 0, ...]}"],
+        ["path[0].turn: a turn needs", "line: {by: [0, 0, ...]}"],
     ),
 ]
 

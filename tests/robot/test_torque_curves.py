@@ -88,7 +88,7 @@ def test_other_mistakes_are_refused_with_their_key():
         robot(torque_speed=[CURVE])
     for wrong in (0.0, -3.0, "much"):
         with pytest.raises(
-            InputError, match=r"robot.limits.total_power: is not a power"
+            InputError, match=r"robot.limits.total_power: the total power is not valid"
         ):
             robot(total_power=wrong)
     with pytest.raises(InputError, match="power limit"):

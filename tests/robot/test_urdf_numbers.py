@@ -204,9 +204,9 @@ def test_xacro_that_is_left_is_named():
         (
             "<link name='link2'>",
             "<link name='link1'>",
-            "links share a name; found link1",
+            "links have the same name; found link1",
         ),
-        ("<joint name='j2'", "<joint name='j1'", "joints share a name; found j1"),
+        ("<joint name='j2'", "<joint name='j1'", "joints have the same name; found j1"),
         ("<link name='link2'>", "<link>", "a <link> has no name"),
         (
             "type='revolute'",

@@ -523,7 +523,7 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeyp
     )
     assert result.verified
     assert (
-        "the motion has 25 of 100 intervals, of which more were not solved"
+        "the motion has 25 intervals, and was not solved with all 100"
         in result.not_completed
     )
 

@@ -59,8 +59,8 @@ def test_a_speed_is_lowered_to_nearly_the_largest_that_is_possible(task, possibl
         lambda changed, *_: changed.boundary.end_speed <= possible,
     )
     good, bad = re.match(
-        r"Lower boundary\.end_speed to ([\d.]+) m/s \(a plan with it was verified; there was none with ([\d.]+) m/s\), "
-        "or try another path",
+        r"Lower boundary\.end_speed to ([\d.]+) m/s \(a plan with it was verified; no plan was found with "
+        r"([\d.]+) m/s\), or try another path",
         found,
     ).groups()
     assert float(good) <= possible < float(bad) <= 1.06 * float(good)

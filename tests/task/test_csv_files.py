@@ -211,19 +211,27 @@ MISTAKES: list[tuple[str, list[str]]] = [
     ("# nothing\n\n", ["poses.csv: the file is empty"]),
     (
         "x,y\n0,0\n1,1",
-        ["poses.csv: line 1: wrong columns; found x, y; allowed: x,y,z | x,y,z,qw"],
+        [
+            "poses.csv: line 1: the columns are wrong; found x, y; allowed: x,y,z | x,y,z,qw"
+        ],
     ),
     (
         "t,x,y,z\n0,0,0,0",
-        ["line 1: wrong columns; found t, x, y, z", "The first line names the columns"],
+        [
+            "line 1: the columns are wrong; found t, x, y, z",
+            "The first line names the columns",
+        ],
     ),
-    ("x,y,z,z\n0,0,0,0", ["line 1: wrong columns; found x, y, z, z"]),
-    ("x,y,z,qx,qy,qz\n0,0,0,0,0,0", ["line 1: wrong columns"]),
+    ("x,y,z,z\n0,0,0,0", ["line 1: the columns are wrong; found x, y, z, z"]),
+    ("x,y,z,qx,qy,qz\n0,0,0,0,0,0", ["line 1: the columns are wrong"]),
     (
         "x|y|z\n0|0|0",
-        ["line 1: wrong columns; found x|y|z", "separated by commas, semicolons"],
+        [
+            "line 1: the columns are wrong; found x|y|z",
+            "separated by commas, semicolons",
+        ],
     ),
-    ("0,0,0\n1,1,1", ["line 1: wrong columns; found 0, 0, 0"]),
+    ("0,0,0\n1,1,1", ["line 1: the columns are wrong; found 0, 0, 0"]),
     (
         "x,y,z\n0,0,0",
         ["poses.csv: a path needs its start and at least one waypoint; found 1 row of"],
@@ -289,7 +297,7 @@ def test_columns_of_the_wrong_task_space() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     with pytest.raises(
         TaskError,
-        match=r"line 1: wrong columns; found x, y, z, rx, ry, rz; allowed: x,y,yaw",
+        match=r"line 1: the columns are wrong; found x, y, z, rx, ry, rz; allowed: x,y,yaw",
     ):
         task(["x", "y", "yaw"])
 
@@ -318,7 +326,7 @@ def test_one_word_on_the_orientation() -> None:
         "orientation": "fixed",
     }
     with pytest.raises(
-        TaskError, match=r"path\[0\].orientation: the points' orientations say already"
+        TaskError, match=r"path\[0\].orientation: the points already have orientations"
     ):
         load_task(
             {

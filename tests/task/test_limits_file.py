@@ -314,7 +314,7 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
         ),
         (
             ("!degrees -170", "!degrees left"),
-            ["!degrees stands before a number, and not before 'left'"],
+            ["!degrees needs a number, not 'left'"],
         ),
         (
             ("!degrees -170", "!degres -170"),

@@ -232,7 +232,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (
         {"spline": SPLINE | {"orientations": [QUATERNION]}},
         [
-            "path[0].spline.orientations: a spline needs an orientation for each",
+            "path[0].spline.orientations: the numbers of waypoints and of orientations differ",
             "found 1; allowed: 2",
         ],
     ),
@@ -252,7 +252,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (
         {"spline": SPLINE, "orientation": "fixed"},
         [
-            "path[0].orientation: the spline's orientations say already",
+            "path[0].orientation: the spline already has orientations",
             "found 'fixed'",
         ],
     ),
@@ -334,7 +334,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
         [1, 2, 3, 1, 0, 0, 0],
         "pose",
         [
-            "path_start: a list does not say how",
+            "path_start: a list does not state its convention",
             "quaternion_xyzw (quaternion, w last: ROS",
         ],
     ),
@@ -351,7 +351,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
     (
         {"position": [1, 2, 3], "rpy_deg": [1, 2, 3]},
         "position",
-        ["path_start: a position with an orientation is for"],
+        ["path_start: a position with an orientation needs"],
     ),
     (
         7,
@@ -362,7 +362,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
         None,
         "pose",
         [
-            "path_start: a free start posture leaves open",
+            "path_start: with a free start posture, the start of the path is missing",
             "allowed: {position: [x, y, z], ...} with one of",
         ],
     ),

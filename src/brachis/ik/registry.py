@@ -243,7 +243,7 @@ class _Matcher:
                     solver = PolishedSolver(
                         solver, self._geometry, self._task_map, redundant
                     )
-                    remark = f"the axes are within {ideal.miss} of an ideal arm's; the solutions are refined numerically"
+                    remark = f"the axes are within {ideal.miss} of an ideal arm's; solutions are refined numerically"
                 check_answers(self._robot, self._task_map, redundant, solver)
             except NotApplicableError as reason:
                 reasons[family.name] = str(reason)

@@ -152,7 +152,7 @@ def resolve_limits(
         A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
         nor an acceleration limit; a range is empty or ends more than 1e6 rad or m away from zero.
     InputError
-        A speed override the speed override has no velocity limit to scale; the total power is outside [`LEAST`, `LARGEST`]; a torque
+        A speed override has no velocity limit to scale; the total power is outside [`LEAST`, `LARGEST`]; a torque
         curve is not valid or rises.
     UnknownNameError
         A limit names a joint that is not of the chain.

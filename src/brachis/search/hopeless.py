@@ -259,9 +259,10 @@ def _explain_end_speed(problem: Problem, plane: PhasePlane) -> Failure | None:
     speeds = {key: getattr(problem.task.boundary, key) for key in shares}
     most = f"{share * speeds[key]:.3g} {unit}"
     return Failure(
-        f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
+        f"the limits do not allow this speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
-        found=f"{speeds[key]:g} {unit}, where one joint path was estimated to allow about {most}",
+        found=f"{speeds[key]:g} {unit}",
+        needed=f"about {most} (estimate along one joint path)",
         hint="Raise the limits that hold the motion back",
         remedies=[
             Remedy(f"boundary.{key}", speed, _FIRST * shares[key] * speed, unit)
@@ -387,7 +388,7 @@ def _describe_reach(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, 
         places[0] = f"before s = {s[0]:.2g}"
         cuts[0] = first + 0.01
     if not reached[-1]:
-        places[1] = f"after s =  {s[-1]:.2g}"
+        places[1] = f"after s = {s[-1]:.2g}"
         cuts[1] = last - 0.01
     text = f"the path {' and '.join(places.values())} is too short to reach it"
     # Of two ends neither is enough by itself.

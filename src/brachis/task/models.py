@@ -315,7 +315,7 @@ class Task(Model):
             (
                 given and self.of_poses and not of_pose,
                 "path_start",
-                "a list does not state the convention of its orientation, such as whether w of a quaternion is first or last",
+                "a list does not state its convention, such as whether w of a quaternion is first or last",
                 self._start_forms,
             ),
             (

@@ -268,7 +268,7 @@ class SplineThrough(Model):
             (
                 self.orientations is None and self.starts_oriented is not None,
                 "starts_oriented",
-                "the orientation at the start stands beside the orientations at the waypoints",
+                "an orientation at the start needs orientations at the waypoints",
                 "orientations as well",
             )
         )

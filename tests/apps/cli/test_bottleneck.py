@@ -165,7 +165,7 @@ def test_a_saved_motion(run, task, write, tmp_path):
 def test_a_saved_motion_keeps_its_urdf(run, tmp_path):
     outcome = run("bottleneck", tmp_path / "result.npz", "--urdf", SCARA)
     assert outcome.code == 2
-    assert "belongs to the robot and task that it was planned for" in outcome.err
+    assert "this option cannot be used with a saved motion" in outcome.err
 
 
 def test_wrong_input(run, task, write, tmp_path):

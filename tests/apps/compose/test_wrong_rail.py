@@ -48,10 +48,13 @@ FIGURES = {
         {"carriage_size": (1, 1, 0)},
         "carriage_size: wrong value; found (1, 1, 0); allowed: three lengths",
     ),
-    "empty name": ({"name": ""}, "name: is not a name; found ''"),
-    "name with a space": ({"name": "my rail"}, "name: is not a name; found 'my rail'"),
-    "name with a null": ({"name": "rail\0"}, "name: is not a name"),
-    "name that is none": ({"root": 7}, "root: is not a name; found 7"),
+    "empty name": ({"name": ""}, "name: this is not a valid name; found ''"),
+    "name with a space": (
+        {"name": "my rail"},
+        "name: this is not a valid name; found 'my rail'",
+    ),
+    "name with a null": ({"name": "rail\0"}, "name: this is not a valid name"),
+    "name that is none": ({"root": 7}, "root: this is not a valid name; found 7"),
 }
 
 
@@ -88,7 +91,7 @@ URDFS = {
     ),
     "links of one name": (
         "<robot name='x'><link name='a'/><link name='a'/></robot>",
-        ["links share a name", "found a"],
+        ["links have the same name", "found a"],
     ),
     "two roots": (
         "<robot name='x'><link name='a'/><link name='b'/></robot>",

@@ -208,7 +208,7 @@ def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(
         export.write(ur10, path, joints=ur10.joint_names[1:], dt=0.1)
     (warning,) = caught
     assert str(warning.message).startswith(
-        f"{SENTENCE}. Move what is missing by its own controller"
+        f"{SENTENCE}. Move the missing joints with their own controller"
     )
     text = path.read_text()
     if suffix == ".json":

@@ -135,11 +135,11 @@ def test_many_angles_go_to_more_panels_in_order():
 @pytest.mark.parametrize(
     ("rows", "message", "where"),
     [
-        ([], "nothing to compare", "rows"),
-        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "is not a case", "rows[1]"),
-        ([(0.0, "j1", 0.0)], "is not an end time", "rows[0]"),
-        ([(0.0, "j1", -1.0)], "is not an end time", "rows[0]"),
-        ([(0.0, "j1", math.inf)], "is not an end time", "rows[0]"),
+        ([], "the list of rows is empty", "rows"),
+        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "the case is not valid", "rows[1]"),
+        ([(0.0, "j1", 0.0)], "the end time is not valid", "rows[0]"),
+        ([(0.0, "j1", -1.0)], "the end time is not valid", "rows[0]"),
+        ([(0.0, "j1", math.inf)], "the end time is not valid", "rows[0]"),
         ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "comes twice", "rows[1]"),
     ],
 )

@@ -60,7 +60,7 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
         plan for plan, outcome in found.items() if outcome.facts["status"] == "failed"
     } == {4, 7}
     assert found[4].facts["error"] == "BrokenExecutor"
-    assert "ended its worker process" in found[4].facts["message"]
+    assert "each worker process ended during this plan" in found[4].facts["message"]
 
 
 def test_what_no_worker_can_run_ends_the_sweep():

@@ -183,7 +183,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
     ):
         with pytest.raises(
             InputError,
-            match="holds other files; allowed: a new folder, or one with a sweep's",
+            match="contains other files; allowed: a new folder, or one with a sweep's",
         ):
             use()
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
@@ -200,7 +200,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
         ({"grid": {"path.1.line.length": [1, 2]}}, ["path is a list of 1", "path.1"]),
         (
             {"grid": {"robot.limits.torque.scale": [1, 2]}},
-            ["robot.limits.torque has no keys of its own", "found 10"],
+            ["robot.limits.torque is a value without keys", "found 10"],
         ),
         (
             {"grid": {"start.joints.3": [0.1]}},

@@ -95,7 +95,8 @@ def test_a_host_that_is_not_here_is_refused(monkeypatch):
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     with pytest.raises(
-        InputError, match=r"--host: cannot be listened on; found 192\.0\.2\.1"
+        InputError,
+        match=r"--host: the viewer cannot listen on this address; found 192\.0\.2\.1",
     ):  # an address of no machine
         start_server("192.0.2.1", 0)
     monkeypatch.setattr(socket, "getaddrinfo", unknown)

@@ -14,9 +14,9 @@ POINTS = np.linspace([0.0, 0.0, 0.0], [0.1, 0.2, 0.3], 20)
 WRONG = [
     (np.full(20, np.inf), r"row 0: a speed must be positive and finite"),
     (np.full(20, -0.1), r"row 0: a speed must be positive and finite"),
-    (np.ones((20, 3)), r"speeds of the wrong shape; found \(20, 3\)"),
+    (np.ones((20, 3)), r"the speeds have the wrong shape; found \(20, 3\)"),
     (["a"] * 20, r"not an array of numbers"),
-    (np.ones(19), r"as many speed as points are needed"),
+    (np.ones(19), r"the numbers of points and of rows of speed differ"),
 ]
 
 

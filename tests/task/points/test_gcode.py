@@ -106,7 +106,7 @@ MISTAKES = [
     ),
     ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: not understood; found 'X#1'"),
     ("G0 X1 Y1 Z1\nG1 X2 F0", r"line 2: a feed rate must be positive; found F0"),
-    ("G0 X1 Y1", r"a.nc: no motion; found 0 places.*Z is never stated"),
+    ("G0 X1 Y1", r"a.nc: the program contains no motion; found 0 places.*Z is missing"),
     ("G0 X1 Y1 Z1\nM98 P1000", r"line 2: subprograms are not read; found M98"),
     (
         "G54 G0 X1 Y1 Z1\nG1 X2 F10\nG55\nG1 X3",

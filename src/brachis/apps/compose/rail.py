@@ -286,7 +286,7 @@ def on_rail(
     Raises
     ------
     InputError
-        A name is taken, or `output` cannot be written or the output would overwrite the arm's URDF.
+        A name is taken, or `output` cannot be written or would overwrite the arm's URDF.
     UrdfError
         The arm's URDF is missing, broken, not one tree, or has bodies that are not physical.
 

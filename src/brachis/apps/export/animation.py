@@ -139,7 +139,7 @@ def film_of(
     step : float
         Of which the format's periods are multiples, s.
     joints : sequence of str or None
-        None: an animation cannot leave out joints.
+        None: an animation shows the whole robot.
     slower : float
         How many times slower than in real time the motion goes.
 

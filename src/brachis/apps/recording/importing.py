@@ -255,8 +255,8 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Followed:
             found=str(error),
             allowed=f"{tolerance:g} m and rad",
             where="path",
-            hint="If the tool stops and changes its direction, split the file there. If the positions are measured, set their "
-            "noise, or raise the tolerance",
+            hint="If the tool stops and changes its direction, split the file there. If the positions are measured, "
+            "set their noise, or raise the tolerance",
         ) from error
     path = build_path(segments, values[0], task_map.rows)
     s = _nearest(task_map, path, values, length / length[-1])
@@ -378,7 +378,7 @@ def _notes(
         *recording.notes,
         *nodes.notes,
         "unknown: the motion between the rows, and the measured torques",
-        f"the tool's path is computed by forward kinematics; the fitted curve is at most {followed.miss:.1e} m or rad off",
+        f"the tool's path comes from forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
         f"its tolerance is {tolerance:.1e} m and rad",
     )
 
