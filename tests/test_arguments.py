@@ -71,7 +71,7 @@ def motion():
         ),
         (
             lambda: brachis.verify_trajectory(5),
-            "trajectory: not a motion; found int; allowed: a Trajectory, a Result, or",
+            "trajectory: this is not a motion; found int; allowed: a Trajectory, a Result, or",
         ),
     ],
 )
@@ -85,8 +85,8 @@ def test_what_is_asked_for_is_named(make, told):
     [
         (
             {"tolerance": 1e-3},
-            "This name is a key inside another keyword: "
-            "spline={'tolerance': ...} or solver={'tolerance': ...} or refine",
+            ("This name is a key inside another keyword: "
+            "spline={'tolerance': ...} or solver={'tolerance': ...} or refine"),
         ),
         (
             {"torque": 5.0},

@@ -69,7 +69,8 @@ def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
             assert isinstance(candidate.solver, PolishedSolver)
             assert candidate.solver.branches == ideal.solver.branches
             assert re.fullmatch(
-                r"the axes are within \de-0[56] rad and \de-0[67] m of an ideal arm's; solutions are refined numerically",
+                r"the axes are within \de-0[56] rad and \de-0[67] m of an ideal arm's; solutions are refined "
+                r"numerically",
                 re.sub(r"\.\d", "", candidate.remark),
             )
         else:

@@ -364,5 +364,5 @@ def test_the_start_must_fit_the_rows() -> None:
         build_path(segments, [0.0, float("nan")], XY)
     with pytest.raises(PathError, match="at least one segment"):
         build_path([], [0.0, 0.0], XY)
-    with pytest.raises(UnknownNameError, match="no row of the task space named 'w'"):
+    with pytest.raises(UnknownNameError, match="no task space row named 'w'"):
         build_path(segments, [0.0, 0.0], ["x", "w"])

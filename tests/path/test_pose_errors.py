@@ -54,7 +54,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 0]}}},
-        ["path[0].turn: the turn has zero length", "another orientation"],
+        ["path[0].turn: the turn has zero length", "an orientation that differs"],
     ),
     (
         {"turn": {"to": HALF}},

@@ -209,7 +209,7 @@ def test_wrong_length(kind):
     with pytest.raises(InputError) as caught:
         limits_of(**{kind: value})
     assert (
-        f"robot.limits.{kind}: has the wrong number of values; found 2; allowed: 3"
+        f"robot.limits.{kind}: the list has the wrong number of values; found 2; allowed: 3"
         in str(caught.value)
     )
 

@@ -107,7 +107,7 @@ def test_missing_and_repeated_figures():
     assert "link 'link1': <inertia izz> is missing" in refused(
         changed('izz="0.055"', "")
     )
-    assert "link 'link1': <mass> is there twice" in refused(
+    assert "link 'link1': <mass> occurs twice" in refused(
         changed("<mass", '<mass value="1"/><mass')
     )
     assert "3 finite numbers" in refused(changed("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0'"))
@@ -172,7 +172,7 @@ def test_ghost_links_are_named():
     assert "the child of joint 'j2' is not a link of the robot" in refused(
         changed("<child link='link2'/>", "<child link='ghost'/>")
     )
-    assert "the parent of joint 'j2' is not a link of the robot; found none" in refused(
+    assert "the parent of joint 'j2' is not a link of the robot; found no name" in refused(
         changed("<parent link='link1'/>", "")
     )
 

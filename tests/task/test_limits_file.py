@@ -107,7 +107,7 @@ def test_a_program_reads_the_file_too(tmp_path):
         ),
         (
             {"limits": {"torque": [1, 2]}},
-            ["limits.torque: has the wrong number of values; found 2", "j1, j2, j3"],
+            ["limits.torque: the list has the wrong number of values; found 2", "j1, j2, j3"],
         ),
         ({"limits": {"torque": {"j4": 1}}}, ["limits.torque", "'j4'", "j1, j2, j3"]),
         (
@@ -292,7 +292,7 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
         (
             ("  j2:", "  j4:"),
             [
-                "joint_limits.yaml: joint_limits: there is no joint of the URDF named 'j4'",
+                "joint_limits.yaml: joint_limits: there is no URDF joint named 'j4'",
                 "j1, j2, j3",
             ],
         ),

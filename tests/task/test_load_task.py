@@ -601,7 +601,7 @@ def test_a_file_needs_a_urdf(tmp_path: Path) -> None:
     file = written(
         tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", "")
     )
-    assert f"{file}: robot.urdf: this key is required" in str(refused(file))
+    assert f"{file}: robot.urdf: a task file needs this key" in str(refused(file))
 
 
 def test_the_given_mapping_is_not_changed() -> None:

@@ -113,7 +113,7 @@ MISTAKES = [
     (
         "x,y,z\n1,5,2,5,3,5\n4,5,6",
         FileUnits(),
-        r"line 2: wrong number of values; found 6; .*Decimal commas need",
+        r"line 2: the row has the wrong number of values; found 6; .*Decimal commas need",
     ),
     (
         "x;y;z\n1.000,5;2;3\n4;5;6",
