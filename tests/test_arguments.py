@@ -85,8 +85,10 @@ def test_what_is_asked_for_is_named(make, told):
     [
         (
             {"tolerance": 1e-3},
-            ("This name is a key inside another keyword: "
-            "spline={'tolerance': ...} or solver={'tolerance': ...} or refine"),
+            (
+                "This name is a key inside another keyword: "
+                "spline={'tolerance': ...} or solver={'tolerance': ...} or refine"
+            ),
         ),
         (
             {"torque": 5.0},

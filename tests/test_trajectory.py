@@ -323,7 +323,7 @@ BROKEN = {
     "urdf broken": ({"urdf": "<robot"}, "not well-formed XML"),
     "urdf of another robot": (
         {"urdf": lambda text: text.replace('"j2"', '"elbow"')},
-        "joint_names: other joints",
+        "joint_names: the joints are not those",
     ),
     "task missing": ({"task": None}, "task: wrong type"),
     "task the name of a file": (

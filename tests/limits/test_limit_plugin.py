@@ -226,7 +226,11 @@ LINE = ROOT / "examples/01_scara_line.yaml"
             "own_limits[0].partials",
             "is not a brachis.limits.Partials",
         ),
-        ({"labels": (Label("j1", "torque", "Nm"),)}, "own_limits[0].labels", "taken"),
+        (
+            {"labels": (Label("j1", "torque", "Nm"),)},
+            "own_limits[0].labels",
+            "this label exists already",
+        ),
         ({"labels": ("j3",)}, "own_limits[0].labels", "Label"),
         (
             {"labels": (), "lower": np.empty(0), "upper": np.empty(0)},
@@ -249,7 +253,7 @@ def test_what_is_no_limit_is_refused(wrong):
 
 
 def test_limits_are_a_list():
-    with pytest.raises(InputError, match="limits: is not a list"):
+    with pytest.raises(InputError, match="limits: this is not a list"):
         brachis.plan(LINE, own_limits=Given())
 
 

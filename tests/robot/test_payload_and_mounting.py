@@ -233,7 +233,9 @@ def test_friction_is_the_urdfs_unless_the_task_says_otherwise():
 
 
 def test_friction_of_the_urdf_that_cannot_be():
-    with pytest.raises(InputError, match=r"viscous\.j1: the value is negative.*-7 in the URDF"):
+    with pytest.raises(
+        InputError, match=r"viscous\.j1: the value is negative.*-7 in the URDF"
+    ):
         of(DAMPED.replace("damping='7'", "damping='-7'"), tool_frame="tool")
     with pytest.raises(InputError, match="joint 'j1' is not below its torque limit"):
         of(DAMPED.replace("friction='3'", "friction='70'"), tool_frame="tool")

@@ -172,8 +172,9 @@ def test_ghost_links_are_named():
     assert "the child of joint 'j2' is not a link of the robot" in refused(
         changed("<child link='link2'/>", "<child link='ghost'/>")
     )
-    assert "the parent of joint 'j2' is not a link of the robot; found no name" in refused(
-        changed("<parent link='link1'/>", "")
+    assert (
+        "the parent of joint 'j2' is not a link of the robot; found no name"
+        in refused(changed("<parent link='link1'/>", ""))
     )
 
 

@@ -238,7 +238,9 @@ MISTAKES: list[tuple[str, list[str]]] = [
     ),
     (
         "x,y,z\n0,0,0\n1,2\n",
-        ["poses.csv: line 3: the row has the wrong number of values; found 2; allowed: 3: x, y, z"],
+        [
+            "poses.csv: line 3: the row has the wrong number of values; found 2; allowed: 3: x, y, z"
+        ],
     ),
     (
         "x,y,z\n\n0,0,0\n1,1,one\n",

@@ -107,7 +107,10 @@ def test_a_program_reads_the_file_too(tmp_path):
         ),
         (
             {"limits": {"torque": [1, 2]}},
-            ["limits.torque: the list has the wrong number of values; found 2", "j1, j2, j3"],
+            [
+                "limits.torque: the list has the wrong number of values; found 2",
+                "j1, j2, j3",
+            ],
         ),
         ({"limits": {"torque": {"j4": 1}}}, ["limits.torque", "'j4'", "j1, j2, j3"]),
         (

@@ -247,7 +247,9 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"spline": {"through": [[1, 0, 0]], "starts_oriented": QUATERNION}},
-        ["path[0].spline.starts_oriented: an orientation at the start needs orientations"],
+        [
+            "path[0].spline.starts_oriented: an orientation at the start needs orientations"
+        ],
     ),
     (
         {"spline": SPLINE, "orientation": "fixed"},

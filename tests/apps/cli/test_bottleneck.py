@@ -126,7 +126,7 @@ def test_figures_survive_a_drawing_that_cannot_be_written(
     monkeypatch.setattr(plots, "save_figure", full)
     outcome = run("bottleneck", write(task), "--out", tmp_path / "out")
     assert outcome.code == 3
-    assert "timeline.png: cannot be written" in outcome.err
+    assert "timeline.png: the file cannot be written" in outcome.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["bottleneck.json"]
 
 

@@ -136,7 +136,7 @@ def test_a_result_survives_a_full_disk_while_figures_are_written(
     task["spline"]["intervals"] = 10
     outcome = run("plan", write(task), "--out", out, "--json")
     assert outcome.code == 3
-    words = f"the result is written, this figure is not: {out / 'overview.png'}: cannot be written; found No space left"
+    words = f"the result is written, this figure is not: {out / 'overview.png'}: the file cannot be written; found No space left"
     assert words in outcome.err
     data = json.loads(outcome.out)
     assert data["verified"] is True
@@ -164,7 +164,7 @@ def test_failure_while_writing_the_result_leaves_the_earlier_one(
     outcome = run("plan", write(task), "--out", out)
     assert outcome.code == 2
     assert (
-        f"{out / 'result.json'}: cannot be written; found No space left on device"
+        f"{out / 'result.json'}: the file cannot be written; found No space left on device"
         in outcome.err
     )
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
@@ -174,7 +174,7 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
     (tmp_path / "out/result.json").mkdir(parents=True)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
     assert outcome.code == 2
-    assert "result.json: cannot be written; found a folder" in outcome.err
+    assert "result.json: the file cannot be written; found a folder" in outcome.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
 
 

@@ -174,7 +174,7 @@ def ur10(line_trajectory):
 def test_urscript(ur10, tmp_path):
     path, joints = tmp_path / "motion.script", ur10.joint_names[1:]
     with pytest.raises(
-        InputError, match=r"six joints; found rail \(m\), .*Name the arm's six"
+        InputError, match=r"six joints; found rail \(m\), .*List only the arm's six"
     ):
         export.write(ur10, path)
     with pytest.warns(BrachisWarning, match="rail"):

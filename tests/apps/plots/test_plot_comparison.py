@@ -140,7 +140,7 @@ def test_many_angles_go_to_more_panels_in_order():
         ([(0.0, "j1", 0.0)], "the end time is not valid", "rows[0]"),
         ([(0.0, "j1", -1.0)], "the end time is not valid", "rows[0]"),
         ([(0.0, "j1", math.inf)], "the end time is not valid", "rows[0]"),
-        ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "comes twice", "rows[1]"),
+        ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "already in another row", "rows[1]"),
     ],
 )
 def test_wrong_tables_are_refused(rows, message, where):

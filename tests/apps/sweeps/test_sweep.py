@@ -221,7 +221,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
             ["path.0.line.angle_deg is varied twice", "in grid and in rows"],
         ),
         ({"gird": {}}, ["gird", "Did you mean 'grid'"]),
-        ({"task": 3}, ["no task", "found 3"]),
+        ({"task": 3}, ["this is not a task", "found 3"]),
         ({"task": "nothing.yaml"}, ["nothing.yaml", "the file does not exist"]),
         ({"fixed": {"spline.degre": 3}}, ["Did you mean 'degree'"]),
     ],
