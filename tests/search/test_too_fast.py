@@ -200,7 +200,7 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"found 0.9 m/s, allowed: about 0.3 m/s .*one joint path",
+        match=r"found 0.9 m/s; allowed: about 0.3 m/s .*one joint path",
     ) as caught:
         brachis.plan(
             slide(

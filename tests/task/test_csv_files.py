@@ -366,7 +366,7 @@ def test_quaternions_of_numbered_columns() -> None:
     write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, QUATERNIONS]))
     with pytest.raises(
         TaskError,
-        match=r"q1, q2, q3, q4 do not say .* quaternion_wxyz \(quaternion, w first: ABB",
+        match=r"q1, q2, q3, q4 do not state .* quaternion_wxyz \(quaternion, w first: ABB",
     ):
         task()
     given = spline_of(task(orientation="quaternion_wxyz")).starts_oriented
