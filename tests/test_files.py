@@ -222,7 +222,9 @@ def test_results_that_are_too_large_for_the_disk_leave_the_folder_as_it_was(tmp_
 
     def full(path):
         raise InputError(
-            "cannot be written", where=str(path), found="No space left on device"
+            "the file cannot be written",
+            where=str(path),
+            found="No space left on device",
         )
 
     with pytest.raises(

@@ -120,7 +120,9 @@ def test_figures_survive_a_drawing_that_cannot_be_written(
 ):
     def full(_figure, path):
         raise InputError(
-            "cannot be written", where=str(path), found="No space left on device"
+            "the file cannot be written",
+            where=str(path),
+            found="No space left on device",
         )
 
     monkeypatch.setattr(plots, "save_figure", full)

@@ -116,7 +116,7 @@ def test_two_motions_do_not_mix_in_one_folder(
 
 def no_space(path):
     return InputError(
-        "cannot be written", where=str(path), found="No space left on device"
+        "the file cannot be written", where=str(path), found="No space left on device"
     )
 
 

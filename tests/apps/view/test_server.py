@@ -64,7 +64,7 @@ def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(
     taken = server.get_port()
     with pytest.raises(
         InputError,
-        match=rf"the port is in use; found {taken} on 127.0.0.1.*next free one",
+        match=rf"the port is in use; found {taken} on 127.0.0.1.*next free port",
     ):
         start_server(LOOPBACK, taken)
     monkeypatch.setattr("brachis.apps.view.server.FIRST_PORT", taken)
