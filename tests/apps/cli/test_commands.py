@@ -136,7 +136,10 @@ def test_a_result_survives_a_full_disk_while_figures_are_written(
     task["spline"]["intervals"] = 10
     outcome = run("plan", write(task), "--out", out, "--json")
     assert outcome.code == 3
-    words = f"the result is written, this figure is not: {out / 'overview.png'}: the file cannot be written; found No space left"
+    words = (
+        f"the result is written, this figure is not: {out / 'overview.png'}: "
+        "the file cannot be written; found No space left"
+    )
     assert words in outcome.err
     data = json.loads(outcome.out)
     assert data["verified"] is True

@@ -256,7 +256,10 @@ def test_suggestions_come_from_the_valid_names():
     [
         (
             ("plan", "scara3"),
-            "scara3: this is the name of a robot, not of a task file; allowed: a task file. brachis new scara3 writes a first task for it",
+            (
+                "scara3: this is the name of a robot, not of a task file; allowed: a task file. "
+                "brachis new scara3 writes a first task for it"
+            ),
         ),
         (("plan", "scara4"), "there is no robot named 'scara4'"),
         (
