@@ -71,7 +71,7 @@ def motion():
         ),
         (
             lambda: brachis.verify_trajectory(5),
-            "trajectory: not a motion; found int; allowed: a Trajectory, a Result, or",
+            "trajectory: this is not a motion; found int; allowed: a Trajectory, a Result, or",
         ),
     ],
 )
@@ -85,10 +85,19 @@ def test_what_is_asked_for_is_named(make, told):
     [
         (
             {"tolerance": 1e-3},
-            "It is a key of others: spline={'tolerance': ...} or solver={'tolerance': ...} or refine",
+            (
+                "This name is a key inside another keyword: "
+                "spline={'tolerance': ...} or solver={'tolerance': ...} or refine"
+            ),
         ),
-        ({"torque": 5.0}, "It is a key of others: limits={'torque': ...}"),
-        ({"mass": 5.0}, "It is a key of others: payload={'mass': ...}"),
+        (
+            {"torque": 5.0},
+            "This name is a key inside another keyword: limits={'torque': ...}",
+        ),
+        (
+            {"mass": 5.0},
+            "This name is a key inside another keyword: payload={'mass': ...}",
+        ),
         (
             {"payload": 500},
             "allowed: a mapping with keys out of mass, com, inertia. payload: Rigid body held to",
@@ -110,7 +119,9 @@ def test_the_form_of_a_key_is_named(keywords, told):
 
 
 def test_a_key_of_a_section_is_found_in_a_file():
-    with pytest.raises(InputError, match=r"It is a key of its own: spline\.intervals"):
+    with pytest.raises(
+        InputError, match=r"This key belongs elsewhere: spline\.intervals"
+    ):
         brachis.load_task({"brachis": 1, "intervals": 40})
 
 
@@ -127,7 +138,7 @@ def test_a_key_of_a_section_is_found_in_a_file():
         (lambda motion: export.write(motion, "x.csv", dt="a"), "dt: wrong type"),
         (
             lambda motion: motion.save("x.txt"),
-            r"x.txt: the suffix is that of another format; found .txt; allowed: .npz",
+            r"x.txt: the suffix belongs to another format; found .txt; allowed: .npz",
         ),
         (
             lambda _: brachis.robots.scara3.with_payload("5 kg"),

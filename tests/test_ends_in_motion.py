@@ -212,7 +212,7 @@ def test_a_speed_that_no_limit_allows_is_told():
     )
     with pytest.raises(
         brachis.PlanningError,
-        match=r"boundary\.end_speed: .* found 20 m/s, where one joint path was estimated to allow about \d",
+        match=r"boundary\.end_speed: .* found 20 m/s, allowed: about \d",
     ):
         brachis.plan(task)
 
@@ -272,7 +272,7 @@ REFUSED = [
     ),
     (
         {"spline": {"knots": "free", "intervals": 10}},
-        "spline.knots: ends in motion tie control points",
+        "spline.knots: free knots need a motion that begins and ends at rest",
     ),
     ({"boundary": {"start_speed": -0.1}}, "boundary.start_speed"),
 ]

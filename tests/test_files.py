@@ -207,7 +207,7 @@ def test_figures_that_are_too_large_for_the_disk_leave_the_result(tmp_path):
     assert done.stdout.splitlines() == [
         str(result),
         str(small),
-        f"{large}: cannot be written; found File too large",
+        f"{large}: the file cannot be written; found File too large",
     ]
     assert (result.read_text(), small.read_text()) == (500 * "x", 50 * "x")
     assert {path.name for path in tmp_path.iterdir()} == {
@@ -222,11 +222,14 @@ def test_results_that_are_too_large_for_the_disk_leave_the_folder_as_it_was(tmp_
 
     def full(path):
         raise InputError(
-            "cannot be written", where=str(path), found="No space left on device"
+            "the file cannot be written",
+            where=str(path),
+            found="No space left on device",
         )
 
     with pytest.raises(
-        InputError, match=r"result.json: cannot be written; found No space left"
+        InputError,
+        match=r"result.json: the file cannot be written; found No space left",
     ):
         write_files(
             tmp_path,

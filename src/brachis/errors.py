@@ -385,7 +385,7 @@ class NotInstalledError(InputError):
     def __init__(self, user: str, library: str, extra: str) -> None:
         self.library = library
         self.extra = extra
-        hint = f'python -m pip install "brachis[{extra}]" in the environment of brachis, be that installed or a clone'
+        hint = f'Run python -m pip install "brachis[{extra}]" in the Python environment that runs brachis'
         super().__init__(f"{user} needs {library}, which is not installed", hint=hint)
 
 

@@ -172,7 +172,7 @@ def plan(
 
             smoothed = None
             if asked.search.least_motion:
-                report("looking for the calmest motion that is as fast")
+                report("looking for the smoothest motion that is as fast")
                 left = Deadline(0.0) if search.interrupted else deadline
                 smoothed = find_least_motion(best, left, report)
             ended = time.perf_counter()
@@ -215,10 +215,10 @@ def _read(
     section = keywords.get("robot")
     if is_robot(section):
         raise InputError(
-            "this is the section of a task, a mapping",
+            "this is the robot section of a task, not a robot",
             where="robot",
             found=repr(section) if isinstance(section, str) else type(section).__name__,
-            allowed="a robot comes first, without a name: brachis.plan('scara3', path=...)",
+            allowed="a robot as the first argument, as in brachis.plan('scara3', path=...)",
         )
     # Everything else than a robot is a task.
     if task is None and first is not None and not is_robot(first):
@@ -341,7 +341,7 @@ def plan_many(
     is_one = isinstance(tasks, str | os.PathLike | Mapping)
     if is_one or not isinstance(tasks, Iterable):
         raise InputError(
-            "is one task" if is_one else "wrong type",
+            "this is one task, not a list of tasks" if is_one else "wrong type",
             where="tasks",
             found=type(tasks).__name__ if is_one else repr(tasks),
             allowed="a list of tasks",

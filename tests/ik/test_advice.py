@@ -55,7 +55,7 @@ def test_what_is_missing_and_how_to_get_it(monkeypatch):
         "EAIK is not installed (pip install EAIK); it might add the redundant joints [j1], [j2], "
     )
     assert missing.endswith(
-        "[j7]; installing it takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
+        "[j7]; installing it needs a C++ compiler, except on macOS and on Linux for x86_64 with Python 3.13 or older"
     )
 
 

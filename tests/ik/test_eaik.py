@@ -356,10 +356,18 @@ def rows(robot, *names):
             (),
             "J_nr is singular everywhere: there is always a motion of the tool that needs j4",
         ),
-        (iiwa, (0, 1, 2, 3), ("x", "y", "z"), "no whole pose is prescribed"),
-        (rail_arm, (1,), (), "j1 would be left over and not revolute"),
-        *((panda_lengths, (i,), (), "EAIK knows no decomposition") for i in (0, 1, 2)),
-        *((gen3, (i,), (), "EAIK knows no decomposition") for i in range(7)),
+        (iiwa, (0, 1, 2, 3), ("x", "y", "z"), "this family solves only poses"),
+        (
+            rail_arm,
+            (1,),
+            (),
+            "EAIK needs six revolute joints besides the redundant ones; prismatic: j1",
+        ),
+        *(
+            (panda_lengths, (i,), (), "EAIK cannot decompose this arm")
+            for i in (0, 1, 2)
+        ),
+        *((gen3, (i,), (), "EAIK cannot decompose this arm") for i in range(7)),
     ],
 )
 def test_refusals(robot, redundant, names, reason):
@@ -371,7 +379,7 @@ def test_refusals(robot, redundant, names, reason):
 
 def test_angles_that_the_urdf_rounds_too_far_are_named_as_the_cause():
     robot = iiwa_by_angles(1.5708)
-    with pytest.raises(NotApplicableError, match="EAIK knows no decomposition"):
+    with pytest.raises(NotApplicableError, match="EAIK cannot decompose this arm"):
         eaik.build(ChainGeometry.of(robot), rows(robot), (2,))
     # The registry then looks at the ideal arm; of one that is farther off it says what is the matter.
     assert isinstance(find(robot, rows(robot), ["j3"]).solver, PolishedSolver)

@@ -269,8 +269,11 @@ def test_reasons():
     assert (
         refusal(tx90l().robot(), ()) == "no three successive joints have parallel axes"
     )
-    assert refusal(ON_RAIL.robot(), ()) == "7 joints would be left over, not six"
-    assert refusal(UR.robot(), (0, 1, 2), ["x", "y", "z"]) == "only for poses"
+    assert refusal(ON_RAIL.robot(), ()) == "7 joints left to solve for, not six"
+    assert (
+        refusal(UR.robot(), (0, 1, 2), ["x", "y", "z"])
+        == "this family solves only poses"
+    )
     steps = list(UR.steps)
     steps[5] = steps[5] @ placement((0.1, 0.0, 0.0))
     assert "j2, j3, j4 are parallel, but the others are neither" in refusal(

@@ -200,11 +200,11 @@ def test_refusals():
         RowsAndYaw(robot, ("x", "y", "yaw"), 0),
     ):
         with pytest.raises(
-            NotApplicableError, match="only for the position: x, y and z"
+            NotApplicableError, match="this family solves only the position: x, y and z"
         ):
             positioning.build(geometry, space, (0, 4, 5, 6))
     with pytest.raises(
-        NotApplicableError, match="4 joints would be left over, not three"
+        NotApplicableError, match="4 joints left to solve for, not three"
     ):
         positioning.build(geometry, position, (0, 4, 5))
     with pytest.raises(NotApplicableError) as caught:

@@ -69,7 +69,8 @@ def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
             assert isinstance(candidate.solver, PolishedSolver)
             assert candidate.solver.branches == ideal.solver.branches
             assert re.fullmatch(
-                r"axes within \de-0[56] rad and \de-0[67] m of an ideal arm's: answers are polished",
+                r"the axes are within \de-0[56] rad and \de-0[67] m of an ideal arm's; solutions are refined "
+                r"numerically",
                 re.sub(r"\.\d", "", candidate.remark),
             )
         else:
@@ -239,17 +240,17 @@ def test_what_is_farther_off_is_refused_and_the_reason_named(name, joint):
     )
     redundant = ["j1"] * (near.n - 6)
     match = find(near, task_map_of(near, "pose"), redundant)
-    assert re.search(r"axes within [57]\.\de-05 rad", match.remark)
+    assert re.search(r"axes are within [57]\.\de-05 rad", match.remark)
     with pytest.raises(DecompositionError) as caught:
         find(far, task_map_of(far, "pose"), redundant)
     reasons = [
         reason
         for reason in caught.value.reasons.values()
-        if "fits an ideal arm only" in reason
+        if "only for an ideal arm" in reason
     ]
-    assert re.search(r"its axes are up to 1\.\de-03 rad", reasons[0])
+    assert re.search(r"the axes are off by up to 1\.\de-03 rad", reasons[0])
     assert (
-        "at most 1e-04 is taken for rounding. If the URDF rounds angles" in reasons[0]
+        "up to 1e-04 is accepted as rounding. If the URDF rounds angles" in reasons[0]
     )
 
 
@@ -286,7 +287,7 @@ def test_rows_and_yaw_of_a_plane_that_is_almost_upright(redundant):
     assert match.family == "planar"
     assert (
         match.remark
-        == "axes within 3.7e-06 rad of an ideal arm's: answers are polished"
+        == "the axes are within 3.7e-06 rad of an ideal arm's; solutions are refined numerically"
     )
     q = np.random.default_rng(3).uniform(-1.0, 1.0, (2000, 4))
     rest = [i for i in range(4) if i != redundant]
@@ -321,7 +322,7 @@ def test_positions():
     for candidate, expected in zip(find_all(rounded, space), ideal, strict=True):
         assert candidate.family == expected.family
         assert expected.remark == ""
-        assert ("polished" in candidate.remark) == isinstance(
+        assert ("refined numerically" in candidate.remark) == isinstance(
             candidate.solver, PolishedSolver
         )
         if candidate.solver is not None:
@@ -381,11 +382,11 @@ def test_inspect_says_what_is_polished(capsys, monkeypatch):
     remarks = {row["redundant joints"]: row["remark"] for row in data["decompositions"]}
     assert (
         remarks["joint4"]
-        == "axes within 3.7e-06 rad and 1.1e-06 m of an ideal arm's: answers are polished"
+        == "the axes are within 3.7e-06 rad and 1.1e-06 m of an ideal arm's; solutions are refined numerically"
     )
     assert remarks["joint1"] == ""
     inspect(xarm(), task_space="pose")
-    assert capsys.readouterr().out.count("answers are polished") == 4
+    assert capsys.readouterr().out.count("solutions are refined numerically") == 4
 
 
 @pytest.mark.parametrize("joint", ["joint4", "joint7"])

@@ -242,7 +242,7 @@ def test_a_slide_that_moves_the_centre_along_one_axis_of_the_wrist():
 
 
 def test_refusals():
-    with pytest.raises(NotApplicableError, match="only for poses"):
+    with pytest.raises(NotApplicableError, match="this family solves only poses"):
         spherical_wrist.build(
             ChainGeometry.of(rail_arm()),
             task_map_of(rail_arm(), ["x", "y", "z"]),

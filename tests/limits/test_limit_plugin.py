@@ -196,7 +196,11 @@ LINE = ROOT / "examples/01_scara_line.yaml"
     [
         ({"labels": ()}, "own_limits[0].lower", "found (1,); allowed: (0,)"),
         ({"lower": np.ones(2)}, "own_limits[0].lower", "(2,)"),
-        ({"lower": np.ones(1)}, "own_limits[0]", "lower is not below upper"),
+        (
+            {"lower": np.ones(1)},
+            "own_limits[0]",
+            "the lower bounds are not below the upper bounds",
+        ),
         (
             {"values": lambda motion: motion.qdot[:, 2]},
             "own_limits[0].values",
@@ -215,14 +219,18 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         (
             {"partials": lambda _motion: Partials()},
             "own_limits[0].partials",
-            "all None",
+            "all partial derivatives are None",
         ),
         (
             {"partials": lambda _motion: None},
             "own_limits[0].partials",
             "is not a brachis.limits.Partials",
         ),
-        ({"labels": (Label("j1", "torque", "Nm"),)}, "own_limits[0].labels", "taken"),
+        (
+            {"labels": (Label("j1", "torque", "Nm"),)},
+            "own_limits[0].labels",
+            "this label exists already",
+        ),
         ({"labels": ("j3",)}, "own_limits[0].labels", "Label"),
         (
             {"labels": (), "lower": np.empty(0), "upper": np.empty(0)},
@@ -240,14 +248,12 @@ def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
 
 @pytest.mark.parametrize("wrong", [Rate, 3.0, "torque"], ids=str)
 def test_what_is_no_limit_is_refused(wrong):
-    with pytest.raises(
-        InputError, match=r"limits\[0\]: is not a limit that can be bound"
-    ):
+    with pytest.raises(InputError, match=r"limits\[0\]: this object is not a limit"):
         brachis.plan(LINE, own_limits=[wrong])
 
 
 def test_limits_are_a_list():
-    with pytest.raises(InputError, match="limits: is not a list"):
+    with pytest.raises(InputError, match="limits: this is not a list"):
         brachis.plan(LINE, own_limits=Given())
 
 

@@ -165,7 +165,7 @@ def test_timeline_and_ratios_know_it(kind, result):
 
 def test_the_limits_of_rates_are_for_splines_that_can_hold_them(kind):
     figure = {kind: FIGURES[kind]}
-    words = f"the {kind.replace('_', ' ')} limit asks for a continuous acceleration"
+    words = f"the {kind.replace('_', ' ')} limit needs a continuous acceleration"
     with pytest.raises(
         InputError, match=rf"spline\.degree: {words}; found 2, .*; allowed: >= 3"
     ):

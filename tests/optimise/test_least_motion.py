@@ -126,7 +126,7 @@ def test_the_fastest_motion_stays_where_there_is_nothing_to_gain():
     assert result.trajectory is result.candidate.trajectory
     assert result.least_motion.reduction == result.least_motion.later == 0.0
     assert len(result.least_motion.reports) == 1
-    assert "stays" in result.least_motion.status
+    assert "is kept" in result.least_motion.status
 
 
 def test_a_slower_motion_is_calmer(tmp_path):

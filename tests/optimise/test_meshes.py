@@ -255,7 +255,7 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
     assert reports[-1].x.shape == (nested.program.variables,)
     assert (
         nested.not_completed
-        == "the motion has 50 of 100 intervals, of which more were not solved"
+        == "the motion has 50 intervals, and was not solved with all 100"
     )
     settled = adapt_mesh(
         first,
@@ -267,7 +267,7 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
     assert settled.reports[-1] is report
     assert (
         settled.not_completed
-        == "the motion has 13 of 100 intervals, of which more were not solved"
+        == "the motion has 13 intervals, and was not solved with all 100"
     )
 
 

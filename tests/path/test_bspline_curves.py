@@ -213,7 +213,10 @@ def test_a_fitted_task_survives_being_saved() -> None:
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"points": np.zeros((5, 4, 3))}, r"points of the wrong shape; found \(5, 4, 3\)"),
+    (
+        {"points": np.zeros((5, 4, 3))},
+        r"the points have the wrong shape; found \(5, 4, 3\)",
+    ),
     ({"points": [[0.0, np.nan], [1.0, 1.0]]}, r"points: row 0: not finite"),
     ({"points": ["a"]}, r"not an array of numbers"),
     (
@@ -226,16 +229,16 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"points": wave(5), "orientations": np.ones((5, 2))},
-        r"orientations of the wrong shape",
+        r"the orientations have the wrong shape",
     ),
     (
         {"points": wave(5), "orientations": np.ones(4)},
-        r"as many orientations as points are needed; found 4; allowed: 5",
+        r"the numbers of points and of rows of orientations differ; found 4; allowed: 5",
     ),
     ({"points": wave(5), "speed": np.zeros(5)}, r"row 0: a speed must be positive"),
     (
         {"points": wave(5), "tolerance": {"position": "5 kg"}},
-        r"tolerance.position: not a quantity; found '5 kg'.*0.05 mm",
+        r"tolerance.position: this is not a number with a unit; found '5 kg'.*0.05 mm",
     ),
     ({"points": wave(5), "tolerance": {"positions": 1.0}}, r"tolerance"),
     ({"points": wave(5), "units": {"length": "furlong"}}, r"units.length"),

@@ -250,12 +250,12 @@ def test_a_path_says_its_frame() -> None:
 def test_frames_that_do_not_fit() -> None:
     with pytest.raises(
         TaskError,
-        match=r"path_frame: this frame is not among frames; found 'table' .*allowed: workpiece",
+        match=r"path_frame: this frame is not defined in frames; found 'table' .*allowed: workpiece",
     ):
         written(SEGMENTS, path_frame="table")
     with pytest.raises(
         TaskError,
-        match=r"allowed: frames: \{table: \{xyz: \[\.\.\.\], rpy_deg: \[\.\.\.\]\}\} beside",
+        match=r"allowed: frames: \{table: \{xyz: \[\.\.\.\], rpy_deg: \[\.\.\.\]\}\} in the task",
     ):
         written(SEGMENTS, frames={}, path_frame="table")
     with pytest.raises(
@@ -265,7 +265,8 @@ def test_frames_that_do_not_fit() -> None:
         written(SEGMENTS, frames={"workpiece": {"xy": [0, 0]}})
     with pytest.raises(
         TaskError,
-        match=r"path_frame: another frame than in path.frame; found 'workpiece' .*allowed: table, or one of both keys",
+        match=r"path_frame: this frame differs from path.frame; found 'workpiece' "
+        r".*allowed: table, or only one of the two keys",
     ):
         written(
             {"frame": "table", "segments": SEGMENTS},
@@ -283,7 +284,7 @@ def test_frames_that_do_not_fit() -> None:
     tilted = written([{"line": {"by": [0.1, 0.0]}}], task_space=["x", "y"])
     with pytest.raises(
         PathError,
-        match=r"path_frame: .* turns it out of the rows .*\[20.0, -35.0, 110.0\] with .*\[x, y\]",
+        match=r"path_frame: .* turns the path out of the rows .*\[20.0, -35.0, 110.0\] with .*\[x, y\]",
     ):
         brachis.plan(brachis.robots.scara3, tilted, start=[0.5, -2.0, 2.0])
 

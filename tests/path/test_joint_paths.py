@@ -96,7 +96,10 @@ REFUSED = [
         r"spline\.joints.*'c'.*a, b, x",
     ),
     ({"spline": {"through": [[1, 1]], "joints": ["a", "b"]}}, r"joints are missing"),
-    ({"line": {"by": [1, 2, 3]}, "orientation": "fixed"}, "for task spaces of poses"),
+    (
+        {"line": {"by": [1, 2, 3]}, "orientation": "fixed"},
+        "needs a task space of poses",
+    ),
     (
         {"bspline": {**CLAMPED, "control_points": [[0.1, 0.2]] * 5}},
         r"control_points\[0\]: wrong number",

@@ -85,7 +85,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"arc": {"center": [0, 0], "angle_deg": 9}},
         XY,
-        ["path[0].arc.center: ", "zero length", "centre is its start"],
+        ["path[0].arc.center: ", "zero length", "centre is at its start"],
     ),
     (
         {"arc": {"center": [1, 0], "angle_deg": 0}},
@@ -155,12 +155,12 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"spline": {"through": [[1, 1], [1, 1]]}},
         XY,
-        ["spline.through[1]: a waypoint repeats its predecessor"],
+        ["spline.through[1]: a waypoint repeats the one before"],
     ),
     (
         {"spline": {"through": [[0, 0], [1, 1], [1, 1]]}},
         XY,
-        ["spline.through[2]: a waypoint repeats its predecessor"],
+        ["spline.through[2]: a waypoint repeats the one before"],
     ),
     (
         {"spline": {"through": [[0, 0]]}},
@@ -178,7 +178,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
         [
             "no spline goes through the waypoints",
             "found distances from 1e-06 to 1e+12",
-            "like distances",
+            "similar distances",
         ],
     ),
     (
@@ -204,7 +204,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
         {"spline": {"through": [[1, 1]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
         XY,
         [
-            "path[0].spline.orientations: orientations are for task spaces of poses",
+            "path[0].spline.orientations: orientations need a task space of poses",
             "[x, y]",
             "Set task_space: pose",
         ],
@@ -217,12 +217,12 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
         XYZ,
-        ["path[0].turn: a turn is for", "Set task_space: pose"],
+        ["path[0].turn: a turn needs", "Set task_space: pose"],
     ),
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
         XYW,
-        ["path[0].turn: a turn is for", "line: {by: [0, 0, ...]}"],
+        ["path[0].turn: a turn needs", "line: {by: [0, 0, ...]}"],
     ),
 ]
 
@@ -364,5 +364,5 @@ def test_the_start_must_fit_the_rows() -> None:
         build_path(segments, [0.0, float("nan")], XY)
     with pytest.raises(PathError, match="at least one segment"):
         build_path([], [0.0, 0.0], XY)
-    with pytest.raises(UnknownNameError, match="no row of the task space named 'w'"):
+    with pytest.raises(UnknownNameError, match="no task space row named 'w'"):
         build_path(segments, [0.0, 0.0], ["x", "w"])

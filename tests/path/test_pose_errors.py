@@ -54,7 +54,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"turn": {"to": {"rpy_deg": [0, 0, 0]}}},
-        ["path[0].turn: the turn has zero length", "another orientation"],
+        ["path[0].turn: the turn has zero length", "an orientation that differs"],
     ),
     (
         {"turn": {"to": HALF}},
@@ -99,7 +99,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
             "spline": {"through": [[1, 0, 0], [1.000001, 0, 0], [0, 0, 0]]},
             "orientation": "tangent",
         },
-        ["path[0].orientation: the curve all but stops", "found x = 1.17"],
+        ["path[0].orientation: the curve almost stops", "found x = 1.17"],
     ),
     (
         spline(starts_at=[0, 0, 0.1]),
@@ -133,7 +133,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
                 "orientations": [{"rpy_deg": [0, 0, 9]}, {"rpy_deg": [0, 0, 0]}],
             }
         },
-        ["path[0].spline.through[1]: a waypoint repeats its predecessor"],
+        ["path[0].spline.through[1]: a waypoint repeats the one before"],
     ),
     (
         {"spline": {"through": [[0, 0, 0]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
@@ -211,7 +211,7 @@ def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
             [{"turn": TURN}, RIGHT],
             ["a stop: ", "Turn the tool along a segment, by its orientation"],
         ),
-        ([RIGHT, {"turn": TURN}], ["a stop: ", "in a task of its own"]),
+        ([RIGHT, {"turn": TURN}], ["a stop: ", "in a separate task"]),
         (
             [RIGHT, UP, RIGHT, RIGHT | {"orientation": TURN}],
             ["likewise path[1].blend, path[2].blend"],

@@ -258,7 +258,7 @@ def test_the_least_end_time():
     content = task(robot={**task()["robot"], "limits": {**limits, "velocity": None}})
     with pytest.warns(
         brachis.PlausibilityWarning,
-        match="the end time is the least that the planner knows",
+        match="the end time is the smallest that the planner allows",
     ):
         result = brachis.plan(content)
     assert [remark.where for remark in result.warnings] == ["t_end"]

@@ -218,7 +218,7 @@ def test_brachis_counts_armature_once():
         ),
         (
             {"coulomb": [1.0]},
-            r"robot\.friction\.coulomb: has the wrong number of values",
+            r"robot\.friction\.coulomb: the list has the wrong number of values",
         ),
     ],
 )

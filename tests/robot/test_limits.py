@@ -209,7 +209,7 @@ def test_wrong_length(kind):
     with pytest.raises(InputError) as caught:
         limits_of(**{kind: value})
     assert (
-        f"robot.limits.{kind}: has the wrong number of values; found 2; allowed: 3"
+        f"robot.limits.{kind}: the list has the wrong number of values; found 2; allowed: 3"
         in str(caught.value)
     )
 
@@ -273,7 +273,9 @@ def test_limits_at_the_bounds_are_taken():
 
 @pytest.mark.parametrize("pair", [[-1e7, 1.0], [0.2, 1e300], [None, 1e16]])
 def test_ranges_that_end_too_far_away_are_refused(pair):
-    with pytest.raises(LimitError, match="position range ends too far away") as caught:
+    with pytest.raises(
+        LimitError, match="position range is too far from zero"
+    ) as caught:
         limits_of(position={"j1": pair})
     assert caught.value.key == "robot.limits.position.j1"
     assert "null for an open end" in str(caught.value)

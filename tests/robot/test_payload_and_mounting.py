@@ -233,7 +233,9 @@ def test_friction_is_the_urdfs_unless_the_task_says_otherwise():
 
 
 def test_friction_of_the_urdf_that_cannot_be():
-    with pytest.raises(InputError, match=r"viscous\.j1: is negative.*-7 in the URDF"):
+    with pytest.raises(
+        InputError, match=r"viscous\.j1: the value is negative.*-7 in the URDF"
+    ):
         of(DAMPED.replace("damping='7'", "damping='-7'"), tool_frame="tool")
     with pytest.raises(InputError, match="joint 'j1' is not below its torque limit"):
         of(DAMPED.replace("friction='3'", "friction='70'"), tool_frame="tool")
@@ -270,7 +272,9 @@ def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
     for wrong in (0.0, 1.2, -1.0):
         with pytest.raises(TaskError, match="speed_override: out of range"):
             of(plain, tool_frame="tool", speed_override=wrong)
-    with pytest.raises(InputError, match="has no velocity limit to act on"):
+    with pytest.raises(
+        InputError, match="the speed override has no velocity limit to scale"
+    ):
         of(
             plain,
             tool_frame="tool",

@@ -112,5 +112,5 @@ def test_a_posture_may_leave_the_virtual_joint_out():
 def test_a_joint_of_the_virtual_ones_name_is_refused():
     text = chain_urdf(rail_arm_joints()).replace("'j7'", f"'{ROLL_JOINT}'")
     robot = Robot.from_urdf("named", urdf_text=text)
-    with pytest.raises(InputError, match="name of the virtual one"):
+    with pytest.raises(InputError, match="name of the virtual roll joint"):
         bind(robot, "pose_free_roll")

@@ -83,12 +83,12 @@ def test_other_mistakes_are_refused_with_their_key():
     with pytest.raises(UnknownNameError, match=r"torque_speed.*elbow"):
         robot(torque_speed={"elbow": CURVE})
     with pytest.raises(
-        InputError, match=r"robot.limits.torque_speed: is not a mapping"
+        InputError, match=r"robot.limits.torque_speed: this is not a mapping"
     ):
         robot(torque_speed=[CURVE])
     for wrong in (0.0, -3.0, "much"):
         with pytest.raises(
-            InputError, match=r"robot.limits.total_power: is not a power"
+            InputError, match=r"robot.limits.total_power: the total power is not valid"
         ):
             robot(total_power=wrong)
     with pytest.raises(InputError, match="power limit"):

@@ -76,12 +76,12 @@ def test_an_inertia_that_parsers_drop_in_silence_is_refused():
         (
             "effort='60.0'",
             "effort='10 Nm'",
-            'Write numbers alone, in Nm or N, such as effort="10"',
+            'Write only numbers, in Nm or N, such as effort="10"',
         ),
         (
             "effort='60.0'",
             "effort='10Nm'",
-            'Write numbers alone, in Nm or N, such as effort="10"',
+            'Write only numbers, in Nm or N, such as effort="10"',
         ),
         ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0, 0, 1'/>", 'Write xyz="0 0 1"'),
         (
@@ -92,7 +92,7 @@ def test_an_inertia_that_parsers_drop_in_silence_is_refused():
         (
             "xyz='0.4 0.0 0.0'",
             "xyz='0.4m 0.0m 0.0m'",
-            'Write numbers alone, in m, such as xyz="0.4 0.0 0.0"',
+            'Write only numbers, in m, such as xyz="0.4 0.0 0.0"',
         ),
     ],
 )
@@ -107,7 +107,7 @@ def test_missing_and_repeated_figures():
     assert "link 'link1': <inertia izz> is missing" in refused(
         changed('izz="0.055"', "")
     )
-    assert "link 'link1': <mass> is there twice" in refused(
+    assert "link 'link1': <mass> occurs twice" in refused(
         changed("<mass", '<mass value="1"/><mass')
     )
     assert "3 finite numbers" in refused(changed("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0'"))
@@ -172,8 +172,9 @@ def test_ghost_links_are_named():
     assert "the child of joint 'j2' is not a link of the robot" in refused(
         changed("<child link='link2'/>", "<child link='ghost'/>")
     )
-    assert "the parent of joint 'j2' is not a link of the robot; found none" in refused(
-        changed("<parent link='link1'/>", "")
+    assert (
+        "the parent of joint 'j2' is not a link of the robot; found no name"
+        in refused(changed("<parent link='link1'/>", ""))
     )
 
 
@@ -204,9 +205,9 @@ def test_xacro_that_is_left_is_named():
         (
             "<link name='link2'>",
             "<link name='link1'>",
-            "links share a name; found link1",
+            "links have the same name; found link1",
         ),
-        ("<joint name='j2'", "<joint name='j1'", "joints share a name; found j1"),
+        ("<joint name='j2'", "<joint name='j1'", "joints have the same name; found j1"),
         ("<link name='link2'>", "<link>", "a <link> has no name"),
         (
             "type='revolute'",

@@ -22,7 +22,7 @@ def length(item, _listener):
 def test_work_that_cannot_be_sent_is_said_so():
     assert list(run_in_processes(length, ["a", "bc"], jobs=2, listener=print)) == [1, 2]
     with pytest.raises(
-        BrachisError, match=r"other processes cannot do the work; .*jobs: 1"
+        BrachisError, match=r"the worker processes cannot run the plans; .*jobs: 1"
     ):
         list(
             run_in_processes(

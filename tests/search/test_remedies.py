@@ -59,8 +59,8 @@ def test_a_speed_is_lowered_to_nearly_the_largest_that_is_possible(task, possibl
         lambda changed, *_: changed.boundary.end_speed <= possible,
     )
     good, bad = re.match(
-        r"Lower boundary\.end_speed to ([\d.]+) m/s \(a plan with it was verified; there was none with ([\d.]+) m/s\), "
-        "or try another path",
+        r"Lower boundary\.end_speed to ([\d.]+) m/s \(a plan with it was verified; no plan was found with "
+        r"([\d.]+) m/s\), or try another path",
         found,
     ).groups()
     assert float(good) <= possible < float(bad) <= 1.06 * float(good)
@@ -116,8 +116,7 @@ def test_a_number_that_was_not_verified_is_not_told(task, seconds):
     ]
     found = hint(task, remedies, lambda *_: False, seconds=seconds)
     assert (
-        found
-        == "Lower boundary.end_speed (how far was not found out), or try another path"
+        found == "Lower boundary.end_speed (how far is not known), or try another path"
     )
 
 
@@ -173,5 +172,5 @@ def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
         sweep = {"sweep": 1, "task": task, "rows": [{"spline.degree": 3}]}
         (row,) = brachis.sweep(sweep, tmp_path / "out", jobs=1).rows()
         message = row["message"]
-    assert "Raise robot.limits.torque.j1 (how far was not found out)" in message
+    assert "Raise robot.limits.torque.j1 (how far is not known)" in message
     assert bool(trials) is (way == "plan")

@@ -62,7 +62,7 @@ def test_a_run_up_that_is_too_short_is_told_with_what_would_do(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path before s = 0\.1 is too short for the way to it",
+        match=r"the path before s = 0\.1 is too short to reach it",
     ) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
     possible = np.sqrt(2.0 * 0.1 * LENGTH)
@@ -82,7 +82,7 @@ def test_no_number_is_advised_where_the_time_is_up(monkeypatch):
     with pytest.raises(brachis.PlanningError) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
     assert re.match(
-        r"Lower tool_limits\.process_speed\[0\]\.speed \(how far was not found out\), or raise",
+        r"Lower tool_limits\.process_speed\[0\]\.speed \(how far is not known\), or raise",
         caught.value.hint,
     )
 
@@ -117,7 +117,7 @@ def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path behind s = 0\.9 is too short for the way to it",
+        match=r"the path after s = 0\.9 is too short to reach it",
     ):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits))
 
@@ -127,7 +127,7 @@ def test_of_several_parts_the_one_is_told_that_is_too_fast(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path behind s = 0\.9 is too short for the way to it",
+        match=r"the path after s = 0\.9 is too short to reach it",
     ) as caught:
         brachis.plan(
             slide(
@@ -190,7 +190,7 @@ def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is
         )
     with pytest.raises(
         brachis.PlanningError,
-        match=r"boundary.start_speed: .* so high a speed at the path's start",
+        match=r"boundary.start_speed: .* this speed at the path's start",
     ):
         brachis.plan({**content, "boundary": {"start_speed": 20.0}})
 
@@ -200,7 +200,7 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"found 0.9 m/s, where one joint path .* about 0.3 m/s",
+        match=r"found 0.9 m/s; allowed: about 0.3 m/s .*one joint path",
     ) as caught:
         brachis.plan(
             slide(
@@ -217,7 +217,7 @@ def test_an_end_speed_that_another_one_at_the_start_makes_possible(monkeypatch):
     both = {"start_speed": 0.9, "end_speed": 0.9}
     lower = r"Lower boundary\.start_speed and lower boundary\.end_speed"
     with pytest.raises(
-        brachis.PlanningError, match=rf"to allow about 0\.3\d* m/s.*{lower}"
+        brachis.PlanningError, match=rf"allowed: about 0\.3\d* m/s.*{lower}"
     ):
         brachis.plan(
             slide(

@@ -211,26 +211,36 @@ MISTAKES: list[tuple[str, list[str]]] = [
     ("# nothing\n\n", ["poses.csv: the file is empty"]),
     (
         "x,y\n0,0\n1,1",
-        ["poses.csv: line 1: wrong columns; found x, y; allowed: x,y,z | x,y,z,qw"],
+        [
+            "poses.csv: line 1: the columns are wrong; found x, y; allowed: x,y,z | x,y,z,qw"
+        ],
     ),
     (
         "t,x,y,z\n0,0,0,0",
-        ["line 1: wrong columns; found t, x, y, z", "The first line names the columns"],
+        [
+            "line 1: the columns are wrong; found t, x, y, z",
+            "The first line names the columns",
+        ],
     ),
-    ("x,y,z,z\n0,0,0,0", ["line 1: wrong columns; found x, y, z, z"]),
-    ("x,y,z,qx,qy,qz\n0,0,0,0,0,0", ["line 1: wrong columns"]),
+    ("x,y,z,z\n0,0,0,0", ["line 1: the columns are wrong; found x, y, z, z"]),
+    ("x,y,z,qx,qy,qz\n0,0,0,0,0,0", ["line 1: the columns are wrong"]),
     (
         "x|y|z\n0|0|0",
-        ["line 1: wrong columns; found x|y|z", "separated by commas, semicolons"],
+        [
+            "line 1: the columns are wrong; found x|y|z",
+            "separated by commas, semicolons",
+        ],
     ),
-    ("0,0,0\n1,1,1", ["line 1: wrong columns; found 0, 0, 0"]),
+    ("0,0,0\n1,1,1", ["line 1: the columns are wrong; found 0, 0, 0"]),
     (
         "x,y,z\n0,0,0",
         ["poses.csv: a path needs its start and at least one waypoint; found 1 row of"],
     ),
     (
         "x,y,z\n0,0,0\n1,2\n",
-        ["poses.csv: line 3: wrong number of values; found 2; allowed: 3: x, y, z"],
+        [
+            "poses.csv: line 3: the row has the wrong number of values; found 2; allowed: 3: x, y, z"
+        ],
     ),
     (
         "x,y,z\n\n0,0,0\n1,1,one\n",
@@ -289,7 +299,7 @@ def test_columns_of_the_wrong_task_space() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     with pytest.raises(
         TaskError,
-        match=r"line 1: wrong columns; found x, y, z, rx, ry, rz; allowed: x,y,yaw",
+        match=r"line 1: the columns are wrong; found x, y, z, rx, ry, rz; allowed: x,y,yaw",
     ):
         task(["x", "y", "yaw"])
 
@@ -318,7 +328,7 @@ def test_one_word_on_the_orientation() -> None:
         "orientation": "fixed",
     }
     with pytest.raises(
-        TaskError, match=r"path\[0\].orientation: the points' orientations say already"
+        TaskError, match=r"path\[0\].orientation: the points already have orientations"
     ):
         load_task(
             {
@@ -356,7 +366,7 @@ def test_quaternions_of_numbered_columns() -> None:
     write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, QUATERNIONS]))
     with pytest.raises(
         TaskError,
-        match=r"q1, q2, q3, q4 do not say .* quaternion_wxyz \(quaternion, w first: ABB",
+        match=r"q1, q2, q3, q4 do not state .* quaternion_wxyz \(quaternion, w first: ABB",
     ):
         task()
     given = spline_of(task(orientation="quaternion_wxyz")).starts_oriented
@@ -371,7 +381,7 @@ AMBIGUOUS = [
         "x,y,z,rx,ry,rz",
         {},
         [
-            "line 1: the columns rx, ry, rz do not say how",
+            "line 1: the columns rx, ry, rz do not state the convention",
             "rotation_vector (axis times angle: Universal",
         ],
     ),
@@ -406,13 +416,13 @@ AMBIGUOUS = [
     (
         "x,y,z",
         {"orientation": "rpy"},
-        ["csv.orientation is rpy, which the columns", "Leave csv.orientation away"],
+        ["csv.orientation is rpy, which the columns", "Remove csv.orientation"],
     ),
     (
         "x,y,z",
         {"orientation": "kuka"},
         [
-            "csv.orientation: this convention of an orientation is not known",
+            "csv.orientation: this convention of an orientation is unknown",
             "kuka_abc (A",
         ],
     ),

@@ -37,7 +37,10 @@ def test_absent_and_null_mappings_are_made():
     [
         ("path.2.line", ["path is a list of 2", "path.0 to path.1"]),
         ("path.last", ["path.last", "path.0 to path.1"]),
-        ("brachis.version", ["brachis has no keys", "found 1", "Set brachis itself"]),
+        (
+            "brachis.version",
+            ["brachis is a value without keys", "found 1", "Set brachis itself"],
+        ),
         ("spline..degree", ["spline..degree", "joined by dots"]),
         ("", ["joined by dots"]),
     ],

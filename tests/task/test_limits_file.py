@@ -107,7 +107,10 @@ def test_a_program_reads_the_file_too(tmp_path):
         ),
         (
             {"limits": {"torque": [1, 2]}},
-            ["limits.torque: has the wrong number of values; found 2", "j1, j2, j3"],
+            [
+                "limits.torque: the list has the wrong number of values; found 2",
+                "j1, j2, j3",
+            ],
         ),
         ({"limits": {"torque": {"j4": 1}}}, ["limits.torque", "'j4'", "j1, j2, j3"]),
         (
@@ -116,11 +119,11 @@ def test_a_program_reads_the_file_too(tmp_path):
         ),
         (
             {"limits": {"torque": [1, 2, [3, 4]]}},
-            ["limits.torque[2]: a pair of limits lies around zero"],
+            ["limits.torque[2]: a pair of limits must lie around zero"],
         ),
         (
             {"limits": {"scale": {"torque": 0.5}}},
-            ["limits.scale: factors on limits belong to the task"],
+            ["limits.scale: a limits file cannot contain factors on limits"],
         ),
     ],
     ids=str,
@@ -135,9 +138,9 @@ def test_files_that_are_none(tmp_path, loaded):
     with pytest.raises(TaskError, match=r"robot\.limits_file: the file does not exist"):
         loaded({"limits_file": "nowhere.yaml"})
     (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
-    with pytest.raises(TaskError, match="a limits file is a mapping"):
+    with pytest.raises(TaskError, match="the limits file is not a mapping of keys"):
         read_limits(tmp_path / "list.yaml")
-    with pytest.raises(TaskError, match="the file of limits was not read"):
+    with pytest.raises(TaskError, match="the limits file was not read"):
         robot_from_settings(RobotSettings(urdf="x.urdf", limits_file="limits.yaml"))
 
 
@@ -292,7 +295,7 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
         (
             ("  j2:", "  j4:"),
             [
-                "joint_limits.yaml: joint_limits: there is no joint of the URDF named 'j4'",
+                "joint_limits.yaml: joint_limits: there is no URDF joint named 'j4'",
                 "j1, j2, j3",
             ],
         ),
@@ -314,7 +317,7 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
         ),
         (
             ("!degrees -170", "!degrees left"),
-            ["!degrees stands before a number, and not before 'left'"],
+            ["!degrees needs a number, not 'left'"],
         ),
         (
             ("!degrees -170", "!degres -170"),

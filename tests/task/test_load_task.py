@@ -299,7 +299,10 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"search": {"slower": "150 %"}},
-        ["search.slower: not a share; found '150 %'", "100 %"],
+        [
+            "search.slower: this is not a percentage or a fraction; found '150 %'",
+            "100 %",
+        ],
     ),
     (
         {"search": {"slower": 1.5}},
@@ -308,7 +311,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (
         {"search": {"slower": 0.1, "least_motion": False}},
         [
-            "search.slower: a slower motion is of use for least motion alone",
+            "search.slower: a slower motion is possible only with least_motion: true",
             "least_motion: true",
         ],
     ),
@@ -532,8 +535,8 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
             "robot: {limits: {torque: 1, torque: 2}}",
             ["line 1, column 29", "'torque' occurs twice"],
         ),
-        ("[1, 2]", ["a task is a mapping; found [1, 2] (a list)"]),
-        ("", ["a task is a mapping; found null"]),
+        ("[1, 2]", ["the task is not a mapping of keys; found [1, 2] (a list)"]),
+        ("", ["the task is not a mapping of keys; found null"]),
         ("a: 1\n---\nb: 2", ["not valid YAML"]),
         ("a: !!python/object:os.system {}", ["not valid YAML"]),
         ("when: 2024-13-45", ["not valid YAML"]),
@@ -544,7 +547,7 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
             LAUGHS,
             [
                 "not valid YAML",
-                "2.35e+09 values with all aliases written out, at most 1000000 are read",
+                "2.35e+09 values with all aliases expanded, more than the 1000000 allowed",
             ],
         ),
         ("a: " + "[" * 5000, ["not valid YAML"]),
@@ -598,7 +601,7 @@ def test_a_file_needs_a_urdf(tmp_path: Path) -> None:
     file = written(
         tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", "")
     )
-    assert f"{file}: robot.urdf: this key is required" in str(refused(file))
+    assert f"{file}: robot.urdf: a task file needs this key" in str(refused(file))
 
 
 def test_the_given_mapping_is_not_changed() -> None:

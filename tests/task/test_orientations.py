@@ -232,7 +232,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (
         {"spline": SPLINE | {"orientations": [QUATERNION]}},
         [
-            "path[0].spline.orientations: a spline needs an orientation for each",
+            "path[0].spline.orientations: the numbers of waypoints and of orientations differ",
             "found 1; allowed: 2",
         ],
     ),
@@ -247,12 +247,14 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"spline": {"through": [[1, 0, 0]], "starts_oriented": QUATERNION}},
-        ["path[0].spline.starts_oriented: the orientation at the start stands beside"],
+        [
+            "path[0].spline.starts_oriented: an orientation at the start needs orientations"
+        ],
     ),
     (
         {"spline": SPLINE, "orientation": "fixed"},
         [
-            "path[0].orientation: the spline's orientations say already",
+            "path[0].orientation: the spline already has orientations",
             "found 'fixed'",
         ],
     ),
@@ -334,7 +336,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
         [1, 2, 3, 1, 0, 0, 0],
         "pose",
         [
-            "path_start: a list does not say how",
+            "path_start: a list does not state its convention",
             "quaternion_xyzw (quaternion, w last: ROS",
         ],
     ),
@@ -351,7 +353,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
     (
         {"position": [1, 2, 3], "rpy_deg": [1, 2, 3]},
         "position",
-        ["path_start: a position with an orientation is for"],
+        ["path_start: a position with an orientation needs"],
     ),
     (
         7,
@@ -362,7 +364,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
         None,
         "pose",
         [
-            "path_start: a free start posture leaves open",
+            "path_start: with a free start posture, the start of the path is missing",
             "allowed: {position: [x, y, z], ...} with one of",
         ],
     ),

@@ -134,7 +134,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"units": {"length": "feet"}}, r"path\[0\].csv.units.length.*found 'feet'"),
     (
         {"tolerance": {"position": "0.1"}},
-        r"path\[0\].csv.tolerance.position: not a quantity; found '0.1'.*0.05 mm",
+        r"path\[0\].csv.tolerance.position: this is not a number with a unit; found '0.1'.*0.05 mm",
     ),
     ({"tolerance": {"position": 0}}, r"path\[0\].csv.tolerance.position"),
     ({"tolerance": {}}, r"path\[0\].csv.tolerance.position"),
@@ -170,5 +170,5 @@ def test_a_bad_row_is_named() -> None:
     rows = 1e3 * wave(500)
     rows[321, 1] += 40.0
     write(rows)
-    with pytest.raises(TaskError, match=r"seam.csv: line 323: the point is a spike"):
+    with pytest.raises(TaskError, match=r"seam.csv: line 323: the point is an outlier"):
         task()

@@ -285,7 +285,9 @@ def test_robot_of_other_joints_is_refused(old, new, planned):
     place = planned.urdf.index(old)
     text = planned.urdf[:place] + planned.urdf[place:].replace(old, new, 1)
     robot = Robot.from_urdf("other", urdf_text=text)
-    with pytest.raises(InputError, match="other joints than the trajectory") as caught:
+    with pytest.raises(
+        InputError, match="joints of the robot are not those of the trajectory"
+    ) as caught:
         verify_trajectory(planned, robot=robot)
     assert caught.value.found == ", ".join(robot.joint_names)
     assert caught.value.allowed == "j1, j2, j3"

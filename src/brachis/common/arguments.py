@@ -95,7 +95,7 @@ def check_list(value: object, where: str, of: str) -> None:
     """
     if not isinstance(value, Sequence) or isinstance(value, str):
         raise InputError(
-            "is not a list",
+            "this is not a list",
             where=where,
             found=repr(value),
             allowed=f"a list of {of}: {where}=[...]",

@@ -144,7 +144,7 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
     suffix = Path(path).suffix
     if suffix and not suffix[1:].isdigit() and suffix.lower() != allowed:
         raise InputError(
-            "the suffix is that of another format",
+            "the suffix belongs to another format",
             where=os.fspath(path),
             found=suffix,
             allowed=allowed,
@@ -203,7 +203,9 @@ def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:
         found = getattr(error, "strerror", None) or str(error)
-        raise InputError("cannot be written", where=str(path), found=found) from error
+        raise InputError(
+            "the file cannot be written", where=str(path), found=found
+        ) from error
 
 
 def shipped_folder(folder: str) -> Path:

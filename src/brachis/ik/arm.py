@@ -81,7 +81,7 @@ class RemainingJoints:
         if len(rest) != count:
             allowed = {3: "three", 6: "six"}[count]
             raise NotApplicableError(
-                f"{write_count(len(rest), 'joint')} would be left over, not {allowed}"
+                f"{write_count(len(rest), 'joint')} left to solve for, not {allowed}"
             )
         q_r = np.random.default_rng(0).uniform(-np.pi, np.pi, (8, len(redundant)))
         screws = geometry.screws_with(redundant, q_r)
@@ -99,7 +99,7 @@ class RemainingJoints:
     ) -> RemainingJoints:
         """Take the six joints that are left over for a pose; raises NotApplicableError for other tasks or counts."""
         if not isinstance(task_map, Pose):
-            raise NotApplicableError("only for poses")
+            raise NotApplicableError("this family solves only poses")
         return cls.of(geometry, redundant, 6)
 
     def reverse(self) -> RemainingJoints:

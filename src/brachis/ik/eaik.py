@@ -103,7 +103,7 @@ class EaikSolver(DeterminantSolver):
         super().__init__(geometry, redundant, postures=postures)
         if None in self._make_robots(postures[:, self._held], EXACT_AXES):
             raise NotApplicableError(
-                "EAIK knows no decomposition: too few of the six axes are parallel or meet"
+                "EAIK cannot decompose this arm: too few of the six axes are parallel or intersect"
             )
 
     def __getstate__(self) -> dict[str, Any]:
@@ -356,12 +356,12 @@ def eaik(
 ) -> EaikSolver:
     """Fit the family: a pose is prescribed, and six joints are left over, all revolute, which EAIK can solve."""
     if not isinstance(task_map, Pose):
-        raise NotApplicableError("no whole pose is prescribed")
+        raise NotApplicableError("this family solves only poses")
     rest = complement(geometry.n, redundant)
     sliding = [geometry.joint_names[i] for i in rest if not geometry.revolute[i]]
     if sliding:
         raise NotApplicableError(
-            f"{', '.join(sliding)} would be left over and not revolute"
+            f"EAIK needs six revolute joints besides the redundant ones; prismatic: {', '.join(sliding)}"
         )
     try:
         largest_size(geometry.random_screws.determinant(rest))

@@ -235,7 +235,7 @@ def planar(
 ) -> PlanarSolver:
     """Fit the family: all joints move in one plane that the prescribed rows can see."""
     if isinstance(task_map, Pose):
-        raise NotApplicableError("a whole pose is prescribed")
+        raise NotApplicableError("this family does not solve poses")
     normal = _plane_normal(geometry)
     rows = np.eye(3)[list(task_map.axes)]
     basis = _basis(normal, rows)
@@ -245,7 +245,7 @@ def planar(
     )
     if inert.any() and np.any(np.abs(rows @ normal) > tolerances.ANGLE):
         raise NotApplicableError(
-            "a slide along the plane's normal changes the prescribed rows"
+            "a prismatic joint along the plane's normal changes the prescribed rows"
         )
     if len(rows) > 2 or np.linalg.matrix_rank(
         rows @ basis.T, tol=tolerances.ANGLE
@@ -305,7 +305,7 @@ def prismatic(
 ) -> PrismaticSolver:
     """Fit the family: every non-redundant joint is prismatic and no angle is prescribed."""
     if isinstance(task_map, Pose):
-        raise NotApplicableError("a whole pose is prescribed")
+        raise NotApplicableError("this family does not solve poses")
     turning = [
         geometry.joint_names[i]
         for i in complement(geometry.n, redundant)
@@ -313,7 +313,7 @@ def prismatic(
     ]
     if turning:
         raise NotApplicableError(
-            f"{', '.join(turning)} would be left over and not prismatic"
+            f"all joints must be prismatic besides the redundant ones; revolute: {', '.join(turning)}"
         )
     if isinstance(task_map, RowsAndYaw):
         raise NotApplicableError("prismatic joints do not change yaw")

@@ -85,7 +85,7 @@ def positioning(
 ) -> PositioningSolver:
     """Fit the family: the tool's position alone is prescribed, and three joints are left over for it."""
     if isinstance(task_map, Pose) or len(task_map.axes) != 3:
-        raise NotApplicableError("only for the position: x, y and z")
+        raise NotApplicableError("this family solves only the position: x, y and z")
     three = RemainingJoints.of(geometry, redundant, 3)
     columns = geometry.random_screws.jacobian_columns(three.joints)
     speeds = np.abs(columns[:3]).max(axis=(0, 2))

@@ -243,7 +243,7 @@ class _Matcher:
                     solver = PolishedSolver(
                         solver, self._geometry, self._task_map, redundant
                     )
-                    remark = f"axes within {ideal.miss} of an ideal arm's: answers are polished"
+                    remark = f"the axes are within {ideal.miss} of an ideal arm's; solutions are refined numerically"
                 check_answers(self._robot, self._task_map, redundant, solver)
             except NotApplicableError as reason:
                 reasons[family.name] = str(reason)
@@ -273,8 +273,8 @@ class _Matcher:
             except NotApplicableError:
                 continue
             reasons[family.name] = (
-                f"fits an ideal arm only, and its axes are up to {rough.miss} from there; at most {TOLERANCE:.0e} is "
-                "taken for rounding. If the URDF rounds angles, as in 1.57, write them with more digits"
+                f"only for an ideal arm, and the axes are off by up to {rough.miss}; up to {TOLERANCE:.0e} is "
+                "accepted as rounding. If the URDF rounds angles, as in 1.57, write them with more digits"
             )
 
 
@@ -305,7 +305,7 @@ def check_answers(
     q = np.random.default_rng(1).uniform(low, high, (100, robot.n))
     if len(set(solver.branches)) < len(solver.branches):
         raise NotApplicableError(
-            f"its branches share labels: {', '.join(solver.branches)}"
+            f"two of its branches have the same label: {', '.join(solver.branches)}"
         )
     margins = [
         solver.branch_margins(q, b).min(axis=1, initial=np.inf)
@@ -313,7 +313,9 @@ def check_answers(
     ]
     q = q[np.max(margins, axis=0) > 1e-2]
     if not len(q):
-        raise NotApplicableError("no random posture is inside a branch")
+        raise NotApplicableError(
+            "none of 100 random postures lies inside a branch, so the solver was not checked"
+        )
     rest = complement(robot.n, redundant)
     targets = task_map.of_placements(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])
@@ -325,7 +327,9 @@ def check_answers(
     turning = ChainGeometry.of(robot).revolute[rest]
     own = np.abs(difference(answers, q[:, None, None, rest], turning)).max(axis=3)
     if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < 1e-6):
-        raise NotApplicableError("its answers leave out postures that reach the target")
+        raise NotApplicableError(
+            "its answers do not contain all postures that reach the target"
+        )
     exists = np.isfinite(answers).all(axis=3)
     sample = np.nonzero(exists)[0]
     reached = q[sample]
@@ -380,7 +384,7 @@ def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:
     names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
     return (
         f"{NOT_INSTALLED}; it might add the redundant joints {names}; "
-        "installing it takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
+        "installing it needs a C++ compiler, except on macOS and on Linux for x86_64 with Python 3.13 or older"
     )
 
 

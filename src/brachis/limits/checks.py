@@ -43,7 +43,7 @@ def build_user_limits(
         here = f"{where}[{number}]"
         if isinstance(model, type) or not callable(getattr(model, "bind", None)):
             raise InputError(
-                "is not a limit that can be bound to a robot",
+                "this object is not a limit",
                 where=here,
                 found=model,
                 allowed="an object whose bind(robot) returns a brachis.limits.Limit (docs/own_limit.md)",
@@ -52,11 +52,11 @@ def build_user_limits(
         try:
             limit = model.bind(robot)
         except (TypeError, ValueError) as error:
-            problem = f"cannot be bound to the robot: {error}"
+            problem = f"the limit cannot be built for this robot: {error}"
             raise InputError(problem, where=here, found=found) from error
         if not isinstance(limit, Limit):
             raise InputError(
-                "bind does not return a brachis.limits.Limit",
+                "bind did not return a brachis.limits.Limit",
                 where=here,
                 found=type(limit).__name__,
             )
@@ -64,10 +64,14 @@ def build_user_limits(
             _check_array(part, shape, np.asarray(array))
         if not np.all(np.asarray(limit.lower) < limit.upper):
             bounds = [limit.lower, limit.upper]
-            raise InputError("lower is not below upper", where=here, found=bounds)
+            raise InputError(
+                "the lower bounds are not below the upper bounds",
+                where=here,
+                found=bounds,
+            )
         for label in limit.labels:
             if str(label) in taken:
-                problem = "the label is taken; subject and kind together name a value"
+                problem = "this label exists already; its subject and kind together must be unique"
                 raise InputError(problem, where=f"{here}.labels", found=str(label))
         taken |= {str(label) for label in limit.labels}
         limits.append(limit)
@@ -80,14 +84,14 @@ def _check_array(where: str, shape: tuple[int, ...], array: np.ndarray) -> None:
     if array.shape != shape:
         moments = "" if is_bound else f" for {_MOMENTS} moments"
         raise InputError(
-            "has the wrong shape",
+            "the array has the wrong shape",
             where=where,
             found=f"{array.shape}{moments}",
             allowed=shape,
         )
     if not is_bound and not np.all(np.isfinite(array.astype(float))):
         raise InputError(
-            "is not finite",
+            "the values are not finite",
             where=where,
             found=array.ravel().tolist(),
             allowed="finite numbers",
@@ -103,11 +107,11 @@ def _parts_of(limit: Limit, n: int, where: str) -> Iterator[_Part]:
     parts = ("kind", "labels", "lower", "upper")
     missing = [name for name in parts if not hasattr(limit, name)]
     if missing:
-        problem = "lacks what every limit has"
+        problem = "the limit lacks required attributes"
         raise InputError(problem, where=where, found=f"no {', '.join(missing)}")
     labels = limit.labels
     if not all(isinstance(label, Label) for label in labels):
-        problem = "are not all brachis.limits.Label"
+        problem = "some labels are not a brachis.limits.Label"
         raise InputError(problem, where=f"{where}.labels", found=labels)
     if not labels and not len(limit.lower):
         raise InputError(
@@ -126,11 +130,13 @@ def _parts_of(limit: Limit, n: int, where: str) -> Iterator[_Part]:
     where = f"{where}.partials"
     partials = limit.partials(moments)
     if not isinstance(partials, Partials):
-        problem = "is not a brachis.limits.Partials"
+        problem = "the return value is not a brachis.limits.Partials"
         raise InputError(problem, where=where, found=partials)
     given = {name: part for name, part in vars(partials).items() if part is not None}
     if not given.keys() - {"s"}:
         allowed = "at least one of q, qdot, qddot, qdddot"
-        raise InputError("are all None", where=where, allowed=allowed)
+        raise InputError(
+            "all partial derivatives are None", where=where, allowed=allowed
+        )
     for name, part in given.items():
         yield f"{where}.{name}", shape if name == "s" else (*shape, n), part

@@ -310,6 +310,6 @@ def _check_ends(task: Task, task_map: TaskMap, path: Path, number: int) -> None:
                 f"process speed at s = {end} is {part.speed:g} m/s, but the path {verbs[0]} at {found:g} m/s",
                 where=f"tool_limits.process_speed[{number}].s[{end}]",
                 found=f"{found:g} m/s, by boundary.{name}_speed",
-                allowed=f"{low:g} to {high:g} m/s at the path's {name}, or a place within the path",
+                allowed=f"{low:g} to {high:g} m/s at the path's {name}, or an s inside the path",
                 hint=f"Set boundary.{name}_speed to {wanted:g}, or leave room on the path to {verbs[1]} the speed",
             )

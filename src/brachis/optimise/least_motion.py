@@ -100,7 +100,7 @@ def find_least_motion(
     try:
         return _solve(fastest, deadline, listener)
     except UnreachableError as error:
-        return _keep(fastest, f"the fastest motion stays: {error}")
+        return _keep(fastest, f"the fastest motion is kept: {error}")
     except KeyboardInterrupt:
         interrupts.clear()
         return _keep(fastest, "interrupted")
@@ -125,9 +125,11 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)
     if not first.status.usable:
-        status = f"the fastest motion stays: {first.status.value}"
+        status = f"the fastest motion is kept: {first.status.value}"
         return _keep(fastest, status, (first,))
-    too_similar = "the fastest motion stays: no other is calmer by 5 % or more"
+    too_similar = (
+        "the fastest motion is kept: no other motion is smoother by 5 % or more"
+    )
     if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
         return _keep(fastest, too_similar, (first,))
     settings = task.refinement
@@ -142,7 +144,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     solve = _session(name, soon, listener, patience=2)
     found = refine_and_verify(fastest, program, (first,), solve, options)
     if found.trajectory is None or found.refined is None or not found.verified:
-        status = "the fastest motion stays: a calmer one was not verified"
+        status = "the fastest motion is kept: a smoother one was not verified"
         return _keep(fastest, status, found.reports)
     reduction = float(1.0 - np.sqrt(program.objective(found.refined.x)))
     if reduction < _WORTH_IT:

@@ -88,7 +88,7 @@ def solve_by_levels(
     intervals = reached.program.intervals
     if intervals == target.intervals:
         return reached
-    not_completed = f"the motion has {intervals} of {target.intervals} intervals, of which more were not solved"
+    not_completed = f"the motion has {intervals} intervals, and was not solved with all {target.intervals}"
     return replace(reached, not_completed=not_completed)
 
 
@@ -290,7 +290,7 @@ def optimise_knots(
     )
     not_completed = ""
     if refinement.deadline.passed:
-        not_completed = "the knots were not moved as far as that pays"
+        not_completed = "the optimisation of the knots was not completed"
     if judge(best) < _BEYOND_LIMITS:
         return SolvedProgram(best.program, best.reports, not_completed)
     reports = with_last(solved.report, best.reports)

@@ -182,7 +182,7 @@ def _blend(start: Array, corner: Array, end: Array, join: Join) -> SepticCurve:
     slowest = 0.2  # it is 1 on a line
     if not speed > slowest:
         raise join.wrong_blend(
-            "the corner is too sharp for a blend, which would all but stop and reverse",
+            "the corner is too sharp for a blend: the tool would almost stop and reverse",
             f"a smallest speed of {speed:.3g} relative to the segments",
             f"more than {slowest}",
             "Turn in two corners, or by an arc",

@@ -104,9 +104,7 @@ class RowCoordinates:
         """
         for row in self.rows:
             if row not in ROWS:
-                raise UnknownNameError(
-                    "row of the task space", row, ROWS, where="task_space"
-                )
+                raise UnknownNameError("task space row", row, ROWS, where="task_space")
         if start.shape != (len(self.rows),) or not np.all(np.isfinite(start)):
             raise PathError(
                 "the start of the path needs one finite coordinate for each row of the task space",
@@ -128,12 +126,12 @@ class RowCoordinates:
         found = f"task_space [{', '.join(self.rows)}]"
         hint = "Set task_space: pose"
         if isinstance(segment, TurnSegment):
-            problem = "a turn is for task spaces of poses"
+            problem = "a turn needs a task space of poses"
             if YAW in self.rows:
                 hint = "Use line: {by: [0, 0, ...]} to turn yaw"
             raise context.wrong(problem, ".turn", found=found, hint=hint)
         if segment.orientation is not None:
-            problem = "an orientation along a segment is for task spaces of poses"
+            problem = "an orientation along a segment needs a task space of poses"
             raise context.wrong(problem, ".orientation", found=found, hint=hint)
         context = replace(context, key=f"{context.key}.{segment.kind}")
         return BUILDERS[type(segment.shape)](segment.shape, context)
@@ -224,7 +222,7 @@ class PoseCoordinates(RowCoordinates):
             position,
             AXES,
             to_turn="A segment turn: {...} turns the tool on the spot",
-            along_tangent="Set orientation: tangent beside it",
+            along_tangent="Set orientation: tangent in the same segment",
         )
         if isinstance(segment, TurnSegment):
             turn = turn_of(segment.turn, rotation, context.key)
@@ -232,7 +230,7 @@ class PoseCoordinates(RowCoordinates):
                 raise context.wrong(
                     "the turn has zero length",
                     found="0 degrees",
-                    allowed="another orientation than before",
+                    allowed="an orientation that differs from the one before",
                 )
             still = LineCurve(position, np.zeros(POSITIONS), abs(turn.angle))
             return pose_curve(still, turn.over(still.length))

@@ -208,7 +208,7 @@ def _about_center(
     outward = context.position - center
     if np.linalg.norm(outward) < tolerances.LENGTH:
         raise context.wrong(
-            "the arc has zero length: its centre is its start, so that the radius is zero",
+            "the arc has zero length: its centre is at its start",
             ".center",
             found=list(shape.center),
             allowed="another point",
@@ -216,7 +216,7 @@ def _about_center(
     if center.size == 2:
         if shape.normal is not None:
             raise context.wrong(
-                "a normal is for three position rows; here the plane is that of the task space",
+                "a normal needs three position rows; here the task space defines the plane",
                 ".normal",
                 found=list(shape.normal),
                 allowed="no normal",

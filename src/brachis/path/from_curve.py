@@ -63,7 +63,7 @@ def bspline_segment(
         spline = _of_pieces(curve, curve.x, len(curve.c) - 1, interval)
     elif interval is None:
         raise InputError(
-            "the interval of a function is not known",
+            "the interval of the function is missing",
             where="interval",
             allowed="(first, last)",
         )
@@ -81,7 +81,7 @@ def _check_interval(interval: tuple[float, float]) -> tuple[float, float]:
     first, last = map(float, interval)
     if not (np.isfinite([first, last]).all() and first < last):
         raise InputError(
-            "is not an interval",
+            "this is not an interval",
             where="interval",
             found=interval,
             allowed="(first, last), first < last",

@@ -178,7 +178,7 @@ def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
         return Corner(
             join,
             "a stop: the position moves on one side, and the tool turns on the spot on the other",
-            "Turn the tool along a segment, by its orientation, or in a task of its own",
+            "Turn the tool along a segment, by its orientation, or in a separate task",
         )
     before, after, length = at_join(first, second)
     jump = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)

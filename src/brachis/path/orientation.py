@@ -127,7 +127,7 @@ def turn_between(
 def half_turn(key: str) -> PathError:
     """Return the error that an orientation is half a turn away from the one before."""
     return PathError(
-        "the orientation is half a turn away from the one before, so that the way there is ambiguous",
+        "the orientation is half a turn away from the one before, so the direction of rotation is ambiguous",
         found="180 degrees",
         allowed="less than 180 degrees",
         where=key,
@@ -200,7 +200,7 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> Orientatio
     )
     if speed < 1e-3:
         raise PathError(
-            "the curve all but stops, so that it has no tangent",
+            "the curve almost stops, so its tangent is not defined",
             found=_place(curve, sigma),
             where=key,
             hint="Use orientation: fixed, or other waypoints",
@@ -214,7 +214,7 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> Orientatio
     sigma, least = smallest(sine, curve.knots)
     if least < np.sin(np.deg2rad(1.0)):
         raise PathError(
-            "the tangent becomes parallel to up, so that it does not say how the tool is turned about it",
+            "the tangent becomes parallel to up, so the tool's rotation about it is not defined",
             found=f"{np.rad2deg(np.arcsin(least)):.2g} degrees between them at {_place(curve, sigma)}",
             allowed="1 degree or more",
             where=key,

@@ -54,11 +54,11 @@ class PathFrame:
             or np.linalg.det(block) < 0.0
         ):
             raise PathError(
-                "the frame of the path turns it out of the rows of the task space",
+                "the path's frame turns the path out of the rows of the task space",
                 where="path_frame",
                 found=f"rpy_deg {list(placement.rpy_deg)} with task_space [{', '.join(rows)}]",
                 allowed="a turn within these rows",
-                hint="Set task_space: position, or turn the frame about the axis that is not among them",
+                hint="Set task_space: position, or turn the frame only about the axis that is not among these rows",
             )
         turn = np.eye(len(rows))
         turn[: len(axes), : len(axes)] = block
@@ -194,7 +194,7 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
         raise PathError(
             "the path does not close",
             found=f"{gap[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}",
-            allowed=f"an end where the path begins, to {largest:g} m and rad",
+            allowed=f"an end within {largest:g} m and rad of the start",
             where="boundary.periodic",
         )
     for derivative, name in ((ends.xi, "tangent"), (ends.xi_ds, "curvature")):

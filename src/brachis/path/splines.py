@@ -74,7 +74,7 @@ def spline_through(
     """Return the smooth curve from the segment's start through waypoints; a line where there is only one."""
     if shape.orientations is not None:
         raise context.wrong(
-            "orientations are for task spaces of poses",
+            "orientations need a task space of poses",
             ".orientations",
             found=f"task_space [{', '.join(context.rows)}]",
             hint="Set task_space: pose",
@@ -265,7 +265,7 @@ def _chord_knots(
     Raises
     ------
     PathError
-        Nothing moves, or a waypoint repeats its predecessor.
+        Nothing moves, or a waypoint repeats the one before.
     """
     if np.all(chords < tolerances.LENGTH):
         chords = otherwise
@@ -275,7 +275,7 @@ def _chord_knots(
         before = len(shape.through) - len(chords)
         repeated = int(np.argmax(chords < tolerances.LENGTH)) + before
         raise context.wrong(
-            "a waypoint repeats its predecessor",
+            "a waypoint repeats the one before",
             f".through[{repeated}]",
             found=list(shape.through[repeated]),
             allowed="waypoints that differ from their predecessors in the position rows",
@@ -301,7 +301,7 @@ def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
         raise PathError(
             "no spline goes through the waypoints: their distances differ too much",
             found=f"distances from {distances.min():.3g} to {distances.max():.3g} (m or rad)",
-            allowed="waypoints of like distances",
+            allowed="waypoints at similar distances",
             where="path",
         ) from error
 

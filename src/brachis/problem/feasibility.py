@@ -119,7 +119,7 @@ def _check_range(
     if where == "path":
         error = PathError
         place = f" at s = {k / (len(postures) - 1):.3g}"
-        advice = "Lead the path elsewhere, or raise"
+        advice = "Move the path, or raise"
     hint = position_hint(value, *ends, unit)
     raise error(
         f"joint {name!r} is out of its range",
@@ -205,7 +205,7 @@ def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
     """
     for limit in limits:
         jumping = {2: "velocity", 3: "acceleration"}[limit.order]
-        asked = f"the {limit.name} limit asks for a continuous {jumping}"
+        asked = f"the {limit.name} limit needs a continuous {jumping}"
         if spline.degree < limit.order:
             found = f"{spline.degree}, with which it jumps at knots"
             raise InputError(
@@ -319,5 +319,5 @@ def other_branch(
         where="branch",
         found=found,
         allowed=allowed,
-        hint=f"Leave branch out, or {name} in a posture of that branch",
+        hint=f"Leave out branch, or set {name}.joints to a posture of that branch",
     )

@@ -169,7 +169,9 @@ def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
     """Look at a motion's end time, s, beside the `least` that the planner allows, s."""
     if t_end > 1.01 * least:
         return ()
-    message = "the end time is the least that the planner knows, so that no limit holds the motion back"
+    message = (
+        "the end time is the smallest that the planner allows, so no limit is active"
+    )
     usual = "more; see the units of limits, lengths and masses"
     return (Issue("t_end", message, f"{t_end:.6g} s", usual),)
 

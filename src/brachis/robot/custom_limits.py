@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib.metadata
 from typing import Any, Protocol
 
-from brachis.errors import InputError, UnknownNameError
+from brachis.errors import InputError, UnknownNameError, suggest
 from brachis.robot import Robot
 from brachis.task import Task
 
@@ -47,7 +47,12 @@ def custom_limits(task: Task) -> tuple[LimitModel, ...]:
         where = f"custom_limits.{kind}"
         if kind not in installed:
             raise UnknownNameError(
-                "kind of limit", kind, installed, where="custom_limits"
+                "kind of limit",
+                kind,
+                installed,
+                where="custom_limits",
+                hint=suggest(kind, installed)
+                or "Install the package that provides this kind (entry point brachis.limits)",
             )
         try:
             factory = installed[kind].load()

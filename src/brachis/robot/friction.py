@@ -84,7 +84,7 @@ class Friction(Summary):
                 if not 0.0 <= value <= LARGEST:
                     origin = " in the URDF" if entry == FROM_URDF else ""
                     raise InputError(
-                        "is negative, too large or not a number",
+                        "the value is negative, too large or not a number",
                         where=f"{where}.{name}",
                         found=f"{value:g}{origin}",
                         allowed=f"numbers from 0 to {LARGEST:g}",

@@ -60,7 +60,7 @@ def robot_from_settings(
     source = urdf if urdf is not None else settings.urdf
     if source is None and urdf_text is None:
         raise TaskError(
-            "no URDF is named", where="robot.urdf", allowed="path of a URDF file"
+            "the URDF is missing", where="robot.urdf", allowed="path of a URDF file"
         )
     path = Path(source or "saved URDF")
     named = settings.model_copy(update={"urdf": str(path.absolute())})
@@ -98,7 +98,7 @@ def robot_for(
     Raises
     ------
     TaskError
-        Robot and task contradict each other; or no URDF is named.
+        Robot and task contradict each other; or the URDF is missing.
     InputError
         See `Robot.from_urdf`.
     """
@@ -111,10 +111,10 @@ def robot_for(
     same = robot_from_settings(given, urdf_text=robot.urdf)
     if (with_free_roll(same) if robot.rolls_freely else same).model != robot.model:
         raise InputError(
-            "the robot's model is not the one of its URDF and settings, so the task's robot part cannot be added",
+            "the robot's model differs from its URDF and settings, so the task's robot section cannot be applied",
             where="robot",
             found="a model that was changed",
-            hint="Leave the robot part of the task away, or give the robot by its URDF",
+            hint="Remove the robot section of the task, or give the robot by its URDF",
         )
     return robot_from_settings(wanted, urdf_text=robot.urdf)
 
@@ -212,7 +212,7 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
     own, other = sides
     if not (isinstance(own, Mapping) and isinstance(other, Mapping)):
         raise TaskError(
-            "the task and the robot that is given with it contradict each other",
+            "the task and the robot given with it contradict each other",
             where=key,
             found=f"{asked} in the task, {given} in the robot",
             allowed="the same in both, or set in one of them",

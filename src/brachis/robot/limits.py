@@ -150,7 +150,7 @@ def resolve_limits(
         A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
         nor an acceleration limit; a range is empty or ends more than 1e6 rad or m away from zero.
     InputError
-        A speed override has no velocity limit to act on; the total power is outside [`LEAST`, `LARGEST`]; a torque
+        A speed override has no velocity limit to scale; the total power is outside [`LEAST`, `LARGEST`]; a torque
         curve is not valid or rises.
     UnknownNameError
         A limit names a joint that is not of the chain.
@@ -169,7 +169,7 @@ def resolve_limits(
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
     for i in np.flatnonzero(is_free):
         raise LimitError(
-            "has neither a torque nor an acceleration limit, so its time would go to zero",
+            "the joint has neither a torque nor an acceleration limit, so the end time would go to zero",
             joint=names[i],
             key=f"robot.limits.torque.{names[i]} or robot.limits.acceleration.{names[i]}",
         )
@@ -178,10 +178,10 @@ def resolve_limits(
         pairs[kind] = _scale_limits(kind, pairs[kind], spec.scale, names)
     if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
         raise InputError(
-            "has no velocity limit to act on",
+            "the speed override has no velocity limit to scale",
             where="robot.speed_override",
             found=f"{speed_override:g}",
-            hint="Give robot.limits.velocity, or leave the override away",
+            hint="Set robot.limits.velocity, or remove the override",
         )
     pairs["velocity"] = pairs["velocity"] * speed_override
     arrays: dict[str, Any] = {}
@@ -227,11 +227,11 @@ def _check_scale(scale: LimitScale) -> None:
     for kind, factor in vars(scale).items():
         if kind not in MAGNITUDES:
             raise UnknownNameError(
-                "limit to scale", kind, MAGNITUDES, where="robot.limits.scale"
+                "limit that can be scaled", kind, MAGNITUDES, where="robot.limits.scale"
             )
         if not (_is_number(factor) and 0.0 < factor < np.inf):
             raise InputError(
-                "is not a factor",
+                "the factor is not valid",
                 where=f"robot.limits.scale.{kind}",
                 found=factor,
                 allowed="a finite number > 0",
@@ -262,10 +262,10 @@ def _resolve_total_power(spec: LimitSpec) -> float:
     factor = spec.scale.power
     if not (_is_number(given) and LEAST <= given * factor <= LARGEST):
         raise InputError(
-            "is not a power in W",
+            "the total power is not valid",
             where="robot.limits.total_power",
             found=given,
-            allowed=f"a number from {LEAST:g} to {LARGEST:g}, scaled too, or null for no limit",
+            allowed=f"{LEAST:g} W to {LARGEST:g} W after scaling, or null for no limit",
         )
     return float(given) * factor
 
@@ -303,7 +303,7 @@ def per_joint_values(
     if isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str):
         if len(value) != len(names):
             raise InputError(
-                "has the wrong number of values",
+                "the list has the wrong number of values",
                 where=key,
                 found=len(value),
                 allowed=f"{len(names)}, one for each of {', '.join(names)}",
@@ -359,7 +359,7 @@ def _spread_ranges(
         given = (known.lower, known.upper) if entry == FROM_URDF else entry
         if entry == FROM_URDF and known.needs_range:
             raise LimitError(
-                "has no position range in the URDF",
+                "the joint has no position range in the URDF",
                 joint=name,
                 key=key,
                 allowed='<limit lower="..." upper="..." .../>, type="continuous", or a range in the task',
@@ -382,7 +382,7 @@ def _spread_ranges(
             problem = "is empty"
             allowed = "[lower, upper] with lower < upper, 1e-09 rad or m apart at least"
         elif any(FARTHEST < abs(end) < np.inf for end in (lower, upper)):
-            problem = "ends too far away"
+            problem = "is too far from zero"
             allowed = f"ends within {FARTHEST:g} rad or m of zero, null for an open end"
         if problem:
             raise LimitError(
@@ -404,7 +404,7 @@ def _resolve_curves(
         return ((),) * len(names)
     if not isinstance(stated, Mapping):
         raise InputError(
-            "is not a mapping of joint names",
+            "this is not a mapping of joint names",
             where="robot.limits.torque_speed",
             found=stated,
             allowed="{joint: [[speed, torque], ...]}",
@@ -429,7 +429,7 @@ def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
     is_table = table.ndim == 2 and len(table) >= 2 and table.shape[1] == 2
     if not (is_table and np.isfinite(table).all()):
         raise InputError(
-            "is not a torque curve",
+            "this is not a torque curve",
             where=key,
             found=points,
             allowed="two or more points [speed, torque]",
@@ -439,7 +439,7 @@ def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
     ascends = speed[0] == 0.0 and np.all(np.diff(speed) > 0.0)
     if not (ascends and speed[-1] <= LARGEST):
         raise InputError(
-            "speeds are out of order",
+            "the speeds do not increase from 0",
             where=key,
             found=found,
             allowed=f"speeds that begin at 0 and ascend, at most {LARGEST:g}",
@@ -449,7 +449,7 @@ def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
             "torques are negative, too small or too large",
             where=key,
             found=found,
-            allowed=f"torques >= 0, at rest from {LEAST:g} to {LARGEST:g}, scaled too",
+            allowed=f"torques >= 0, at rest from {LEAST:g} to {LARGEST:g}, also after scaling",
         )
     # The same torque may have been rounded to different figures.
     rising = np.flatnonzero(np.diff(torque) > tolerances.ROUNDING * torque[0])

@@ -113,7 +113,7 @@ class Robot(Summary):
         if given or (named_fields and "model" not in named_fields):
             allowed = 'brachis.Robot.from_urdf("robot.urdf")'
             raise InputError(
-                "a robot is not made of these",
+                "a robot cannot be made from these arguments",
                 where="Robot",
                 found=given or named_fields,
                 allowed=allowed,
@@ -205,7 +205,7 @@ class Robot(Summary):
         """
         if settings.limits_file is not None:
             raise TaskError(
-                "the file of limits was not read",
+                "the limits file was not read",
                 where="robot.limits_file",
                 found=settings.limits_file,
                 hint="Make the task with brachis.load_task, or give robot.limits",

@@ -52,7 +52,7 @@ def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
         axis = numbers_of(joint, "axis", "xyz", "1 0 0")
         if not np.linalg.norm(axis) > tolerances.ANGLE:
             raise UrdfError(
-                f"joint {name!r} has no axis",
+                f"the axis of joint {name!r} has zero length",
                 where=where,
                 found=f"<axis xyz={' '.join(f'{component:g}' for component in axis)!r}>",
                 allowed="a direction, any length but zero",
@@ -238,7 +238,7 @@ def _only_leaf(tree: UrdfTree, where: str) -> str:
     leaves = _leaves(tree)
     if len(leaves) != 1:
         raise UrdfError(
-            "the tool frame is not clear",
+            "the tool frame is ambiguous",
             where=where,
             found=f"{len(leaves)} links without children: {', '.join(leaves)}",
             hint="Set robot.tool_frame to one of the robot's links",

@@ -166,7 +166,7 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
         named[name] = element
     if repeated:
         raise UrdfError(
-            f"{kind}s share a name",
+            f"{kind}s have the same name",
             where=where,
             found=", ".join(repeated),
             allowed="each name once",
@@ -189,7 +189,7 @@ def _connect(
                 raise UrdfError(
                     f"the {end} of joint {name!r} is not a link of the robot",
                     where=f"{where}, line {joint.sourceline}",
-                    found=link or "none",
+                    found=link or "no name",
                     allowed=", ".join(links),
                     hint=suggest(link, links) or add,
                 )
@@ -304,9 +304,9 @@ def _check_entry(owner: Element, entry: Entry, where: str) -> None:
             return
         if len(elements) > 1:
             raise UrdfError(
-                f"<{tag}> is there twice",
+                f"<{tag}> occurs twice",
                 where=_place_of(elements[1], where),
-                allowed="one, or none",
+                allowed="not more than one",
             )
     text = elements[0].get(entry.attribute)
     if _are_numbers((text or "").split(), entry) or (
@@ -343,5 +343,5 @@ def _suggest_numbers(text: str, entry: Entry) -> str | None:
             return f'Write {entry.attribute}="{" ".join(words)}"'
     bare = [match.group() for match in _NUMBER.finditer(text)]
     if len(bare) == entry.count:
-        return f'Write numbers alone, in {entry.unit}, such as {entry.attribute}="{" ".join(bare)}"'
+        return f'Write only numbers, in {entry.unit}, such as {entry.attribute}="{" ".join(bare)}"'
     return None

@@ -26,7 +26,7 @@ from brachis.search.closed_form_lattice import solve_all
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd, sampling_box
 from brachis.task import SolverSettings, Task
 
-_NO_TIME = "There was no time to find out why: raise search.time_limit"
+_NO_TIME = "The reason was not found in time: raise search.time_limit"
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def explain_reach(
         if failure is None and limit.at_rest == "posture":
             allowed, nearest, remedies = _check_at_rest(robot, limit, own)
             cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
-            failure = fail(allowed, cause, "Lead the path elsewhere", remedies)
+            failure = fail(allowed, cause, "Move the path", remedies)
     others = "other redundant joints, " if decomposition.redundant else ""
     return failure or (
         "Every point of the path is within reach of this branch, but no joint path through them was found; "

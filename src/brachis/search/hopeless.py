@@ -139,7 +139,7 @@ def explain_holding(
         where=label.key or load.limit.name,
         found=f"{taken} {label.unit} to hold the arm, {mean} {label.unit} on average (root mean square)",
         needed=f"{figure:.4g} {label.unit}",
-        hint="Lead the path through postures that take less, or mount the robot otherwise",
+        hint="Move the path so that its postures need less, or change the mounting of the robot",
         remedies=remedies,
     )
 
@@ -259,9 +259,10 @@ def _explain_end_speed(problem: Problem, plane: PhasePlane) -> Failure | None:
     speeds = {key: getattr(problem.task.boundary, key) for key in shares}
     most = f"{share * speeds[key]:.3g} {unit}"
     return Failure(
-        f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
+        f"the limits do not allow this speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
-        found=f"{speeds[key]:g} {unit}, where one joint path was estimated to allow about {most}",
+        found=f"{speeds[key]:g} {unit}",
+        needed=f"about {most} (estimate along one joint path)",
         hint="Raise the limits that hold the motion back",
         remedies=[
             Remedy(f"boundary.{key}", speed, _FIRST * shares[key] * speed, unit)
@@ -321,7 +322,7 @@ def _explain_shortfall(
             for end, cut in cuts.items()
         ]
     return Failure(
-        f"no motion was found with the {label.kind} that is asked for: {what}",
+        f"no motion was found with the required {label.kind}: {what}",
         where=f"{label.key or limit.name} ({label.subject})",
         found=f"{found} to {most} {label.unit} on that part, the least at s = {motion.s[place]:.2g}, {how}",
         needed=f"{allowed} {label.unit}",
@@ -376,7 +377,7 @@ def _parts_of(limit: Limit, s: np.ndarray) -> np.ndarray:
 def _describe_reach(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, float]]:
     """Say where of the places, (P,), a speed is reached, (P,) bool, and to which s ends of the part could be moved."""
     if not reached.any():
-        return "it is reached nowhere on that part", {}
+        return "it is not reached anywhere on that part", {}
     first, last = (float(end) for end in s[reached][[0, -1]])
     if not reached[(s >= first) & (s <= last)].all():
         return f"it cannot be held all the way from s = {first:.3g} to {last:.3g}", {}
@@ -387,8 +388,8 @@ def _describe_reach(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, 
         places[0] = f"before s = {s[0]:.2g}"
         cuts[0] = first + 0.01
     if not reached[-1]:
-        places[1] = f"behind s = {s[-1]:.2g}"
+        places[1] = f"after s = {s[-1]:.2g}"
         cuts[1] = last - 0.01
-    text = f"the path {' and '.join(places.values())} is too short for the way to it"
+    text = f"the path {' and '.join(places.values())} is too short to reach it"
     # Of two ends neither is enough by itself.
     return text, cuts if len(cuts) == 1 else {}

@@ -16,8 +16,8 @@ ALL_POSTURES = "all postures"
 """What the lattice is called that keeps to no choice of redundant joints."""
 NO_ANSWER = "it is out of reach"
 OTHER_BRANCH = "the branch ends"
-NO_CHART = "the arm stays too near a singularity of its own"
-JUMPS = "no posture is near enough to continue"
+NO_CHART = "the arm stays too close to a singularity"
+JUMPS = "no neighbouring posture continues the joint path"
 
 
 @dataclass(frozen=True)

@@ -268,14 +268,14 @@ class Search:
             return tuple(parts)
         if self._unfinished_lattices:
             names = " | ".join(self._unfinished_lattices)
-            parts.append(f"the lattice of {names} was not searched to its end")
+            parts.append(f"the lattice of {names} was not searched completely")
         unsolved = sum(each.status == NOT_TRIED for each in self.candidates)
         counts = {"planned": unsolved, "refined": len(self._waiting)}
         if any(counts.values()):
             total = write_count(len(self.candidates), "candidate")
             left = [f"{n} not {what}" for what, n in counts.items() if n]
             parts.append(f"of {total} {', '.join(left)}")
-        return (*parts, "what search.effort asks for was not tried to its end")
+        return (*parts, "the search that search.effort requires was not completed")
 
     def in_order(self) -> tuple[Candidate, ...]:
         """All candidates, the fastest verified one first, without their programs."""

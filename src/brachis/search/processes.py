@@ -77,9 +77,9 @@ def run_in_processes(
             yield one
     except (BrokenExecutor, PicklingError) as error:
         raise BrachisError(
-            "other processes cannot do the work",
+            "the worker processes cannot run the plans",
             found=str(error).partition("\n")[0].rstrip("."),
-            hint="Plan with jobs: 1; a limit or closed form of your own has to be in a module that they can import",
+            hint="Set search.jobs: 1, or put your own limit or closed form in a module that the workers can import",
         ) from error
     finally:
         with (

@@ -89,7 +89,7 @@ def try_remedies(
     )
     text = ", or ".join(advice)
     if untried and not text:
-        text = f"{untried} (how far was not found out)"
+        text = f"{untried} (how far is not known)"
     if text:
         error.put_advice(text[:1].upper() + text[1:])
 
@@ -135,7 +135,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
         if outcome:
             good = bad
         elif outcome is False:
-            verified += f"; there was none with {bad:g} {remedy.unit}".rstrip()
+            verified += f"; no plan was found with {bad:g} {remedy.unit}".rstrip()
     return f"{good:g} {remedy.unit}".rstrip() + f" {verified})"
 
 

@@ -405,7 +405,7 @@ def _refuse_beyond(
         where="path",
         found=f"{found} {label.unit} at s = {s[station]:.3g}",
         needed=f"{allowed} {label.unit}",
-        hint="Lead the path elsewhere",
+        hint="Move the path",
         remedies=remedies,
     )
     raise failure.error()

@@ -137,7 +137,7 @@ def _from_percent(value: object) -> object:
     percent = _PERCENT.match(value)
     if percent is None:
         raise refuse(
-            "not a share",
+            "this is not a percentage or a fraction",
             found=value,
             allowed="from 0 to 100 %, or a number from 0 to 1",
         )

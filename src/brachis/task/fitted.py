@@ -61,7 +61,7 @@ def segments_along(
     poses = points.turning.shape[1] == QUATERNION
     if poses and segment.orientation is not None:
         raise TaskError(
-            "the points' orientations say already how the tool turns",
+            "the points already have orientations",
             found="orientations",
             allowed="no orientation",
             where=f"{where}.orientation",
@@ -69,11 +69,11 @@ def segments_along(
     if settings.tolerance is None:
         if points.speed is not None:
             raise TaskError(
-                "feed rates are read along a fitted path alone",
+                "feed rates need a fitted path",
                 found="feed rates",
-                allowed="a tolerance beside them",
+                allowed="feed rates together with a tolerance",
                 where=where,
-                hint="Give a tolerance, or leave the feed rates out",
+                hint="Set csv.tolerance, or remove the feed rates",
             )
         report = check_interpolation(points, notes)
         return [_spline_through(points, report, segment)]
@@ -142,7 +142,7 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
         raise TaskError(
             f"the points have {write_count(len(corners), 'corner')}",
             found=found,
-            allowed="none",
+            allowed="no corners",
             where=f"{where}.corner",
             hint="Set corner: blend to round them within the tolerance",
         )
@@ -236,7 +236,7 @@ def _along_joints(
     for key in ("orientation", "units", "tolerance", "corner"):
         if getattr(settings, key) != getattr(usual, key):
             raise TaskError(
-                "a path of joints passes all rows, which are in rad and m",
+                "this key does not apply to a path of joints, which passes all rows, in rad and m",
                 allowed=f"no {key}",
                 where=f"{where}.csv.{key}",
             )

@@ -188,7 +188,7 @@ def _no_keyword(name: str, where: str, own: Sequence[str]) -> UnknownNameError:
         name,
         valid,
         where=where,
-        hint=hint and f"It is a key of others: {hint}",
+        hint=hint and f"This name is a key inside another keyword: {hint}",
     )
 
 

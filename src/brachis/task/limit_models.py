@@ -59,7 +59,7 @@ _Pair = Annotated[
     tuple[Number, Number],
     must(
         lambda pair: pair[0] < 0.0 < pair[1],
-        "a pair of limits lies around zero",
+        "a pair of limits must lie around zero",
         "[lower, upper] with lower < 0 < upper",
     ),
 ]
@@ -190,7 +190,7 @@ class SpeedTable(Model):
     def _is_a_table(self) -> SpeedTable:
         if len(self.speed) != len(self.s):
             raise refuse(
-                "there is not one speed for every path coordinate",
+                "the numbers of path coordinates and speeds differ",
                 key="speed",
                 found=write_count(len(self.speed), "speed"),
                 allowed=f"{len(self.s)}",
@@ -198,7 +198,7 @@ class SpeedTable(Model):
         for row, (before, place) in enumerate(itertools.pairwise(self.s), 1):
             if place < before:
                 raise refuse(
-                    "the path coordinates do not ascend",
+                    "the path coordinates do not increase",
                     key=f"s[{row}]",
                     found=place,
                     allowed=f">= {before:g}",
@@ -206,10 +206,10 @@ class SpeedTable(Model):
         for place, times in Counter(self.s).items():
             if times > 2:
                 raise refuse(
-                    "a place has more than two speeds",
+                    "a path coordinate has more than two speeds",
                     key="s",
                     found=place,
-                    allowed="a place at most twice, which is a step",
+                    allowed="each path coordinate once, or twice for a step",
                 )
         return self
 
@@ -274,7 +274,7 @@ class ToolLimits(Model):
                     "the parts of the path overlap, meet or are out of order",
                     key=f"[{number}].s",
                     found=part.s,
-                    allowed=f"a begin above {end:g}; the part before ends there, and speeds change in a gap",
+                    allowed=f"a begin above {end:g}, the end of the part before; the speed changes in the gap",
                 )
         return parts
 

@@ -211,7 +211,7 @@ def _by_joint(
     content = read_yaml(text, str(path))
     if not isinstance(content, Mapping):
         raise TaskError(
-            "a limits file is a mapping",
+            "the limits file is not a mapping of keys",
             found=show(content),
             allowed=", ".join(LimitsFile.model_fields),
             where=str(path),
@@ -227,9 +227,9 @@ def _by_joint(
         return file.by_kind()
     if file.limits.scale != LimitSpec().scale:
         raise TaskError(
-            "factors on limits belong to the task",
+            "a limits file cannot contain factors on limits",
             where=f"{path}: limits.scale",
-            allowed="robot.limits.scale of the task",
+            allowed="robot.limits.scale in the task",
         )
     return {
         kind: value
@@ -265,7 +265,7 @@ def _check_joints(
     for name in sorted(limited if names else ()):
         if name not in names:
             raise UnknownNameError(
-                "joint of the URDF", name, names, where=f"{where}: joint_limits"
+                "URDF joint", name, names, where=f"{where}: joint_limits"
             )
     own = [each for kind, each in robot["limits"].items() if kind != "scale"]
     if any(isinstance(each, int | float | list | tuple) for each in own):
@@ -323,14 +323,12 @@ def _spread(value: object, joints: tuple[str, ...], where: str) -> dict[str, Any
     if isinstance(value, Mapping):
         for name in value:
             if name not in joints:
-                raise UnknownNameError(
-                    "joint of the limits file", name, joints, where=where
-                )
+                raise UnknownNameError("joint", name, joints, where=where)
         return dict(value)
     if isinstance(value, tuple):
         if len(value) != len(joints):
             raise TaskError(
-                "has the wrong number of values",
+                "the list has the wrong number of values",
                 where=where,
                 found=len(value),
                 allowed=f"{len(joints)}, one for each of {', '.join(joints)}",

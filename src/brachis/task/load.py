@@ -57,7 +57,7 @@ def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
     parts = _INDEX.sub(r".\1", key).split(".")
     if not all(parts):
         raise TaskError(
-            "no key",
+            "this is not a valid key",
             found=repr(key),
             allowed="names and indices joined by dots, such as path.0.line.by",
         )
@@ -77,7 +77,7 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
     where = ".".join(before)
     if not isinstance(place, list):
         raise TaskError(
-            f"{where} has no keys of its own",
+            f"{where} is a value without keys",
             where=key,
             found=show(place),
             hint=f"Set {where} itself",
@@ -90,7 +90,7 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
             allowed=f"{where}.0"
             + (f" to {where}.{len(place) - 1}" if len(place) > 1 else "")
             if place
-            else "none",
+            else "no index, as the list is empty",
         )
     return int(part)
 
@@ -111,9 +111,9 @@ def read_assignment(text: str) -> tuple[str, object]:
     key, equals, value = text.partition("=")
     if not equals:
         raise TaskError(
-            "a key is set by key=value",
+            "this does not have the form key=value",
             found=repr(text),
-            allowed="such as spline.intervals=40",
+            allowed="key=value, such as spline.intervals=40",
         )
     return key.strip(), read_yaml(value, f"value of {key.strip()}")
 
@@ -179,15 +179,15 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
         return task_from(source, "task", Path.cwd(), changes or {})
     if not isinstance(source, str | os.PathLike):
         raise TaskError(
-            "a task is loaded from a file or a mapping",
+            "a task cannot be loaded from this",
             found=type(source).__name__,
             allowed="a file name, a mapping, or a Task",
         )
     if isinstance(source, str) and "\n" in source:
         raise TaskError(
-            "a text is not the name of a file",
+            "this text is not the name of a file",
             found=show(source),
-            allowed="a file name; of the text of a URDF Robot.from_urdf(name, urdf_text=text)",
+            allowed="a file name; for the text of a URDF, Robot.from_urdf(name, urdf_text=text)",
         )
     path = Path(source)
     check_kind(path, Kind.TASK, TaskError)
@@ -210,9 +210,9 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     task = task_from(content, str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         raise TaskError(
-            "this key is required in a task file, and missing",
+            "a task file needs this key, and it is missing",
             where=f"{path}: robot.urdf",
-            hint="Give the URDF's path, relative to the task file",
+            hint="Set it to the path of the URDF, relative to the task file",
         )
     return task
 
@@ -254,7 +254,7 @@ def task_from(
     """
     if not isinstance(content, Mapping):
         raise TaskError(
-            "a task is a mapping",
+            "the task is not a mapping of keys",
             found=show(content),
             allowed=", ".join(Task.model_fields),
             where=source,

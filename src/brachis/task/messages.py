@@ -171,7 +171,11 @@ def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
     name = str(detail["loc"][-1])
     keys = _keys_at(detail["loc"][:-1], model)
     elsewhere = " or ".join(key_paths(name, model))
-    hint = f"It is a key of its own: {elsewhere}" if elsewhere else _meant([name], keys)
+    hint = (
+        f"This key belongs elsewhere: {elsewhere}"
+        if elsewhere
+        else _meant([name], keys)
+    )
     return "unknown key", name, ", ".join(keys), hint
 
 

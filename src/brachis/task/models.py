@@ -230,10 +230,10 @@ class Task(Model):
         other = content.get("path_frame")
         if other not in (None, path["frame"]):
             raise refuse(
-                "another frame than in path.frame",
+                "this frame differs from path.frame",
                 key="path_frame",
                 found=other,
-                allowed=f"{path['frame']}, or one of both keys",
+                allowed=f"{path['frame']}, or only one of the two keys",
             )
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
@@ -302,7 +302,7 @@ class Task(Model):
             (
                 open_start and not unread,
                 "path_start",
-                "a free start posture leaves open where the path begins",
+                "with a free start posture, the start of the path is missing",
                 self._start_forms,
             ),
             (
@@ -314,13 +314,13 @@ class Task(Model):
             (
                 given and self.of_poses and not of_pose,
                 "path_start",
-                "a list does not say how an orientation is meant, as whether w of a quaternion is first or last",
+                "a list does not state its convention, such as whether w of a quaternion is first or last",
                 self._start_forms,
             ),
             (
                 of_pose and not self.of_poses,
                 "path_start",
-                "a position with an orientation is for task spaces of poses",
+                "a position with an orientation needs a task space of poses",
                 self._start_forms,
             ),
         )
@@ -328,7 +328,7 @@ class Task(Model):
     @model_validator(mode="after")
     def _path_fits(self) -> Self:
         name = self.path_frame
-        frame = f"frames: {{{name}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
+        frame = f"frames: {{{name}: {{xyz: [...], rpy_deg: [...]}}}} in the task"
         joints = self.task_space == "joints"
         no_choice = "a path of joints leaves no choice of postures"
         if self.path[-1].blend is not None:
@@ -342,7 +342,7 @@ class Task(Model):
             (
                 name is not None and name not in self.frames,
                 "path_frame",
-                "this frame is not among frames",
+                "this frame is not defined in frames",
                 ", ".join(self.frames) or frame,
             ),
             (
@@ -376,7 +376,7 @@ class Task(Model):
             (
                 self.boundary.in_motion and spline.knots == "free",
                 "spline.knots",
-                "ends in motion tie control points by the knots, which may not move then",
+                "free knots need a motion that begins and ends at rest",
                 "uniform, or a boundary at rest",
             ),
             (

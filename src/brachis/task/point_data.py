@@ -38,7 +38,7 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
         number = quantity(value, units)
         if number is None:
             raise refuse(
-                "not a quantity",
+                "this is not a number with a unit",
                 found=value,
                 allowed=f"a number with a unit ({', '.join(units)}), as {example}",
             )
@@ -75,7 +75,7 @@ OrientationWord = Annotated[
     Name,
     must(
         CONVENTIONS.__contains__,
-        "this convention of an orientation is not known",
+        "this convention of an orientation is unknown",
         choices(),
     ),
     WithJsonSchema({"enum": list(CONVENTIONS)}),

@@ -258,7 +258,7 @@ class SplineThrough(Model):
         count = len(self.through)
         if self.orientations is not None and len(self.orientations) != count:
             raise refuse(
-                "a spline needs an orientation for each of its waypoints, or none",
+                "the numbers of waypoints and of orientations differ",
                 key="orientations",
                 found=len(self.orientations),
                 allowed=f"{count}, as there are waypoints in through",
@@ -267,7 +267,7 @@ class SplineThrough(Model):
             (
                 self.orientations is None and self.starts_oriented is not None,
                 "starts_oriented",
-                "the orientation at the start stands beside the orientations at the waypoints",
+                "an orientation at the start needs orientations at the waypoints",
                 "orientations as well",
             )
         )
@@ -404,7 +404,7 @@ class SplineSegment(MovingSegment):
             (
                 self.orientation is not None and self.spline.orientations is not None,
                 "orientation",
-                "the spline's orientations say already how the tool turns",
+                "the spline already has orientations",
                 "orientation or spline.orientations, not both",
             )
         )
@@ -438,7 +438,7 @@ class BSplineSegment(MovingSegment):
             (
                 self.orientation is not None and self.bspline.has_quaternions,
                 "orientation",
-                "the curve's quaternions say already how the tool turns",
+                "the curve already has orientations (quaternions)",
                 "orientation or control points with quaternions, not both",
             )
         )

@@ -230,7 +230,7 @@ class SplineSettings(Model):
             (
                 order > 1 and self.degree <= order,
                 "degree",
-                f"rest: {self.rest} asks for a continuous {last}, zero at the ends: degree {self.degree} is too low",
+                f"rest: {self.rest} needs a continuous {last}, zero at the ends: degree {self.degree} is too low",
                 f">= {order + 1}, or {' or '.join(lower)}",
             ),
             (
@@ -270,7 +270,7 @@ class SearchSettings(Model):
             (
                 self.slower and not self.least_motion,
                 "slower",
-                "a slower motion is of use for least motion alone",
+                "a slower motion is possible only with least_motion: true",
                 "0, or least_motion: true",
             )
         )
@@ -326,7 +326,7 @@ class BoundarySettings(Model):
                 (
                     self.periodic and getattr(self, key),
                     key,
-                    "a periodic motion has no ends: how fast it passes the seam is planned",
+                    "a periodic motion has no ends, so its speed there cannot be set",
                     "0, or periodic: false",
                 )
                 for key in ("start_speed", "end_speed")

@@ -63,7 +63,7 @@ class _Loader(yaml.SafeLoader):
         """Parse the document, unless its aliases make it endless or far too long (ComposerError)."""
         node = super().get_single_node()
         if node is not None and (size := _size(node, {})) > _LARGEST:
-            problem = f"{size:.3g} values with all aliases written out, at most {_LARGEST} are read"
+            problem = f"{size:.3g} values with all aliases expanded, more than the {_LARGEST} allowed"
             if size == math.inf:
                 problem = "the task contains itself (an alias inside its own anchor)"
             raise yaml.composer.ComposerError(None, None, problem, node.start_mark)
@@ -94,7 +94,7 @@ def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
         raise yaml.constructor.ConstructorError(
             None,
             None,
-            f"{node.tag} stands before a number, and not before {text!r}",
+            f"{node.tag} needs a number, not {text!r}",
             node.start_mark,
         ) from None
 

@@ -190,7 +190,7 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     robot, _ = bind(robot, task.task_space)
     _refuse_unless(
         meta.joint_names == list(robot.joint_names),
-        "other joints than the URDF's",
+        "the joints are not those of the URDF",
         where="joint_names",
         found=meta.joint_names,
         allowed=robot.joint_names,
@@ -210,7 +210,7 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         usable = array.dtype.kind in "fiu" and (np.abs(array) <= LARGEST).all()
         _refuse_unless(
             bool(usable),
-            "not all are finite numbers of a usable size",
+            "some numbers are not finite or are too large",
             where=name,
             allowed=f"numbers between -{LARGEST:g} and {LARGEST:g}",
         )
@@ -252,11 +252,11 @@ def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
         "the rows and knots of the chart do not fit each other or the robot",
         where="chart_rows",
         found=f"{rows.shape}, knots {knots.shape}",
-        allowed=f"rows (B, r, {n + 1}), and B + {degree + 1} knots from 0 to 1 where B is not 1",
+        allowed=f"rows (B, r, {n + 1}), and B + {degree + 1} knots from 0 to 1 if B is not 1",
     )
     _refuse_unless(
         named in (0, rows.shape[1]),
-        "other joints than the chart's",
+        "the joints are not those of the chart",
         where="redundant_joints",
         found=named,
         allowed=rows.shape[1],

@@ -346,7 +346,7 @@ class Trajectory(Summary):
         if not np.all(np.abs(times - inside) <= 1e-9 * self.t_end):
             last, t_end = write_apart(times.max(), self.t_end, digits=6)
             raise InputError(
-                "time outside the trajectory",
+                "the time is outside the trajectory",
                 found=f"{times.min():g} s to {last} s",
                 allowed=f"0 s to {t_end} s",
             )
@@ -386,7 +386,10 @@ def motion_of(given: Motion, where: str = "trajectory") -> Trajectory:
     if not isinstance(motion, Trajectory):
         allowed = "a Trajectory, a Result, or the npz file of one"
         raise InputError(
-            "not a motion", where=where, found=type(given).__name__, allowed=allowed
+            "this is not a motion",
+            where=where,
+            found=type(given).__name__,
+            allowed=allowed,
         )
     return motion
 

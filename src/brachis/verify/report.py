@@ -10,6 +10,9 @@ from brachis.common.summary import Summary
 from brachis.errors import write_apart
 from brachis.robot.joints import shown_unit
 
+POSITION_SCALE = "0: the middle of the range, 1: an end"
+"""Remark of the check of the positions: what its ratio means."""
+
 
 @dataclass(frozen=True)
 class Check:

@@ -80,7 +80,7 @@ def verify_trajectory(
     )
     if robot.joint_names != trajectory.joint_names:
         raise InputError(
-            "the robot has other joints than the trajectory",
+            "the joints of the robot are not those of the trajectory",
             where="robot",
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),

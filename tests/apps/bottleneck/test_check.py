@@ -99,7 +99,7 @@ def test_report_needs_the_solved_problem(scara):
     bare = dataclasses.replace(
         result, candidate=dataclasses.replace(result.candidate, refined=None)
     )
-    with pytest.raises(InputError, match="no solved problem"):
+    with pytest.raises(InputError, match="no solved optimisation problem"):
         brachis.bottleneck.report(bare)
 
 

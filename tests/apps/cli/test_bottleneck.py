@@ -120,13 +120,15 @@ def test_figures_survive_a_drawing_that_cannot_be_written(
 ):
     def full(_figure, path):
         raise InputError(
-            "cannot be written", where=str(path), found="No space left on device"
+            "the file cannot be written",
+            where=str(path),
+            found="No space left on device",
         )
 
     monkeypatch.setattr(plots, "save_figure", full)
     outcome = run("bottleneck", write(task), "--out", tmp_path / "out")
     assert outcome.code == 3
-    assert "timeline.png: cannot be written" in outcome.err
+    assert "timeline.png: the file cannot be written" in outcome.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["bottleneck.json"]
 
 
@@ -165,7 +167,7 @@ def test_a_saved_motion(run, task, write, tmp_path):
 def test_a_saved_motion_keeps_its_urdf(run, tmp_path):
     outcome = run("bottleneck", tmp_path / "result.npz", "--urdf", SCARA)
     assert outcome.code == 2
-    assert "belongs to the robot and task that it was planned for" in outcome.err
+    assert "this option cannot be used with a saved motion" in outcome.err
 
 
 def test_wrong_input(run, task, write, tmp_path):

@@ -116,7 +116,7 @@ def test_two_motions_do_not_mix_in_one_folder(
 
 def no_space(path):
     return InputError(
-        "cannot be written", where=str(path), found="No space left on device"
+        "the file cannot be written", where=str(path), found="No space left on device"
     )
 
 
@@ -138,7 +138,8 @@ def test_a_result_survives_a_full_disk_while_figures_are_written(
     assert outcome.code == 3
     assert "the result is written, its figures are not: " in outcome.err
     assert (
-        f"{out / 'overview.png'}: cannot be written; found No space left" in outcome.err
+        f"{out / 'overview.png'}: the file cannot be written; found No space left"
+        in outcome.err
     )
     data = json.loads(outcome.out)
     assert data["verified"] is True
@@ -166,7 +167,7 @@ def test_failure_while_writing_the_result_leaves_the_earlier_one(
     outcome = run("plan", write(task), "--out", out)
     assert outcome.code == 2
     assert (
-        f"{out / 'result.json'}: cannot be written; found No space left on device"
+        f"{out / 'result.json'}: the file cannot be written; found No space left on device"
         in outcome.err
     )
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
@@ -176,7 +177,7 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
     (tmp_path / "out/result.json").mkdir(parents=True)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
     assert outcome.code == 2
-    assert "result.json: cannot be written; found a folder" in outcome.err
+    assert "result.json: the file cannot be written; found a folder" in outcome.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
 
 
@@ -276,7 +277,9 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     assert (tmp_path / "out/unverified.npz").exists()
     data = json.loads(outcome.out)
     assert data["interrupted"]
-    assert data["undone"][-1] == "what search.effort asks for was not tried to its end"
+    assert (
+        data["undone"][-1] == "the search that search.effort requires was not completed"
+    )
     assert (
         "brachis: the search was ended early; this is the best motion so far\n"
         in outcome.err
@@ -318,7 +321,7 @@ def test_the_folder_of_a_motion_stands_for_it(run, planned, tmp_path):
     outcome = run("verify", tmp_path / "empty")
     assert outcome.code == 2
     assert (
-        "is a folder without a motion; allowed: result.npz or unverified.npz"
+        "this folder contains no motion; allowed: result.npz or unverified.npz"
         in outcome.err
     )
 
@@ -391,7 +394,7 @@ def test_the_saved_motion_is_not_written_over(run, planned):
     assert run("export", saved, "--out", saved).code == 2
     outcome = run("export", saved, "--out", saved, "--format", "csv")
     assert outcome.code == 2
-    assert "would be written over an input" in outcome.err
+    assert "the output would overwrite an input file" in outcome.err
     assert run("plot", saved, "--out", saved).code == 2
     assert saved.read_bytes() == before
 

@@ -120,17 +120,17 @@ def test_no_figure_is_guessed(run, tmp_path, missing):
 
 
 WRONG = {
-    "zero axis": (("--axis", "0,0,0"), ["axis: wrong value"]),
+    "zero axis": (("--axis", "0,0,0"), ["axis: this value is not valid"]),
     "range upside down": (
         ("--range", "2", "-2"),
         [
-            "range: wrong value; found (2.0, -2.0); allowed: [low, high] in m, low < high"
+            "range: this value is not valid; found (2.0, -2.0); allowed: [low, high] in m, low < high"
         ],
     ),
-    "negative mass": (("--mass", "-1"), ["mass: wrong value; found -1.0"]),
+    "negative mass": (("--mass", "-1"), ["mass: this value is not valid; found -1.0"]),
     "angle not a number": (
         ("--mount-rpy-deg", "nan", "0", "0"),
-        ["mount_rpy: wrong value"],
+        ["mount_rpy: this value is not valid"],
     ),
     "taken name": (
         ("--name", "j1"),
@@ -161,8 +161,8 @@ def test_wrong_files(run, tmp_path):
     for arm, out, words in (
         (gone, tmp_path / "new.urdf", "gone.urdf: the file does not exist"),
         (broken, tmp_path / "new.urdf", "not well-formed XML"),
-        (SCARA, tmp_path / "no/new.urdf", "new.urdf: cannot be written"),
-        (SCARA, SCARA, "would be written over an input"),
+        (SCARA, tmp_path / "no/new.urdf", "new.urdf: the file cannot be written"),
+        (SCARA, SCARA, "the output would overwrite an input file"),
     ):
         outcome = run("compose", arm, *FIGURES, "--out", out)
         assert outcome.code == 2

@@ -45,7 +45,7 @@ def test_the_suffix_says_the_format_unless_it_is_named(run, saved, tmp_path):
     outcome = run("export", saved, "--out", tmp_path / "motion.dat")
     assert outcome.code == 2
     assert (
-        "cannot tell the format of the file; found suffix .dat; allowed: .csv, .parquet"
+        "the suffix of the file is not that of a known format; found suffix .dat; allowed: .csv, .parquet"
         in outcome.err
     )
     (tmp_path / "task.yaml").write_text("brachis: 1")

@@ -132,7 +132,7 @@ def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
         "EAIK is not installed (pip install EAIK); it might add the redundant joints ["
     )
     assert (
-        "[panda_joint5], [panda_joint6]; installing it takes a C++ compiler except on"
+        "[panda_joint5], [panda_joint6]; installing it needs a C++ compiler, except on"
         in remarks[-1]
     )
     assert remarks[-1] in run("inspect", published("Panda")).out.replace("\n", " ")

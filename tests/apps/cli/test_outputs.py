@@ -79,7 +79,12 @@ def test_nothing_is_written_over_other_files(case, run, saved, monkeypatch):
     assert outcome.code == 2, outcome.err
     assert any(
         part in outcome.err
-        for part in ("over an input", "of another kind", "not written by", "the format")
+        for part in (
+            "overwrite an input",
+            "of another kind",
+            "not written by",
+            "the format",
+        )
     )
     assert contents(saved) == before
 

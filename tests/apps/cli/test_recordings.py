@@ -49,11 +49,14 @@ def test_import(run, recorded, tmp_path):
     assert " deg/s " in outcome.out
     assert f"end time t_E: {trajectory.t_end:.4f} s" in outcome.out
     assert "verification: passed" in outcome.out
-    assert "not known: what the motion does between the rows" in outcome.out
+    assert "unknown: the motion between the rows" in outcome.out
     assert run("verify", out).code == 0
     outcome = run("bottleneck", out)
     assert outcome.code == 0, outcome.err
-    assert "the motion was not planned: what a limit costs is not known" in outcome.out
+    assert (
+        "the motion was not planned, so the cost of its limits is unknown"
+        in outcome.out
+    )
     assert run("export", out, "--out", tmp_path / "again.json").code == 0
     assert (
         run("import", file, "--robot", cell, "--angle", "deg", "--out", cell).code == 2
@@ -112,7 +115,7 @@ def test_compare(run, recorded, tmp_path):
         ),
         (("--tolerance", "0"), "the tolerance of a path is out of range; found 0.0"),
         (("--noise", "-1"), "noise"),
-        ((), 'If these are degrees, say units={"angle": "deg"}, or --angle deg'),
+        ((), 'If these are degrees, set units={"angle": "deg"} or --angle deg'),
     ],
 )
 def test_wrong_options(run, recorded, tmp_path, options, told):

@@ -79,7 +79,7 @@ def test_a_folder_without_a_motion_is_refused(run, tmp_path):
     refused = run("view", tmp_path)
     assert refused.code == 2
     assert (
-        "is a folder without a motion; allowed: result.npz or unverified.npz"
+        "this folder contains no motion; allowed: result.npz or unverified.npz"
         in refused.err
     )
 
@@ -98,7 +98,7 @@ def test_a_port_in_use_is_refused(run, saved, looked_at, monkeypatch):
 def test_other_machines_are_let_in_with_a_warning(run, saved, looked_at):
     shown = run("view", saved, "--port", 0, "--host", "0.0.0.0")  # noqa: S104  (what is tested)
     assert shown.code == 0, shown.err
-    assert "warning: anyone who reaches 0.0.0.0 can look" in shown.err
+    assert "warning: anyone who can reach 0.0.0.0 can watch" in shown.err
     assert looked_at.pop().startswith("http://127.0.0.1:")
 
 

@@ -13,45 +13,63 @@ from brachis.errors import InputError, UrdfError
 from .conftest import RAIL, arm_text
 
 FIGURES = {
-    "zero axis": ({"axis": (0, 0, 0)}, "axis: wrong value; found (0, 0, 0)"),
+    "zero axis": (
+        {"axis": (0, 0, 0)},
+        "axis: this value is not valid; found (0, 0, 0)",
+    ),
     "short axis": (
         {"axis": (0, 1)},
-        "axis: wrong value; found (0, 1); allowed: a direction [x, y, z], not all zero",
+        "axis: this value is not valid; found (0, 1); allowed: a direction [x, y, z], not all zero",
     ),
-    "axis of words": ({"axis": "abc"}, "axis: wrong value; found abc"),
-    "axis not a number": ({"axis": (0, math.nan, 0)}, "axis: wrong value"),
+    "axis of words": ({"axis": "abc"}, "axis: this value is not valid; found abc"),
+    "axis not a number": ({"axis": (0, math.nan, 0)}, "axis: this value is not valid"),
     "range upside down": (
         {"range": (2, -2)},
-        "range: wrong value; found (2, -2); allowed: [low, high] in m, low < high",
+        "range: this value is not valid; found (2, -2); allowed: [low, high] in m, low < high",
     ),
-    "empty range": ({"range": (1, 1)}, "range: wrong value"),
+    "empty range": ({"range": (1, 1)}, "range: this value is not valid"),
     "endless range": (
         {"range": (-math.inf, 1)},
-        "range: wrong value; found (-inf, 1); allowed: [low, high] in m",
+        "range: this value is not valid; found (-inf, 1); allowed: [low, high] in m",
     ),
-    "one number as range": ({"range": 2.0}, "range: wrong value; found 2.0"),
+    "one number as range": (
+        {"range": 2.0},
+        "range: this value is not valid; found 2.0",
+    ),
     "no velocity": (
         {"velocity": 0.0},
-        "velocity: wrong value; found 0.0; allowed: a finite number > 0 m/s",
+        "velocity: this value is not valid; found 0.0; allowed: a finite number > 0 m/s",
     ),
-    "negative force": ({"force": -5}, "force: wrong value; found -5"),
-    "infinite force": ({"force": math.inf}, "force: wrong value; found inf"),
-    "no mass": ({"mass": 0}, "mass: wrong value; found 0"),
-    "mass not stated": ({"mass": None}, "mass: wrong value; found None"),
-    "mass not a number": ({"mass": math.nan}, "mass: wrong value; found nan"),
+    "negative force": ({"force": -5}, "force: this value is not valid; found -5"),
+    "infinite force": (
+        {"force": math.inf},
+        "force: this value is not valid; found inf",
+    ),
+    "no mass": ({"mass": 0}, "mass: this value is not valid; found 0"),
+    "mass not stated": ({"mass": None}, "mass: this value is not valid; found None"),
+    "mass not a number": (
+        {"mass": math.nan},
+        "mass: this value is not valid; found nan",
+    ),
     "mount": (
         {"mount_xyz": (0, 0)},
-        "mount_xyz: wrong value; found (0, 0); allowed: a position [x, y, z] in m",
+        "mount_xyz: this value is not valid; found (0, 0); allowed: a position [x, y, z] in m",
     ),
-    "turned mount": ({"mount_rpy": (0, 0, math.inf)}, "mount_rpy: wrong value"),
+    "turned mount": (
+        {"mount_rpy": (0, 0, math.inf)},
+        "mount_rpy: this value is not valid",
+    ),
     "flat carriage": (
         {"carriage_size": (1, 1, 0)},
-        "carriage_size: wrong value; found (1, 1, 0); allowed: three lengths",
+        "carriage_size: this value is not valid; found (1, 1, 0); allowed: three lengths",
     ),
-    "empty name": ({"name": ""}, "name: is not a name; found ''"),
-    "name with a space": ({"name": "my rail"}, "name: is not a name; found 'my rail'"),
-    "name with a null": ({"name": "rail\0"}, "name: is not a name"),
-    "name that is none": ({"root": 7}, "root: is not a name; found 7"),
+    "empty name": ({"name": ""}, "name: this is not a valid name; found ''"),
+    "name with a space": (
+        {"name": "my rail"},
+        "name: this is not a valid name; found 'my rail'",
+    ),
+    "name with a null": ({"name": "rail\0"}, "name: this is not a valid name"),
+    "name that is none": ({"root": 7}, "root: this is not a valid name; found 7"),
 }
 
 
@@ -88,7 +106,7 @@ URDFS = {
     ),
     "links of one name": (
         "<robot name='x'><link name='a'/><link name='a'/></robot>",
-        ["links share a name", "found a"],
+        ["links have the same name", "found a"],
     ),
     "two roots": (
         "<robot name='x'><link name='a'/><link name='b'/></robot>",
@@ -124,7 +142,7 @@ URDFS = {
     ),
     "joint without a parent": (
         arm_text().replace("<parent link='link3'/>", ""),
-        ["the parent of joint 'tool_mount' is not a link", "found none"],
+        ["the parent of joint 'tool_mount' is not a link", "found no name"],
     ),
     "xacro macro": (
         arm_text(more="<xacro:arm xmlns:xacro='http://www.ros.org/wiki/xacro'/>"),
@@ -176,7 +194,8 @@ def test_arm_is_never_overwritten(arm, tmp_path, monkeypatch):
     monkeypatch.chdir(arm.parent)
     for output in (arm, alias, Path("arm.urdf"), Path("../arm/arm.urdf")):
         with pytest.raises(
-            InputError, match=r"output .*: is the arm's own file; allowed: another file"
+            InputError,
+            match=r"output .*: the output would overwrite the arm's URDF; allowed: another file",
         ):
             on_rail(arm, Rail(**RAIL), output=output)
     assert arm.read_text() == before
@@ -187,7 +206,9 @@ def test_output_that_cannot_be_written(arm, tmp_path):
     for output in (tmp_path / "missing/new.urdf", tmp_path / "folder.urdf"):
         with pytest.raises(InputError) as caught:
             on_rail(arm, Rail(**RAIL), output=output)
-        assert str(caught.value).startswith(f"{output}: cannot be written; found ")
+        assert str(caught.value).startswith(
+            f"{output}: the file cannot be written; found "
+        )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["arm", "folder.urdf"]
 
 

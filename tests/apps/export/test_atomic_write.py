@@ -104,7 +104,8 @@ def test_what_cannot_be_written_is_named(tmp_path, name):
 def test_a_full_disk_is_named():
     with (
         pytest.raises(
-            InputError, match="/dev/full: cannot be written; found No space left"
+            InputError,
+            match="/dev/full: the file cannot be written; found No space left",
         ),
         atomic_write("/dev/full") as stream,
     ):

@@ -107,6 +107,6 @@ def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else
         text=True,
         check=True,
     )
-    assert done.stdout == f"{path}: cannot be written; found File too large\n"
+    assert done.stdout == f"{path}: the file cannot be written; found File too large\n"
     assert path.read_text() == "old"
     assert sorted(tmp_path.iterdir()) == [path, saved]

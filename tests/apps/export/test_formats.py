@@ -174,7 +174,7 @@ def ur10(line_trajectory):
 def test_urscript(ur10, tmp_path):
     path, joints = tmp_path / "motion.script", ur10.joint_names[1:]
     with pytest.raises(
-        InputError, match=r"six joints; found rail \(m\), .*Name the arm's six"
+        InputError, match=r"six joints; found rail \(m\), .*List only the arm's six"
     ):
         export.write(ur10, path)
     with pytest.warns(BrachisWarning, match="rail"):
@@ -208,7 +208,7 @@ def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(
         export.write(ur10, path, joints=ur10.joint_names[1:], dt=0.1)
     (warning,) = caught
     assert str(warning.message).startswith(
-        f"{SENTENCE}. Move what is missing by its own controller"
+        f"{SENTENCE}. Move the missing joints with their own controller"
     )
     text = path.read_text()
     if suffix == ".json":
@@ -279,7 +279,7 @@ def test_an_animation_may_be_slower_and_nothing_else_may(line_trajectory, tmp_pa
     assert figure._suptitle.get_text().endswith("3 times slower")
     with pytest.raises(
         InputError,
-        match=r"only animations may be slower; found 2.0; allowed: 1, or .gif, .mp4",
+        match=r"only animations can be slowed down; found 2.0; allowed: 1, or .gif, .mp4",
     ):
         export.write(line_trajectory, tmp_path / "motion.csv", slower=2.0)
     with pytest.raises(
@@ -327,7 +327,9 @@ def test_what_ffmpeg_says_is_told(line_trajectory, tmp_path, monkeypatch):
     program.write_text("#!/bin/sh\necho no encoder >&2\nexit 1\n")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}:/usr/bin:/bin")
-    with pytest.raises(InputError, match="ffmpeg cannot make the film; found no enco"):
+    with pytest.raises(
+        InputError, match="ffmpeg failed to write the film; found no enco"
+    ):
         export.write(line_trajectory, tmp_path / "motion.mp4", dt=0.5)
     assert list(tmp_path.iterdir()) == [folder]
 
@@ -362,19 +364,19 @@ def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
         (
             "motion.txt",
             {},
-            r"cannot tell the format of the file; found suffix .txt; allowed: .csv, .parquet, .json",
+            r"the suffix of the file is not that of a known format; found suffix .txt; allowed: .csv, .parquet, .json",
         ),
         ("motion", {"form": "parkuet"}, "Did you mean 'parquet'"),
         (
             "motion.gif",
             {"dt": 0.005},
-            r"cannot be the period of an animation; found 0.005 s; allowed: a multiple of 0.01 s",
+            r"an animation cannot have this period; found 0.005 s; allowed: a multiple of 0.01 s",
         ),
-        ("motion.gif", {"dt": 0.0}, "cannot be the period of an animation"),
+        ("motion.gif", {"dt": 0.0}, "an animation cannot have this period"),
         (
             "motion.gif",
             {"joints": ["j1"]},
-            "an animation shows the whole robot; found j1",
+            "an animation cannot leave out joints; found j1",
         ),
         ("motion.json", {"last": "held"}, "Did you mean 'hold'"),
     ],

@@ -74,5 +74,5 @@ def test_without_a_motion_nothing_is_scaled():
 
 
 def test_nothing_to_draw_is_refused():
-    with pytest.raises(InputError, match="nothing to draw"):
+    with pytest.raises(InputError, match="the list of candidates is empty"):
         plot_candidates([])

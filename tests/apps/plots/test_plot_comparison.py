@@ -135,12 +135,12 @@ def test_many_angles_go_to_more_panels_in_order():
 @pytest.mark.parametrize(
     ("rows", "message", "where"),
     [
-        ([], "nothing to compare", "rows"),
-        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "is not a case", "rows[1]"),
-        ([(0.0, "j1", 0.0)], "is not an end time", "rows[0]"),
-        ([(0.0, "j1", -1.0)], "is not an end time", "rows[0]"),
-        ([(0.0, "j1", math.inf)], "is not an end time", "rows[0]"),
-        ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "comes twice", "rows[1]"),
+        ([], "the list of rows is empty", "rows"),
+        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "the case is not valid", "rows[1]"),
+        ([(0.0, "j1", 0.0)], "the end time is not valid", "rows[0]"),
+        ([(0.0, "j1", -1.0)], "the end time is not valid", "rows[0]"),
+        ([(0.0, "j1", math.inf)], "the end time is not valid", "rows[0]"),
+        ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "already in another row", "rows[1]"),
     ],
 )
 def test_wrong_tables_are_refused(rows, message, where):

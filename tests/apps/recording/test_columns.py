@@ -134,7 +134,7 @@ def test_standing_still_before_and_after_does_not_count(table, write):
         (
             "t,j1 [deg],j2,j3",
             {"angle": "rad"},
-            "the header contradicts the units asked for; found deg",
+            "the unit in the header is not the requested unit; found deg",
         ),
         ("t,j1,j2,j3", {"angle": "grad"}, "unknown unit of angle; found grad"),
     ],
@@ -160,7 +160,8 @@ def test_only_some_velocities(table, write):
 def test_rows_that_are_no_motion(table, write):
     t, q, _ = table
     with pytest.raises(
-        TaskError, match=r"line 4: times do not ascend; found 0.004 s after 0.004 s"
+        TaskError,
+        match=r"line 4: the times do not increase; found 0.004 s after 0.004 s",
     ):
         read_recording(
             write("t,j1,j2,j3", np.concatenate([t[:2], t[1:-1]]), q), ROBOT, {}
@@ -173,7 +174,7 @@ def test_rows_that_are_no_motion(table, write):
         read_recording(write("t,j1,j2,j3", t, 0.0 * q), ROBOT, {})
     with pytest.raises(
         TaskError,
-        match=r"implausible angle \(degrees\?\); found [0-9.]+ rad at j1. If these are degrees, say",
+        match=r"implausible angle \(degrees\?\); found [0-9.]+ rad at j1. If these are degrees, set",
     ):
         read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, {})
     with pytest.raises(TaskError, match="the file does not exist"):

@@ -133,10 +133,10 @@ def test_bottlenecks_are_when_limits_are_active(imported):
     assert found.to_dict()["sensitivities"] is None
     text = str(found)
     assert text.startswith(
-        "the motion was not planned: what a limit costs is not known\n"
+        "the motion was not planned, so the cost of its limits is unknown\n"
     )
     assert "is at its torque limit for" in text
-    with pytest.raises(InputError, match="nothing of it can be solved again"):
+    with pytest.raises(InputError, match="the cost of its limits cannot be computed"):
         bottleneck.report(imported, check=True)
 
 
@@ -262,7 +262,7 @@ def test_measured_positions_are_smoothed(motion, write):
     )
     assert found.path_error < 1e-4
     assert found.worst_ratio == pytest.approx(1.0, abs=0.05)
-    with pytest.raises(PathError, match="say their noise, or raise the tolerance"):
+    with pytest.raises(PathError, match="set their noise, or raise the tolerance"):
         import_motion(path, task=motion.task)
 
 
@@ -319,7 +319,7 @@ def test_a_tool_that_stops_and_turns_off_is_refused(motion, table, write):
     )
     with pytest.raises(
         PathError,
-        match=r"follows no smooth path within the tolerance.* divide the file there",
+        match=r"follows no smooth path within the tolerance.* split the file there",
     ):
         import_motion(path, task=motion.task)
 

@@ -27,7 +27,7 @@ CONTENT = {
         {"path.0.line.length": 0.9, "spline.degree": 9},
     ],
 }
-"""Of the rows one is good, one is out of reach, and one has no such degree; an angle comes twice."""
+"""Of the rows one is good, one is out of reach, and one has no such degree; an angle already in another row."""
 
 
 ROUNDED = ["t_end_s", "worst_ratio", "path_error", "iterations", "wall_time_s"]

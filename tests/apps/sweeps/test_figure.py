@@ -92,7 +92,7 @@ def test_draws_of_two_keys_are_points():
 
 @pytest.mark.parametrize("rows", [[], [row(None, a=1)]])
 def test_nothing_to_draw(rows):
-    with pytest.raises(InputError, match="nothing to draw"):
+    with pytest.raises(InputError, match="no plan is verified"):
         plot_sweep(rows, ["a"])
 
 

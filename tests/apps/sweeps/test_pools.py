@@ -60,7 +60,7 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
         plan for plan, outcome in found.items() if outcome.facts["status"] == "failed"
     } == {4, 7}
     assert found[4].facts["error"] == "BrokenExecutor"
-    assert "ended its worker process" in found[4].facts["message"]
+    assert "each worker process ended during this plan" in found[4].facts["message"]
 
 
 def test_what_no_worker_can_run_ends_the_sweep():
@@ -166,6 +166,6 @@ def test_a_scheduler_that_is_lost(monkeypatch):
     monkeypatch.setattr("dask.distributed.Client", Client)
     with pytest.raises(
         ClusterError,
-        match=r"tcp://here:1: the Dask scheduler was lost; found in <TCP .closed.*goes on",
+        match=r"tcp://here:1: the connection to the Dask scheduler was lost; found in <TCP .closed.*goes on",
     ):
         list(on_dask([], "tcp://here:1", print))

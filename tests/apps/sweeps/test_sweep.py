@@ -183,7 +183,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
     ):
         with pytest.raises(
             InputError,
-            match="holds other files; allowed: a new folder, or one with a sweep's",
+            match="contains other files; allowed: a new folder, or one with a sweep's",
         ):
             use()
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
@@ -200,7 +200,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
         ({"grid": {"path.1.line.length": [1, 2]}}, ["path is a list of 1", "path.1"]),
         (
             {"grid": {"robot.limits.torque.scale": [1, 2]}},
-            ["robot.limits.torque has no keys of its own", "found 10"],
+            ["robot.limits.torque is a value without keys", "found 10"],
         ),
         (
             {"grid": {"start.joints.3": [0.1]}},
@@ -221,7 +221,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
             ["path.0.line.angle_deg is varied twice", "in grid and in rows"],
         ),
         ({"gird": {}}, ["gird", "Did you mean 'grid'"]),
-        ({"task": 3}, ["no task", "found 3"]),
+        ({"task": 3}, ["this is not a task", "found 3"]),
         ({"task": "nothing.yaml"}, ["nothing.yaml", "the file does not exist"]),
         ({"fixed": {"spline.degre": 3}}, ["Did you mean 'degree'"]),
     ],

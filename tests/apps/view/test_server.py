@@ -64,7 +64,7 @@ def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(
     taken = server.get_port()
     with pytest.raises(
         InputError,
-        match=rf"the port is in use; found {taken} on 127.0.0.1.*next free one",
+        match=rf"the port is in use; found {taken} on 127.0.0.1.*next free port",
     ):
         start_server(LOOPBACK, taken)
     monkeypatch.setattr("brachis.apps.view.server.FIRST_PORT", taken)
@@ -85,7 +85,7 @@ def test_a_port_that_somebody_takes_in_between_is_refused_as_well(server, monkey
 def test_what_is_no_port_is_refused(port):
     with pytest.raises(
         InputError,
-        match=rf"--port: the port does not exist; found {port}; allowed: 0 to 65535",
+        match=rf"--port: the port is out of range; found {port}; allowed: 0 to 65535",
     ):
         start_server(LOOPBACK, port)
 
@@ -95,7 +95,8 @@ def test_a_host_that_is_not_here_is_refused(monkeypatch):
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     with pytest.raises(
-        InputError, match=r"--host: cannot be listened on; found 192\.0\.2\.1"
+        InputError,
+        match=r"--host: the viewer cannot listen on this address; found 192\.0\.2\.1",
     ):  # an address of no machine
         start_server("192.0.2.1", 0)
     monkeypatch.setattr(socket, "getaddrinfo", unknown)

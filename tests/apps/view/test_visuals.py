@@ -118,7 +118,7 @@ BROKEN = {
         b"\0" * 80 + struct.pack("<I12fH", 1, *[math.nan] * 12, 0),
         "not finite",
     ),
-    "packed.tar.gz": (b"\x1f\x8b", "packed meshes are not read"),
+    "packed.tar.gz": (b"\x1f\x8b", "compressed meshes cannot be read"),
     "a" * 5000 + ".stl": (None, "a mesh file is missing"),
 }
 

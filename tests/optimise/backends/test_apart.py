@@ -69,7 +69,7 @@ def test_a_solver_that_does_not_come_back_is_ended(monkeypatch):
     monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
     report = solve(SolverOptions(time_limit=0.1))
     assert report.status is SolveStatus.TIME_LIMIT
-    assert report.message == "ended: it did not come back in time"
+    assert report.message == "ended: it did not finish in time"
     np.testing.assert_array_equal(report.x, START)
     assert report.violation == 0.0, "the start is feasible, and stays"
     assert not own_children()

@@ -14,9 +14,9 @@ POINTS = np.linspace([0.0, 0.0, 0.0], [0.1, 0.2, 0.3], 20)
 WRONG = [
     (np.full(20, np.inf), r"row 0: a speed must be positive and finite"),
     (np.full(20, -0.1), r"row 0: a speed must be positive and finite"),
-    (np.ones((20, 3)), r"speeds of the wrong shape; found \(20, 3\)"),
+    (np.ones((20, 3)), r"the speeds have the wrong shape; found \(20, 3\)"),
     (["a"] * 20, r"not an array of numbers"),
-    (np.ones(19), r"as many speed as points are needed"),
+    (np.ones(19), r"the numbers of points and of rows of speed differ"),
 ]
 
 
@@ -34,12 +34,10 @@ def test_no_speed_may_be_prescribed_in_places():
 
 
 def test_empty_arrays_are_refused():
-    with pytest.raises(TaskError, match="an array without numbers"):
+    with pytest.raises(TaskError, match="the array is empty"):
         points_from(np.empty((0, 3)), None, None, FileUnits(), "points")
 
 
 def test_feed_rates_without_a_tolerance_are_refused_not_lost():
-    with pytest.raises(
-        TaskError, match="feed rates are read along a fitted path alone"
-    ):
+    with pytest.raises(TaskError, match="feed rates need a fitted path"):
         brachis.fit_path(POINTS, speed=np.full(20, 0.01))

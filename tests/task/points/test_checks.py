@@ -33,7 +33,7 @@ def test_a_spike_is_named(scatter):
     position[1_234] += [0.0, 5.0 * MM, 0.0]
     with pytest.raises(
         TaskError,
-        match=r"row 1234: the point is a spike, .* 4.78\d* mm off .*remove the row",
+        match=r"row 1234: the point is an outlier, .* 4.78\d* mm off .*remove the row",
     ):
         spikes(position)
 
@@ -43,7 +43,7 @@ def test_corners_are_no_spikes_and_spikes_beside_them_are(count, scatter):
     position = bent(count, scatter)[0]
     spikes(position)
     position[count // 5] += [0.0, 0.0, 50.0 * MM]
-    with pytest.raises(TaskError, match=f"row {count // 5}: the point is a spike"):
+    with pytest.raises(TaskError, match=f"row {count // 5}: the point is an outlier"):
         spikes(position)
 
 
@@ -89,7 +89,7 @@ def test_a_turn_on_the_spot_is_refused():
         match=r"row 1: the position stands still from row 0 on while the tool turns",
     ):
         without_repetitions(points(position, yaw))
-    with pytest.raises(TaskError, match="the position does not move"):
+    with pytest.raises(TaskError, match="all rows have the same position"):
         without_repetitions(points(np.zeros((5, 2))))
 
 

@@ -104,9 +104,9 @@ MISTAKES = [
         "G0 X1 Y1 Z1\nG2 X5 Y1 R1 F10",
         r"line 2: invalid arc: no circle of this radius passes both ends; found R 1 mm for ends 4 mm apart",
     ),
-    ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: not understood; found 'X#1'"),
+    ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: this is not understood; found 'X#1'"),
     ("G0 X1 Y1 Z1\nG1 X2 F0", r"line 2: a feed rate must be positive; found F0"),
-    ("G0 X1 Y1", r"a.nc: no motion; found 0 places.*Z is never stated"),
+    ("G0 X1 Y1", r"a.nc: the program contains no motion; found 0 places.*Z is missing"),
     ("G0 X1 Y1 Z1\nM98 P1000", r"line 2: subprograms are not read; found M98"),
     (
         "G54 G0 X1 Y1 Z1\nG1 X2 F10\nG55\nG1 X3",
@@ -123,7 +123,7 @@ def test_mistakes_are_named(text, message):
 
 def test_positions_alone_are_given():
     with pytest.raises(
-        TaskError, match=r"G-code gives positions alone; found x, y, yaw"
+        TaskError, match=r"G-code contains only positions; found x, y, yaw"
     ):
         points_of(PROGRAM, ("x", "y", "yaw"))
 

@@ -113,12 +113,12 @@ MISTAKES = [
     (
         "x,y,z\n1,5,2,5,3,5\n4,5,6",
         FileUnits(),
-        r"line 2: wrong number of values; found 6; .*Decimal commas need",
+        r"line 2: the row has the wrong number of values; found 6; .*Decimal commas need",
     ),
     (
         "x;y;z\n1.000,5;2;3\n4;5;6",
         FileUnits(),
-        r"line 2: decimal points and commas in one line; found '1.000,5;2;3'",
+        r"line 2: the line has both decimal points and decimal commas; found '1.000,5;2;3'",
     ),
     (
         "x;y;z\n1,5;2;3\n4;NaN;6",

@@ -302,7 +302,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
         answers.append(x)
     if not answers:
         raise PlanningError(
-            "the answer could not be solved again",
+            "solving the planned motion again found no optimum",
             hint="Plan with a smaller solver.tolerance.",
         )
     return min(answers, key=program.end_time), False

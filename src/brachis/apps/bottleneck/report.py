@@ -205,7 +205,7 @@ class BottleneckReport:
 
     def text(self, *, degrees: bool = False) -> str:
         """Say all in plain words, angles in degrees if requested."""
-        lines = ["the motion was not planned: what a limit costs is not known"]
+        lines = ["the motion was not planned, so the cost of its limits is unknown"]
         if self.sensitivities is not None:
             lines = _costs(self.sensitivities, self.t_end, degrees=degrees)
         if self.knots is not None:
@@ -285,7 +285,7 @@ def report(
         if trajectory.recovered is not None:
             if check or reference:
                 raise InputError(
-                    "the motion was not planned: nothing of it can be solved again",
+                    "this motion was not planned, so the cost of its limits cannot be computed",
                     where=trajectory.recovered.source,
                     hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
                 )
@@ -295,7 +295,7 @@ def report(
         trajectory = motion.trajectory
         if motion.candidate.refined is None:
             raise InputError(
-                "the result holds no solved problem",
+                "the result contains no solved optimisation problem",
                 where="result",
                 allowed="a result of brachis.plan",
             )
@@ -337,7 +337,7 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     lines = []
     if not found.reliable:
         lines.append(
-            f"beware: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
+            f"warning: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
             "motion is not an optimum, and the savings below are rough"
         )
     costly = [
@@ -380,10 +380,10 @@ def _knots(found: KnotCost, t_end: float) -> list[str]:
         return []
     line = (
         f"the knots cost about {_part(found.saved * t_end, t_end)} with {write_count(found.intervals, 'interval')}: "
-        f"timed anew in the phase plane, where torques jump, the same joint path takes {found.t_end:.4g} s"
+        f"with torques that may jump, the same joint path takes {found.t_end:.4g} s"
     )
     if found.given:
-        line += "; spline.intervals: auto, or more of them, come nearer to that"
+        line += "; to come closer, set spline.intervals: auto or a larger number"
     return [line]
 
 

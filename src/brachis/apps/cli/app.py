@@ -239,7 +239,7 @@ def motion_file(result: Path) -> Path:
         if is_file(result / name):
             return result / name
     raise ResultFileError(
-        "is a folder without a motion",
+        "this folder contains no motion",
         where=str(result),
         allowed=" or ".join(_MOTIONS),
         hint="Run brachis plan --out",
@@ -269,7 +269,7 @@ def load_changed_task(
     if robots.is_robot(str(path)) and path.suffix == "":
         name = robots.path_of(str(path)).parent.name
         raise TaskError(
-            "is a robot",
+            "this is the name of a robot, not of a task file",
             where=name,
             allowed="a task file",
             hint=f"brachis new {name} writes a first task for it",

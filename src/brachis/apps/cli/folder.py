@@ -81,7 +81,7 @@ def check_output(
         with suppress(OSError):  # an input that cannot be read is another file
             if path is not None and out.samefile(path):
                 raise InputError(
-                    "would be written over an input",
+                    "the output would overwrite an input file",
                     where=str(out),
                     found="the same file",
                     allowed="another file name",
@@ -143,7 +143,7 @@ def write_files(
     for name in (*results, *figures):
         if is_folder(out / name):
             raise InputError(
-                "cannot be written",
+                "the file cannot be written",
                 where=str(out / name),
                 found="a folder of this name",
             )

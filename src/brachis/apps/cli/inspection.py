@@ -37,10 +37,10 @@ _NONE = "none"
 _MOST_REFUSED = 12
 """Choices without a closed form that are listed on the screen."""
 _OTHER_TASKS = (
-    "a whole pose is prescribed",
-    "no whole pose is prescribed",
+    "this family does not solve poses",
+    "this family solves only poses",
     "only for poses",
-    "only for the position: x, y and z",
+    "this family solves only the position: x, y and z",
 )
 """Reasons of families for other task spaces; shown only without other reasons."""
 
@@ -257,7 +257,7 @@ def _robot_of_urdf(
             locked[name] = float(value)
         except ValueError as error:
             raise InputError(
-                "is not understood",
+                "this value is not understood",
                 where="--lock",
                 found=text,
                 allowed="name=value, rad or m",
@@ -361,7 +361,7 @@ def _read_posture(robot: Robot, text: str) -> np.ndarray:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
         raise InputError(
-            "is not understood",
+            "this value is not understood",
             where="--posture",
             found=text,
             allowed="numbers, rad or m",

@@ -170,7 +170,7 @@ def report(
     print_lines(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
         print_error(
-            "the motion did not pass the verification; the report says so, and what failed"
+            "the motion did not pass the verification; the report lists the checks that failed"
         )
     raise typer.Exit(0 if page.verified else 1)
 
@@ -235,7 +235,7 @@ def view(
     )
     if not viewer.local:
         print_error(
-            f"warning: anyone who reaches {host} can look, and move the slider; leave --host out to prevent it"
+            f"warning: anyone who can reach {host} can watch and move the slider; leave out --host to prevent this"
         )
     show(viewer, browser=browser)
 

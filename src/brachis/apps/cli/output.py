@@ -119,11 +119,16 @@ def _widths(least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
 
 def print_verification(verification: Verification, *, degrees: bool) -> None:
     """Print the checks, one a row."""
+    from brachis.verify import POSITION_SCALE
+
     verdict = "passed" if verification.passed else "FAILED"
     rows = []
+    scales = []
     for check in verification.checks:
         outcome = "ok" if check.passed else "FAILED"
-        if check.remark:
+        if check.remark == POSITION_SCALE:
+            scales.append(f"{check.name}: {check.remark}")
+        elif check.remark:
             outcome += f" ({check.remark})"
         time_text = "" if check.time is None else f"{check.time:.4f}"
         figures = check.figures(degrees=degrees)
@@ -134,6 +139,7 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
         rows,
         numbers=("worst", "allowed", "time [s]"),
     )
+    print_lines(*scales)
 
 
 def print_error(message: str) -> None:

@@ -225,7 +225,7 @@ def bottleneck(
             for option, value in given.items():
                 if value is not None:
                     raise InputError(
-                        "a saved motion belongs to the robot and task that it was planned for",
+                        "this option cannot be used with a saved motion",
                         where=option,
                         found=value,
                         allowed="this option with a task file",
@@ -258,7 +258,7 @@ def bottleneck(
         verified=data["verified"],
         show=None if json else show_report,
         result=result,
-        complaint="what is said of it may not hold",
+        complaint="its bottlenecks may be wrong",
     )
     raise typer.Exit(code)
 

@@ -198,7 +198,7 @@ def _load(
 def _print_comparison(found: Comparison) -> None:
     """Print the comparison for a person."""
     print_lines(found.verdict)
-    kept = "kept, as far as rows tell"
+    kept = "kept at all recorded rows"
     if found.exceeded:
         kept = f"{len(found.exceeded)} exceeded"
     if not found.proven:

@@ -144,8 +144,8 @@ class Comparison(Summary):
         """What has to be known of the recorded motion besides the times."""
         remarks = [
             f"the recorded motion exceeds the {use.limit} limit of {use.recorded_at} by "
-            f"{100.0 * (use.recorded - 1.0):.2g} % at {use.recorded_time:.4f} s, as its rows prove; between them it "
-            f"may be by up to {100.0 * (use.recorded_up_to - 1.0):.2g} %"
+            f"{100.0 * (use.recorded - 1.0):.2g} % at {use.recorded_time:.4f} s, as its rows prove, and "
+            f"may exceed it by up to {100.0 * (use.recorded_up_to - 1.0):.2g} % between the rows"
             for use in self.exceeded
         ]
         if self.recorded.task.spline.rest != "full":

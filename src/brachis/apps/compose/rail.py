@@ -139,7 +139,10 @@ class Rail:
             is_finite = value.shape == shape and np.isfinite(value).all()
             if not is_finite or not np.all(test(value)):
                 raise InputError(
-                    "wrong value", where=figure, found=str(given), allowed=allowed
+                    "this value is not valid",
+                    where=figure,
+                    found=str(given),
+                    allowed=allowed,
                 )
             if figure == "axis":
                 value /= np.abs(value).max()  # squares of its size may overflow
@@ -151,7 +154,7 @@ class Rail:
             given = getattr(self, figure)
             if not (isinstance(given, str) and _NAME.fullmatch(given)):
                 raise InputError(
-                    "is not a name",
+                    "this is not a valid name",
                     where=figure,
                     found=repr(given),
                     allowed="a letter or underscore, then letters, digits, underscores, dots and hyphens",
@@ -193,7 +196,7 @@ class Rail:
                 )
         if len(new) < 5:
             raise InputError(
-                "two of the new names are the same",
+                "the new joints and links need different names",
                 where="name",
                 found=f"name {self.name!r}, root {self.root!r}, the arm's root link {arm_root!r}",
                 hint="Choose another name or root",
@@ -283,7 +286,7 @@ def on_rail(
     Raises
     ------
     InputError
-        A name is taken, or `output` cannot be written or is the arm's own file.
+        A name is taken, or `output` cannot be written or would overwrite the arm's URDF.
     UrdfError
         The arm's URDF is missing, broken, not one tree, or has bodies that are not physical.
 
@@ -303,7 +306,7 @@ def on_rail(
             known = status_of(target)
         if known is not None and os.path.samestat(known, source.stat()):
             raise InputError(
-                "is the arm's own file",
+                "the output would overwrite the arm's URDF",
                 where=f"output {target}",
                 allowed="another file",
             )

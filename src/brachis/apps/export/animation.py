@@ -150,7 +150,7 @@ def film_of(
         The period or the joints do not fit.
     """
     if joints is not None:
-        problem = "an animation shows the whole robot"
+        problem = "an animation cannot leave out joints"
         raise InputError(
             problem, where="joints", found=", ".join(joints), allowed="all joints"
         )
@@ -165,10 +165,10 @@ def film_of(
     usable = np.isfinite(dt) and dt > 0.0 and slower * trajectory.t_end / dt < most
     if not usable or abs(dt / step - round(dt / step)) > 1e-6:
         raise InputError(
-            "cannot be the period of an animation",
+            "an animation cannot have this period",
             where="dt",
             found=f"{dt} s",
-            allowed=f"a multiple of {step:g} s, for at most {most} pictures",
+            allowed=f"a multiple of {step:g} s, with no more than {most} pictures in all",
         )
     found = frames(trajectory, frame_times(trajectory, dt / slower), slower)
     return Film((pixels[:, :, :3].copy() for _, pixels in found), dt)
@@ -233,7 +233,7 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
         if process.returncode:
             messages.seek(0)
             raise InputError(
-                "ffmpeg cannot make the film",
+                "ffmpeg failed to write the film",
                 found=messages.read().decode(errors="replace").strip(),
             )
         stream.write(file.read_bytes())

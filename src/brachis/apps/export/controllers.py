@@ -101,7 +101,7 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
             where="joints",
             found=", ".join(f"{name} ({unit})" for name, unit in named),
             allowed="six revolute joints, from the base on",
-            hint="Name the arm's six as joints, and write others, such as a rail, in another format",
+            hint="List only the arm's six joints in joints, and write the others, such as a rail, in another format",
         )
     first, *postures = (f"[{', '.join(map(repr, row))}]" for row in rows.q.tolist())
     periods = np.diff(rows.t).round(12).tolist()

@@ -118,7 +118,7 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
     found = [form for form in FORMATS.values() if form.suffix == suffix]
     if not found:
         raise InputError(
-            "cannot tell the format of the file",
+            "the suffix of the file is not that of a known format",
             where=str(path),
             found=f"suffix {suffix}" if suffix else "no suffix",
             allowed=", ".join(form.suffix for form in FORMATS.values()),
@@ -183,7 +183,7 @@ def write(
     elif slower != 1.0:
         animations = [each.suffix for each in FORMATS.values() if each.step]
         raise InputError(
-            "only animations may be slower",
+            "only animations can be slowed down",
             where="slower",
             found=slower,
             allowed=f"1, or {', '.join(animations)}",

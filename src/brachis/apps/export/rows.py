@@ -109,7 +109,7 @@ def rows_of(
         travel = f"{np.ptp(q):.4g} {unit} ({q.min():.4g} to {q.max():.4g} {unit})"
         left_out.append(f"joint {joint} moves by {travel} and is not in this file")
     if left_out:
-        hint = "Move what is missing by its own controller at the same time, or write all joints"
+        hint = "Move the missing joints with their own controller at the same time, or write all joints"
         warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=3)
     return JointRows(
         tuple(chosen),

@@ -87,7 +87,7 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
         raise InputError("wrong type", where="rows", found=repr(rows), allowed=allowed)
     if not rows:
         raise InputError(
-            "there is nothing to compare",
+            "the list of rows is empty",
             where="rows",
             found="no rows",
             allowed="at least one",
@@ -100,15 +100,15 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
             found = repr(row)
             allowed = row_type
         elif not isinstance(row[0], str) and not math.isfinite(row[0]):
-            problem = "is not a case"
+            problem = "the case is not valid"
             found = f"{row[0]}"
             allowed = "a finite number, or a name"
         elif not (math.isnan(row[2]) or 0.0 < row[2] < math.inf):
-            problem = "is not an end time"
+            problem = "the end time is not valid"
             found = f"{row[2]} s"
             allowed = "> 0 s, or NaN for no plan"
         elif (row[0], row[1]) in cells:
-            problem = "comes twice"
+            problem = "this case and choice are already in another row"
             found = f"{_name(row[0])} with {row[1]!r}"
         else:
             cells[row[0], row[1]] = row[2]
@@ -210,12 +210,12 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     ):
         problem = "wrong type"
     elif not candidates:
-        problem = "there is nothing to draw"
+        problem = "the list of candidates is empty"
     if problem:
         raise InputError(
             problem,
             where="candidates",
-            found=type(candidates).__name__ if candidates else "none",
+            found=type(candidates).__name__ if candidates else "no candidates",
             allowed="the candidates of a result: result.candidates",
         )
     fastest, *others = candidates

@@ -295,7 +295,7 @@ def plot_timeline(
     ax.set_yticks(range(len(shown)), names)
     ax.tick_params(axis="y", length=0.0)
     if not shown:
-        style.write(ax, 0.5, 0.5, "no limit is ever used by half", ha="center")
+        style.write(ax, 0.5, 0.5, "no limit is used by 50 % or more", ha="center")
     bar = figure.colorbar(ScalarMappable(**blue), ax=ax, pad=0.01, fraction=0.03)
     bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
     bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)

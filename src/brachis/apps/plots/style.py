@@ -79,7 +79,7 @@ def check_suffix(path: str | os.PathLike[str]) -> str:
     suffix = Path(path).suffix.lower().removeprefix(".")
     if suffix not in SUFFIXES:
         raise InputError(
-            "cannot tell the format of the figure",
+            "the suffix of the figure is not that of a known format",
             where=str(path),
             found=f"suffix .{suffix}" if suffix else "no suffix",
             allowed=", ".join(f".{name}" for name in SUFFIXES),

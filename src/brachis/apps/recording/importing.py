@@ -139,7 +139,7 @@ def import_motion(
     followed = recover_path(task_map, nodes, tolerance)
     if followed.miss > tolerance:
         raise PathError(
-            "the recovered path misses the motion",
+            "the recovered path is too far from the motion",
             found=f"{followed.miss:.3g} m or rad off",
             allowed=f"{tolerance:.3g}",
             where="path",
@@ -239,7 +239,7 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
             "the tool does not move along a path",
             found=f"{length[-1]:.3g} m",
             where="path",
-            hint="A task space of joints takes any motion",
+            hint="With the task space joints any motion can be imported",
         )
     values = task_map.values(q)
     chosen = _choose_evenly(length)
@@ -255,8 +255,8 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
             found=str(error),
             allowed=f"{tolerance:g} m and rad",
             where="path",
-            hint="Where the tool stops and turns off, divide the file there; where positions are measured, say their "
-            "noise, or raise the tolerance",
+            hint="If the tool stops and changes its direction, split the file there. If the positions are measured, "
+            "set their noise, or raise the tolerance",
         ) from error
     path = build_path(segments, values[0], task_map.rows)
     s = _nearest(task_map, path, values, length / length[-1])
@@ -361,10 +361,10 @@ def _deviations(
     n = recording.q.shape[1]
     if given.shape not in ((), (n,)) or not ((given > 0.0) & (given < np.inf)).all():
         raise InputError(
-            "not a standard deviation",
+            "the noise is not a valid standard deviation",
             where="noise",
             found=noise,
-            allowed=f"> 0 rad or m, one figure or {n}",
+            allowed=f"one number > 0 rad or m, or {n} of them",
         )
     return np.broadcast_to(given, n)
 
@@ -377,8 +377,8 @@ def _notes(
         f"{len(recording.t)} rows over {recording.t[-1]:.6g} s, one every {h:.4g} ms",
         *recording.notes,
         *nodes.notes,
-        "not known: what the motion does between the rows, and the torques that were measured",
-        f"the tool's path follows by forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
+        "unknown: the motion between the rows, and the measured torques",
+        f"the tool's path comes from forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
         f"its tolerance is {tolerance:.1e} m and rad",
     )
 

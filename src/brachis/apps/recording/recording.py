@@ -90,7 +90,7 @@ Columns = dict[tuple[str, str], tuple[int, str | None]]
 def _allowed_columns(joints: Sequence[str]) -> str:
     """Say which columns a file has, for messages."""
     first = joints[0]
-    rates = f"qd_{first}, ..., qdd_{first}, ... where rates are known"
+    rates = f"qd_{first}, ..., qdd_{first}, ... if rates are known"
     return f"t, then {', '.join(joints)} (or q_{first}, ...), and {rates}"
 
 
@@ -184,7 +184,7 @@ def _read_column(
         )
     if asked is not None and factors[asked] != factors[unit]:
         raise TaskError(
-            "the header contradicts the units asked for",
+            "the unit in the header is not the requested unit",
             found=f"{unit} for {table.header[i]}",
             allowed=asked,
             where=where,
@@ -320,7 +320,7 @@ def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
         )
     for i in np.flatnonzero(np.diff(t) <= 0.0):
         raise TaskError(
-            "times do not ascend",
+            "the times do not increase",
             found=f"{t[i + 1]:g} s after {t[i]:g} s",
             where=f"{source}: line {table.lines[i + 1]}",
         )
@@ -340,7 +340,7 @@ def _check_angles(q: np.ndarray, robot: Robot, source: Path) -> None:
             "implausible angle (degrees?)",
             found=f"{largest[joint]:.4g} rad at {robot.joint_names[joint]}",
             where=str(source),
-            hint='If these are degrees, say units={"angle": "deg"}, or --angle deg; if they are rad, say rad',
+            hint='If these are degrees, set units={"angle": "deg"} or --angle deg; if they are radians, set rad',
         )
 
 
@@ -363,5 +363,8 @@ def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path)
 
 def _no_motion(problem: str, t: np.ndarray, source: Path) -> TaskError:
     return TaskError(
-        problem, found=write_count(len(t), "row"), allowed="a motion", where=str(source)
+        problem,
+        found=write_count(len(t), "row"),
+        allowed=f"{FEWEST_ROWS} or more rows in which a joint moves",
+        where=str(source),
     )

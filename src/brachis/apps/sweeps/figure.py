@@ -48,7 +48,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     """
     if len(keys) not in (1, 2):
         raise InputError(
-            "a figure has one axis or two",
+            "a figure can show only one or two keys",
             where="keys",
             found=len(keys),
             allowed="1 or 2 keys that vary",
@@ -58,7 +58,9 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     is_verified = np.isfinite(times)
     if not is_verified.any():
         raise InputError(
-            "there is nothing to draw", where="plans", found="none that is verified"
+            "no plan is verified, so the figure would be empty",
+            where="plans",
+            allowed="at least one verified plan",
         )
     columns = list(zip(*cells, strict=True))
     values = [_sort_values(column) for column in columns]

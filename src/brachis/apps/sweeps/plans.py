@@ -153,7 +153,7 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         folder = path.absolute().parent
     if not isinstance(content, Mapping):
         raise TaskError(
-            "a sweep is a mapping",
+            "the sweep is not a mapping of keys",
             found=show(content),
             allowed=", ".join(SweepSettings.model_fields),
             where=name,
@@ -172,7 +172,9 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         task_name = str(path)
         folder = path.parent
     if not isinstance(base, Mapping):
-        raise TaskError("a task is a mapping", found=show(base), where=task_name)
+        raise TaskError(
+            "the task is not a mapping of keys", found=show(base), where=task_name
+        )
     base = with_keys(base, settings.fixed)
     rows = tuple(
         Row(changes, _plan(base, changes, task_name, folder))
@@ -194,7 +196,9 @@ def _plan(
         task = task_from(with_keys(base, changes), name, folder, {})
         if task.robot.urdf is None:
             raise TaskError(
-                "no robot", where=f"{name}: robot.urdf", hint="Give the URDF's path"
+                "the robot is missing",
+                where=f"{name}: robot.urdf",
+                hint="Set it to the path of the URDF",
             )
         urdf = read_file(Path(task.robot.urdf))
     except BrachisError as error:
@@ -273,7 +277,7 @@ def run_plan(plan: Plan) -> Outcome:
             "a worker has another version of brachis",
             found=brachis.__version__,
             allowed=plan.version,
-            hint="Install the same everywhere",
+            hint="Install the same version for all workers",
         )
     began = time.perf_counter()
     try:

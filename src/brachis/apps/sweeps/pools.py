@@ -35,7 +35,7 @@ HEARTBEAT = 1.0
 """Time until Ctrl-C, or the end of the parent process, is noticed, s."""
 _CONNECTING = 10.0
 """Time in which a scheduler has to answer, s."""
-_ENDED = "the plan ended its worker process each time: a crash, or too little memory"
+_ENDED = "each worker process ended during this plan: a crash, or too little memory"
 _ONE_THREAD = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -71,10 +71,10 @@ def pool_for(
         return lambda plans: in_processes(plans, wanted)
     if jobs is not None:
         raise InputError(
-            "a cluster has as many processes as it has workers",
+            "jobs cannot be set for a cluster, which runs one process per worker",
             where="jobs",
             found=jobs,
-            allowed="jobs or scheduler",
+            allowed="jobs or scheduler, not both",
         )
     return lambda plans: on_dask(plans, scheduler, listener)
 
@@ -174,7 +174,7 @@ def on_dask(
                 listener(f"waiting for workers of {address}")
             if any(number > 1 for number in threads.values()):
                 listener(
-                    "workers with several threads plan slower than as many workers with one: --nthreads 1"
+                    "workers with several threads are slower than workers with one thread; start them with --nthreads 1"
                 )
             executor = client.get_executor(pure=False)
             yield from as_completed(
@@ -185,10 +185,10 @@ def on_dask(
             )
     except (OSError, CancelledError) as error:
         raise ClusterError(
-            "the Dask scheduler was lost",
+            "the connection to the Dask scheduler was lost",
             where=address,
             found=str(error),
-            hint="Finished plans are stored: the same sweep goes on once the scheduler runs again",
+            hint="Finished plans are stored: run the same sweep again when the scheduler runs, and it continues",
         ) from error
 
 

@@ -93,7 +93,7 @@ class Store:
             is_foreign = any(folder.iterdir()) and self.read_description() is None
         if is_foreign:
             raise InputError(
-                "the folder holds other files",
+                "the folder contains other files",
                 where=str(folder),
                 allowed=f"a new folder, or one with a sweep's {_ABOUT}",
             )
@@ -104,7 +104,7 @@ class Store:
             stream.write(json.dumps({_MARK: 1, **about}, indent=2).encode() + b"\n")
 
     def read_description(self) -> dict[str, Any] | None:
-        """Return what was written down; None if the folder is not a sweep's."""
+        """Return what was written down; None if the folder contains no sweep."""
         try:
             about: dict[str, Any] = json.loads(read_file(self.folder / _ABOUT))
             is_ours = _MARK in about
@@ -187,7 +187,9 @@ class Store:
             return self._arrow.parquet.read_table(path)
         except (OSError, self._arrow.ArrowException) as error:
             raise InputError(
-                "no table of a sweep", where=str(path), found=str(error)
+                "the file is not the table of a sweep",
+                where=str(path),
+                found=str(error),
             ) from error
 
 
@@ -258,7 +260,7 @@ class SweepResult(Summary):
         about = store.read_description()
         if about is None:
             raise InputError(
-                "the folder is not a sweep's",
+                "the folder contains no sweep",
                 where=str(path),
                 allowed=f"one with its {_ABOUT}",
             )
@@ -371,7 +373,5 @@ class SweepResult(Summary):
 
         for key in keys or ():
             if key not in self.varied:
-                raise UnknownNameError(
-                    "key that varies", key, self.varied, where="keys"
-                )
+                raise UnknownNameError("varied key", key, self.varied, where="keys")
         return plot_sweep(self.rows(), tuple(keys or self.varied[:2]))

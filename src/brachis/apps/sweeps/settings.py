@@ -162,7 +162,9 @@ class SweepSettings(Model):
     def _check_task(cls, task: JsonValue) -> JsonValue:
         if not isinstance(task, str | dict) or not task:
             raise refuse(
-                "no task", found=task, allowed="the name of a task file, or a task"
+                "this is not a task",
+                found=task,
+                allowed="the name of a task file, or a task",
             )
         return task
 

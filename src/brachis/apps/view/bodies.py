@@ -113,7 +113,9 @@ def _check_size(path: Path, room: int) -> int:
     """
     if path.suffix in {".gz", ".bz2"}:
         raise InputError(
-            "packed meshes are not read", where=path.name, hint="Unpack it"
+            "compressed meshes cannot be read",
+            where=path.name,
+            hint="Decompress the file",
         )
     size = _size(path)
     if size > room:

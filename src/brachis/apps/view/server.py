@@ -34,7 +34,7 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
     Raises
     ------
     InputError
-        The host is not on this machine, or the port does not exist or is in use.
+        The host is not on this machine, or the port is out of range or is in use.
     NotInstalledError
         viser is not installed.
     """
@@ -101,7 +101,7 @@ def _in_use(host: str, port: int) -> InputError:
         where="--port",
         found=f"{port} on {host}",
         allowed="a free one",
-        hint="Leave --port out for the next free one",
+        hint="Leave out --port to use the next free port",
     )
 
 
@@ -109,7 +109,7 @@ def _check(host: str, port: int) -> None:
     """Refuse an address that cannot be listened on."""
     if not 0 <= port <= 65535:
         raise InputError(
-            "the port does not exist", where="--port", found=port, allowed="0 to 65535"
+            "the port is out of range", where="--port", found=port, allowed="0 to 65535"
         )
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -118,7 +118,7 @@ def _check(host: str, port: int) -> None:
         if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
             raise _in_use(host, port) from error
         raise InputError(
-            "cannot be listened on",
+            "the viewer cannot listen on this address",
             where="--host",
             found=f"{host}, port {port}: {getattr(error, 'strerror', None) or error}",
             allowed=f"an address of this machine, for example {LOOPBACK}, or 0.0.0.0 for all of them",

@@ -153,7 +153,7 @@ def subprocess_solve(
     message = "crashed"
     if now > until:
         status = SolveStatus.TIME_LIMIT
-        message = "ended: it did not come back in time"
+        message = "ended: it did not finish in time"
     return _report_start(solver.name, problem, x, status, message, now - began)
 
 

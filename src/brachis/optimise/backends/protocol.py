@@ -22,13 +22,11 @@ class SolveStatus(enum.Enum):
     ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
     STAGNATED = "stagnated: feasible, and the last iterations made it no faster; other motions take as long"
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
-    STALLED = (
-        "the solver crept on without progress; another start or solver may do better"
-    )
+    STALLED = "the solver made no progress; another start or solver may do better"
     TIME_LIMIT = "time limit reached"
     INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
     EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"
-    FAILED = "the solver broke down; choose another solver"
+    FAILED = "the solver failed; choose another solver"
 
     @property
     def usable(self) -> bool:

@@ -115,7 +115,7 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
         return Pose(robot)
     if not set(names) <= set(ROWS) or len(set(names)) < len(names) or not positions:
         raise InputError(
-            "rows are not usable",
+            "some rows are unknown or repeated",
             where="task_space",
             found=list(names),
             allowed=f"{', '.join(ROWS)}, each once",
@@ -180,9 +180,10 @@ def with_free_roll(robot: Robot) -> Robot:
     """
     if robot.model.existJointName(ROLL_JOINT):
         raise InputError(
-            "the robot has a joint with the name of the virtual one",
+            "a joint of the robot has the name of the virtual roll joint",
             where="task_space",
             found=ROLL_JOINT,
+            hint="Rename the joint in the URDF",
         )
     model = robot.model.copy()
     tool = model.frames[robot.frame_id]

@@ -120,7 +120,7 @@ class TaskMap(Summary, ABC):
         """
         if isinstance(stated, ToolPose) or len(stated) != self.m:
             raise InputError(
-                "has the wrong number of coordinates",
+                "this is the wrong number of coordinates",
                 where=where,
                 found="a pose" if isinstance(stated, ToolPose) else len(stated),
                 allowed=f"{self.m}: {', '.join(self.rows)}",

@@ -157,15 +157,15 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
             i,
             f"the position stands still from {points.name_row(i - 1)} on while the tool turns",
             found=points.describe(i),
-            allowed="a motion of the position",
-            hint="A path that stops and turns on the spot is for segments of its own: csv, turn, csv",
+            allowed="rows with different positions",
+            hint="Use separate segments for a turn on the spot: csv, turn, csv",
         )
     kept = points.only(np.setdiff1d(np.arange(len(points)), again))
     if len(kept) < 2:
         raise TaskError(
-            "the position does not move",
+            "all rows have the same position",
             found=f"{len(points)} times the same",
-            allowed="a motion",
+            allowed="at least two different positions",
             where=points.source,
         )
     if not again.size:
@@ -198,7 +198,7 @@ def refuse_repetitions(points: Points) -> None:
             f"the row repeats {points.name_row(i - 1)}",
             found=points.describe(i),
             allowed=f"rows that differ from their predecessors in {'orientation' if still else 'position'}",
-            hint="With a tolerance repeated rows are left out",
+            hint="Set a tolerance to leave out repeated rows",
         )
 
 
@@ -229,7 +229,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
         away = f"{1e3 * off[i]:.4g} mm off the line between its neighbours; points are {1e3 * usual[i]:.3g} mm apart"
         raise points.wrong(
             i + 1,
-            "the point is a spike, far off its neighbours",
+            "the point is an outlier, far from its neighbours",
             found=f"{points.describe(i + 1)}, {away}",
             allowed=f"at most {1e3 * allowed[i]:.3g} mm",
             hint="Correct or remove the row",

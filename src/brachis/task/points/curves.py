@@ -103,7 +103,7 @@ def _fit_between(
                 f"the path turns back, by {degrees:.4g} degrees",
                 found=points.describe(corner.index),
                 allowed="corners up to 150 degrees",
-                hint="A path that stops there is for two tasks",
+                hint="Make two tasks if the path stops there",
             )
     curves = []
     for start, end in pairwise([None, *corners, None]):
@@ -215,7 +215,7 @@ def _fit_one(
         found = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
         allowed = f"{np.rad2deg(tolerance.orientation):.3g} deg"
         looks = scatter.of_turning() if scatter.turning else ""
-    hint = f"The data are {looks}" if looks else "Is the row as it should be?"
+    hint = f"The data are {looks}" if looks else "Check this row"
     raise points.wrong(
         i,
         f"no smooth curve is within the tolerance of {kind}",

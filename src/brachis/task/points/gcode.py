@@ -80,7 +80,7 @@ def read_gcode(
     names = POSITION if isinstance(rows, str) else rows
     if not set(names) <= set(POSITION):
         raise TaskError(
-            "G-code gives positions alone",
+            "G-code contains only positions",
             found=", ".join(names),
             allowed="x, y, z",
             where=source,
@@ -99,11 +99,11 @@ def read_gcode(
             if np.isnan(place)
         ]
         raise TaskError(
-            "no motion",
+            "the program contains no motion",
             found=write_count(len(machine.points), "place"),
             allowed="2 or more",
             where=source,
-            hint=f"{', '.join(missing)} is never stated" if missing else None,
+            hint=f"{', '.join(missing)} is missing" if missing else None,
         )
     chosen = [POSITION.index(name) for name in names]
     speed = np.array(machine.speeds)
@@ -116,7 +116,9 @@ def read_gcode(
     )
     notes = ["G-code"]
     if not machine.unit_stated:
-        notes.append("millimetres, as neither G20 nor G21 says otherwise")
+        notes.append(
+            "lengths are in millimetres, as the program has neither G20 nor G21"
+        )
     if machine.skipped:
         notes.append(f"skipped {', '.join(sorted(machine.skipped))}")
     return points, tuple(notes)
@@ -127,7 +129,9 @@ def _obey(machine: _Machine, code: str) -> None:
     rest = _WORD.sub("", code).strip()
     if rest:
         raise machine.wrong(
-            "not understood", repr(rest[:40]), "G-code words, such as G1 X10 F600"
+            "this is not understood",
+            repr(rest[:40]),
+            "G-code words, such as G1 X10 F600",
         )
     values: dict[str, float] = {}
     for letter, text in _WORD.findall(code):

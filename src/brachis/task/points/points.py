@@ -152,9 +152,9 @@ def points_from(
         values = values[:, :3, 3]
     if values.ndim != 2 or not 1 <= values.shape[1] <= 3 or len(values) < least:
         raise TaskError(
-            "points of the wrong shape",
+            "the points have the wrong shape",
             found=values.shape,
-            allowed=f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more",
+            allowed=f"positions (n, 1), (n, 2) or (n, 3), or matrices (n, 4, 4), with n >= {least}",
             where=source,
         )
     turning = np.empty((len(values), 0))
@@ -166,17 +166,19 @@ def points_from(
         speeds = _numbers(speed, where) * SPEEDS[units.speed or "m/s"]
         if speeds.ndim != 1:
             raise TaskError(
-                "speeds of the wrong shape",
+                "the speeds have the wrong shape",
                 found=speeds.shape,
                 allowed="(n,)",
                 where=where,
             )
-        problem = "a speed must be positive and finite, or NaN where none is prescribed"
+        problem = (
+            "a speed must be positive and finite, or NaN if no speed is prescribed"
+        )
         _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
     for name, one in (("orientations", turning), ("speed", speeds)):
         if one is not None and len(one) != len(values):
             raise TaskError(
-                f"as many {name} as points are needed",
+                f"the numbers of points and of rows of {name} differ",
                 found=len(one),
                 allowed=len(values),
             )
@@ -211,7 +213,7 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
         _refuse_first(bad, "not a rotation matrix", values, source)
         quaternions = Rotation.from_matrix(values).as_quat()
         return with_like_signs(np.roll(quaternions, 1, axis=1))
-    problem = "orientations of the wrong shape"
+    problem = "the orientations have the wrong shape"
     if values.shape[1:] == (QUATERNION,):
         problem = "an array of quaternions does not say whether w is first or last"
     allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
@@ -222,7 +224,7 @@ def _array(values: Any, where: str, source: str) -> Array:
     array = _numbers(values, where)
     if not array.size:
         raise TaskError(
-            "an array without numbers",
+            "the array is empty",
             found=array.shape,
             allowed="2 rows or more",
             where=where,
@@ -236,7 +238,7 @@ def _numbers(values: Any, where: str) -> Array:
         return np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise TaskError(
-            "not an array of numbers", found=str(error), where=where
+            "this is not an array of numbers", found=str(error), where=where
         ) from None
 
 

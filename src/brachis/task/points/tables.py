@@ -92,7 +92,7 @@ def read_table(
     header = tuple(first)
     check(header, f"{source}: line {head[0]}")
     if not rows:
-        raise TaskError("no rows of numbers", where=source)
+        raise TaskError("the file has no rows of numbers", where=source)
     values = [_numbers(cells, header, source, number) for number, cells in rows]
     numbers = np.array([number for number, _ in rows])
     return Table(header, head[0], np.array(values), numbers, tuple(notes))
@@ -102,10 +102,10 @@ def _with_point(line: str, source: str, number: int) -> str:
     """Write decimal commas as points, unless there are both: one of them would separate thousands."""
     if "," in line and "." in line:
         raise TaskError(
-            "decimal points and commas in one line",
+            "the line has both decimal points and decimal commas",
             found=repr(line[:60]),
             where=f"{source}: line {number}",
-            hint="Write numbers without separators of thousands",
+            hint="Write numbers without thousands separators",
         )
     return line.replace(",", ".")
 
@@ -136,7 +136,7 @@ def _numbers(
     if len(cells) != len(header):
         hint = "Decimal commas need columns separated by semicolons or tabs"
         raise TaskError(
-            "wrong number of values",
+            "the row has the wrong number of values",
             found=len(cells),
             allowed=f"{len(header)}: {', '.join(header)}",
             where=f"{source}: line {number}",
@@ -245,12 +245,12 @@ def read_columns(
     choice = next((one for one in _choices(rows) if sorted(one) == names), None)
     if choice is None or len(places) != len(header):
         raise TaskError(
-            "wrong columns",
+            "the columns are wrong",
             found=", ".join(header),
             allowed=allowed_columns(rows),
             where=where,
             hint="The first line names the columns, separated by commas, semicolons, tabs or spaces; units may follow "
-            "names (x_mm); a column feed may stand beside them",
+            "names (x_mm); a column feed may be added",
         )
     return Columns(places, choice, _convention(choice, stated, where), where)
 
@@ -271,7 +271,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
     possible = _ORIENTATIONS.get(columns, ())
     if stated is None and len(possible) > 1:
         raise TaskError(
-            f"the columns {', '.join(columns)} do not say how the orientation is meant",
+            f"the columns {', '.join(columns)} do not state the convention of the orientation",
             allowed=f"csv.orientation: {choices(possible)}",
             where=where,
             hint="State it in the task, csv: {file: ..., orientation: ...}; another choice gives another motion",
@@ -282,7 +282,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
             for each, conventions in _ORIENTATIONS.items()
             if stated in conventions
         ]
-        hint = "Leave csv.orientation away"
+        hint = "Remove csv.orientation"
         if possible:
             hint = f"Or csv.orientation: {choices(possible)}"
         raise TaskError(

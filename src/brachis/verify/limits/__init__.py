@@ -77,7 +77,7 @@ def _check_model(model: LimitModel, given: Given) -> tuple[str, Worst]:
         shape = (len(states.t), len(subjects))
         if found.shape != shape:
             raise InputError(
-                "has the wrong shape",
+                "the array has the wrong shape",
                 where=f"{type(model).__name__}.check",
                 found=found.shape,
                 allowed=f"{shape}, a ratio for every moment and label",

@@ -14,6 +14,7 @@ from brachis.robot import Robot
 from brachis.verify.limits.protocol import LimitCheck, Worst, largest, worst_between
 from brachis.verify.mechanics import torque_rates
 from brachis.verify.motion import Given, MotionStates
+from brachis.verify.report import POSITION_SCALE
 
 
 def _worst_derivative(kind: str, given: Given) -> Worst | None:
@@ -41,8 +42,7 @@ def _worst_position(given: Given) -> Worst | None:
         return beyond
     scale = np.where(np.isfinite(half), np.maximum(half, 1e-5), 1.0)
     inside = _worst_in_range(given, scale)
-    remark = "0: the middle of the range, 1: an end"
-    return inside._replace(ratio=max(inside.ratio, 0.0), remark=remark)
+    return inside._replace(ratio=max(inside.ratio, 0.0), remark=POSITION_SCALE)
 
 
 def _worst_in_range(given: Given, scale: np.ndarray) -> Worst:
