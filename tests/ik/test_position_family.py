@@ -11,8 +11,7 @@ import pytest
 
 import brachis
 from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
-from brachis.ik.point_recipes import RECIPES
-from brachis.ik.position_family import positioning
+from brachis.ik.point_recipes import RECIPES, positioning
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndYaw
 from support.chains import Joint, chain_urdf

@@ -90,7 +90,7 @@ def test_verification_finds_what_is_too_fast(kind, result):
 def test_verification_finds_a_rate_within_a_microsecond(kind, result, follows, factor):
     """A jerk that is constant over so short a piece, and that of a quintic whose acceleration alone has changed.
 
-    The latter's jerk ends at nine times the mean, as `brachis.trajectory.pieces` states it: m + a + b is 1 + 3 + 5.
+    The latter's jerk ends at nine times the mean, as `brachis.trajectory.trajectory` states it: m + a + b is 1 + 3 + 5.
     """
     trajectory, change, h = result.trajectory, np.array([0.1, 0.0, 0.0]), 1e-6
     t = 0.4321 * trajectory.t_end + np.array([0.0, h])

@@ -6,15 +6,25 @@ program. `improve` tries such changes in turn, and its answer is a `SolvedProgra
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
+from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
-from brachis.optimise.backends import SolverReport, SolveStatus
+from brachis.kinematics import ChartMap, JointMap
+from brachis.optimise.backends import (
+    Progress,
+    Solver,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
 from brachis.optimise.program import Program
+from brachis.task import SolverSettings
 
 
 @dataclass(frozen=True, repr=False)
@@ -188,3 +198,68 @@ def with_last(
 ) -> tuple[SolverReport, ...]:
     """Move one of the reports to the end."""
     return (*(report for report in reports if report is not last), last)
+
+
+_ITERATIONS = 100
+"""Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
+
+
+@dataclass(frozen=True)
+class SolverSession:
+    """A backend that solves programs one after the other; call the session to solve.
+
+    Attributes
+    ----------
+    backend : Solver
+    options : SolverOptions
+        The time limit holds for every single solve.
+    deadline : Deadline
+        Of all solves.
+    progress : callable, optional
+        Called between iterations with their number and the objective.
+    acceptable : float
+        An answer with no larger violation is usable, however the solve ended.
+    """
+
+    backend: Solver
+    options: SolverOptions
+    deadline: Deadline
+    progress: Progress | None = None
+    acceptable: float = -np.inf
+
+    @classmethod
+    def for_task(
+        cls,
+        backend: Solver,
+        settings: SolverSettings,
+        joint_map: JointMap,
+        deadline: Deadline,
+        listener: Listener,
+    ) -> SolverSession:
+        """Take the bounds from the task's ``solver`` part.
+
+        In a chart many motions are equally fast, and no branch boundary slows a solve
+        down. So a solve ends there after fewer iterates without gain.
+        """
+        iterations = settings.max_iterations
+        default = SolverSettings.model_fields["max_iterations"].default
+        if settings.name == "auto" and iterations == default:
+            iterations = _ITERATIONS * max(joint_map.r, 1)
+        options = SolverOptions(settings.tolerance, iterations, settings.time_limit)
+        if isinstance(joint_map, ChartMap):
+            options = dataclasses.replace(options, progress=1e-5, patience=10)
+
+        def progress(iteration: int, objective: float) -> None:
+            text = f"{backend.name}: iteration {iteration}, t_E = {objective:.4f} s"
+            listener(Iteration(text))
+
+        return cls(backend, options, deadline, progress)
+
+    def __call__(self, program: Program, x: np.ndarray) -> SolverReport:
+        """Solve a program from the point x, (v,)."""
+        left = self.deadline.within(self.options.time_limit).left
+        options = dataclasses.replace(self.options, time_limit=left)
+        report = self.backend.solve(program, x, options, self.progress)
+        if report.status.usable or report.violation > self.acceptable:
+            return report
+        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)

@@ -30,9 +30,9 @@ from brachis.optimise.backends import (
     solvers_for,
 )
 from brachis.optimise.candidate import Candidate, refine_and_verify
+from brachis.optimise.improve import SolverSession
 from brachis.optimise.program import LeastAcceleration, Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.optimise.session import SolverSession
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 

@@ -45,13 +45,13 @@ from brachis.optimise.improve import (
     Change,
     Solve,
     SolvedProgram,
+    SolverSession,
     attempt_once,
     improve,
 )
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import phase_in, program_of
 from brachis.problem.problem import Problem
 from brachis.search.phase_plane import initial_guess, initial_knots

@@ -19,7 +19,7 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
 from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.candidate import InitialGuess
-from brachis.optimise.session import SolverSession
+from brachis.optimise.improve import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.search.candidates import solve_in_chart, solvers_of
 from brachis.search.phase_plane import initial_guess

@@ -26,8 +26,7 @@ from brachis.verify.checks import (
 )
 from brachis.verify.limits import check_limits
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Given, MotionStates, Pieces
-from brachis.verify.places import all_places
+from brachis.verify.motion import Given, MotionStates, Pieces, all_places
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 

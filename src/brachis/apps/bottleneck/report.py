@@ -54,11 +54,10 @@ from brachis.kinematics import (
 )
 from brachis.limits import Role
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.phase import Motion
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.optimise.session import SolverSession
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
