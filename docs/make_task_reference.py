@@ -93,7 +93,7 @@ mappings may contain a pair `[lower, upper]` with lower < 0 < upper instead of a
 
 Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`; they then hold at both ends too.
 With `rest: jerk` (degree >= 4) jerk and torque rate are zero at both ends. The torque rate includes the change of
-Coulomb friction; choose a `coulomb_velocity` over which this friction may change.
+Coulomb friction; a larger `coulomb_velocity` makes it change slower.
 
 **Friction.** If `viscous` or `coulomb` is absent, the URDF's `<dynamics>` has the value. `null` switches it off.
 

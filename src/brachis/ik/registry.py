@@ -340,7 +340,9 @@ def check_answers(
         )
     ).max()
     if not miss < 1e-8:
-        raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
+        raise NotApplicableError(
+            f"its answers miss the target by {miss:.1e} m or rad; allowed: less than 1e-8"
+        )
 
 
 def _ranges_to_check(robot: Robot) -> tuple[np.ndarray, np.ndarray]:

@@ -112,7 +112,7 @@ class Friction(Summary):
         least = 1e-9  # rad/s or m/s: steeper steps have slopes that overflow in squares
         if not v_eps.min() >= least:
             raise InputError(
-                "the speed at which Coulomb friction is developed is too small",
+                "the speed at which Coulomb friction reaches 76 % of its value is too small",
                 where="robot.friction.coulomb_velocity",
                 found=settings.coulomb_velocity,
                 allowed=f"{least:g} to {LARGEST:g} rad/s or m/s",

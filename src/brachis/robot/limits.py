@@ -449,7 +449,7 @@ def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
             "torques are negative, too small or too large",
             where=key,
             found=found,
-            allowed=f"torques >= 0, at rest from {LEAST:g} to {LARGEST:g}, also after scaling",
+            allowed=f"torques >= 0; that at speed 0 from {LEAST:g} to {LARGEST:g} N m (N), also after scaling",
         )
     # The same torque may have been rounded to different figures.
     rising = np.flatnonzero(np.diff(torque) > tolerances.ROUNDING * torque[0])

@@ -399,10 +399,9 @@ class Robot(Summary):
         missing = [name for name, value in pairs if value is None]
         if missing:
             raise InputError(
-                "joints are missing",
+                f"no position for {', '.join(missing)}",
                 where=where,
-                found=", ".join(missing),
-                allowed="a position for each",
+                allowed="a position for each joint",
             )
         q = np.array(values, dtype=float)
         if not np.all(np.abs(q) <= FARTHEST):

@@ -131,7 +131,7 @@ def _robot_element(text: str, where: str) -> Element:
             where=where,
             found=f"root element <{robot.tag}>",
             allowed="<robot>",
-            hint=_EXPAND,
+            hint="Convert it to a URDF",
         )
     for element in robot.iter(etree.Element):
         name = etree.QName(element)

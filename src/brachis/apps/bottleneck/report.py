@@ -117,12 +117,10 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
             if -1e-3 <= slower <= task.search.slower + 1e-3:
                 return refined
             ends.append(f"t_E = {refined.t_end:.6g} s by {refined.reports[-1].solver}")
-    what = "a different optimum" if ends else "no optimum"
+    what = f"a different optimum ({', '.join(ends)})" if ends else "no optimum"
     raise PlanningError(
-        f"re-solving found {what}; sensitivities of this file are unavailable",
-        found=", ".join(ends) or "no answer",
-        allowed=f"t_E = {trajectory.t_end:.6g} s, that of the saved motion",
-        hint="Ask for the bottlenecks of the task itself",
+        f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
+        hint="Run brachis bottleneck on the task file: it plans again",
     )
 
 

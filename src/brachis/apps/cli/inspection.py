@@ -101,7 +101,7 @@ def inspect(
                 raise InputError(
                     "not allowed with a task file",
                     where=option,
-                    hint=f"Leave the option away, and {hint}; or inspect the URDF",
+                    hint=f"Omit the option and {hint}; or give the URDF in place of the task",
                 )
         task = load_changed_task(source, changes)
         robot = robot_from_settings(task.robot)

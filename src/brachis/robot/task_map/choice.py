@@ -114,8 +114,9 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     if names == POSE_ROWS:
         return Pose(robot)
     if not set(names) <= set(ROWS) or len(set(names)) < len(names) or not positions:
+        only_yaw = set(names) <= {YAW}
         raise InputError(
-            "some rows are unknown or repeated",
+            "no row of the position" if only_yaw else "unknown or repeated rows",
             where="task_space",
             found=list(names),
             allowed=f"{', '.join(ROWS)}, each once",
