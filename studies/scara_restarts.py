@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from brachis import load_task, plan
-from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.guess import starting_point
 from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem, decompositions_of
@@ -58,7 +58,7 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
 
 
 def solve(program, x):
-    return solver_named("uno")[0].solve(
+    return solvers_for("uno")[0].solve(
         program, x, SolverOptions(max_iterations=100, time_limit=5.0), None
     )
 

@@ -100,11 +100,11 @@ def test_what_is_asked_for_is_named(make, told):
         ),
         (
             {"payload": 500},
-            "allowed: a mapping with keys out of mass, com, inertia. payload: Rigid body held to",
+            "allowed: a mapping with keys out of mass, com, inertia. payload: Rigid body fixed to",
         ),
         (
             {"gravity": 9.81},
-            "allowed: a list. gravity: Gravity [x, y, z], m/s^2, world frame",
+            "allowed: a list. gravity: Gravity [x, y, z] in the world frame, m/s^2",
         ),
         (
             {"tool_limits": 0.5},
@@ -142,7 +142,7 @@ def test_a_key_of_a_section_is_found_in_a_file():
         ),
         (
             lambda _: brachis.robots.scara3.with_payload("5 kg"),
-            "allowed: a number. mass: kg",
+            "allowed: a number. mass: Mass, kg",
         ),
     ],
 )

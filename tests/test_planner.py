@@ -137,7 +137,7 @@ def test_path_start_is_checked():
     ):
         brachis.plan(robot(), task(path_start=[np.sqrt(3.0), 0.01]))
     with pytest.raises(
-        brachis.InputError, match="path_start: has the wrong number of coordinates"
+        brachis.InputError, match="path_start: this is the wrong number of coordinates"
     ):
         brachis.plan(robot(), task(path_start=[1.0, 0.0, 0.0]))
 

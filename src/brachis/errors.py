@@ -1,4 +1,4 @@
-"""Errors that brachis raises: one base class, subclasses that carry data.
+"""Errors that brachis raises: one base class, and subclasses that carry data::
 
     BrachisError                    exit code 1
     |-- PlanningError               the input was sound, and no plan could be made
@@ -13,7 +13,7 @@
         |-- PathError               the prescribed path
         |-- StartError              the start or end posture
         |-- DecompositionError      a choice of redundant joints without a closed form
-        |-- PlausibilityError       implausible figures, where the plan is strict
+        |-- PlausibilityError       implausible figures, if the plan is strict
         `-- NotInstalledError       a library of an extra
     MissingAttributeError           an AttributeError that names the attribute that may be meant
     BrachisWarning                  a UserWarning

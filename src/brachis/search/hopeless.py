@@ -261,8 +261,7 @@ def _explain_end_speed(problem: Problem, plane: PhasePlane) -> Failure | None:
     return Failure(
         f"the limits do not allow this speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
-        found=f"{speeds[key]:g} {unit}",
-        needed=f"about {most} (estimate along one joint path)",
+        found=f"{speeds[key]:g} {unit}; along one joint path about {most} is possible (estimate)",
         hint="Raise the limits that hold the motion back",
         remedies=[
             Remedy(f"boundary.{key}", speed, _FIRST * shares[key] * speed, unit)

@@ -202,7 +202,7 @@ def test_set_changes_the_task(run, task, write, tmp_path):
     assert "torque" in run("bottleneck", path, *SMALL).out
     outcome = run("bottleneck", tmp_path / "result.npz", "--set", "spline.intervals=6")
     assert outcome.code == 2
-    assert "--set: a saved motion" in outcome.err
+    assert "--set: this option cannot be used with a saved motion" in outcome.err
 
 
 @pytest.mark.parametrize("command", ["plan", "bottleneck", "inspect"])

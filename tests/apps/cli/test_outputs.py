@@ -83,7 +83,7 @@ def test_nothing_is_written_over_other_files(case, run, saved, monkeypatch):
             "overwrite an input",
             "of another kind",
             "not written by",
-            "the format",
+            "a known format",
         )
     )
     assert contents(saved) == before
@@ -318,5 +318,6 @@ def test_endless_inputs_are_refused(endless, run, saved, tmp_path):
         assert outcome.code == 2, command
         assert str(endless) in outcome.err
         assert any(
-            what in outcome.err for what in ("a pipe", "a folder", "a device", "MB")
+            what in outcome.err
+            for what in ("a pipe", "a folder", "this folder", "a device", "MB")
         )

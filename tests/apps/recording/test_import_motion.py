@@ -49,7 +49,7 @@ def test_its_path_comes_back_and_it_verifies(imported, motion):
 
 def test_what_is_known_of_it_is_saved(imported, tmp_path):
     assert "accelerations are the file's" in imported.recovered.told
-    assert any(line.startswith("not known: ") for line in imported.recovered.told)
+    assert any(line.startswith("unknown: ") for line in imported.recovered.told)
     imported.save(tmp_path / "today.npz")
     again = Trajectory.load(tmp_path / "today.npz")
     assert again.recovered.to_file() == imported.recovered.to_file()

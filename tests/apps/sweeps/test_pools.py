@@ -166,6 +166,6 @@ def test_a_scheduler_that_is_lost(monkeypatch):
     monkeypatch.setattr("dask.distributed.Client", Client)
     with pytest.raises(
         ClusterError,
-        match=r"tcp://here:1: the connection to the Dask scheduler was lost; found in <TCP .closed.*goes on",
+        match=r"tcp://here:1: the connection to the Dask scheduler was lost; found in <TCP .closed.*it continues",
     ):
         list(on_dask([], "tcp://here:1", print))
