@@ -1,4 +1,6 @@
-"""Errors that brachis raises: one base class, and subclasses that carry data::
+"""Errors that brachis raises: one base class, and subclasses that carry data.
+
+The tree of errors::
 
     BrachisError                    exit code 1
     |-- PlanningError               the input was sound, and no plan could be made
