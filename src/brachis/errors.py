@@ -20,9 +20,8 @@ The tree of errors::
     MissingAttributeError           an AttributeError that names the attribute that may be meant
     BrachisWarning                  a UserWarning
 
-Every message says what was found, what is allowed, where, and what to try; the same facts are attributes, so that a
-caller need not parse text. ``exit_code`` is what the command line returns: 2 for wrong input, 1 for a plan that could
-not be made although the input was sound.
+Every message says what was found, what is allowed, where, and what to try; attributes hold the same facts.
+``exit_code`` is what the command line returns: 2 for wrong input, 1 if no plan could be made from sound input.
 
 Examples
 --------
