@@ -200,7 +200,7 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"found 0.9 m/s; allowed: about 0.3 m/s .*one joint path",
+        match=r"found 0.9 m/s; along one joint path about 0.3 m/s is possible",
     ) as caught:
         brachis.plan(
             slide(
@@ -217,7 +217,7 @@ def test_an_end_speed_that_another_one_at_the_start_makes_possible(monkeypatch):
     both = {"start_speed": 0.9, "end_speed": 0.9}
     lower = r"Lower boundary\.start_speed and lower boundary\.end_speed"
     with pytest.raises(
-        brachis.PlanningError, match=rf"allowed: about 0\.3\d* m/s.*{lower}"
+        brachis.PlanningError, match=rf"joint path about 0\.3\d* m/s.*{lower}"
     ):
         brachis.plan(
             slide(

@@ -117,9 +117,10 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
             if -1e-3 <= slower <= task.search.slower + 1e-3:
                 return refined
             ends.append(f"t_E = {refined.t_end:.6g} s by {refined.reports[-1].solver}")
-    what = f"a different optimum ({', '.join(ends)})" if ends else "no optimum"
+    what = "a different optimum" if ends else "no optimum"
     raise PlanningError(
         f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
+        found=", ".join(ends) or None,
         hint="Run brachis bottleneck on the task file: it plans again",
     )
 
