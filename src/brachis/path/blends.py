@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from math import floor
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
+from numpy.polynomial.polynomial import polyder
 
 from brachis.common import tolerances
 from brachis.common.arrays import with_like_signs
@@ -45,12 +46,18 @@ class SepticCurve:
         """Start and end: the polynomial is analytic."""
         return np.array([0.0, self.length])
 
+    @cached_property
+    def _by_order(self) -> Array:
+        """Coefficients of all derivatives by sigma, shape (8, 8, m)."""
+        found = np.zeros((8, *self.coefficients.shape))
+        for k in range(8):
+            found[k, : 8 - k] = polyder(self.coefficients, k) / self.length**k
+        return found
+
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the polynomial and its derivatives by sigma, shape (order + 1, K, m)."""
-        u = sigma / self.length
-        terms = (polyder(self.coefficients, k) for k in range(order + 1))
-        values = [polyval(u, c).T / self.length**k for k, c in enumerate(terms)]
-        return np.stack(values)
+        powers = np.vander(sigma / self.length, 8, increasing=True)
+        return np.asarray(powers @ self._by_order[: order + 1])
 
 
 def septic(start: Array, end: Array, length: float) -> SepticCurve:
