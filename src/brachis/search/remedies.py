@@ -111,9 +111,10 @@ def is_planned(
         task = task_with(task, effort="single")
     problem = Problem.of(robot, task, own_limits)
     search = Search(problem, decompositions_of(problem, families), deadline, ignore)
-    for batch in itertools.islice(search.find_starts(), most):
-        search.solve_candidates(batch)
-        search.refine_and_verify(batch)
+    with search.end_early():
+        for batch in itertools.islice(search.find_starts(), most):
+            search.solve_candidates(batch)
+            search.refine_and_verify(batch)
     if search.best is not None and search.best.verified:
         return True
     return None if most or problem.robot.n > problem.task_map.m else False
