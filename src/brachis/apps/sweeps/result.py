@@ -338,7 +338,10 @@ class SweepResult(Summary):
         }
 
     def summary(self) -> dict[str, Any]:
-        """Return the sweep in short: numbers of plans, best, median and worst verified ones, failures by cause."""
+        """Return the sweep in short: numbers of plans, best, median and worst verified ones, failures by cause.
+
+        Of an even number of plans the median is the faster one of the two in the middle.
+        """
         ranked = self.ranked()
         found: dict[str, Any] = {"plans": len(self.table)}
         for status in (VERIFIED, UNVERIFIED, FAILED):
