@@ -2,23 +2,29 @@
 
 from brachis.path.build import build_path, check_on_path, path_of
 from brachis.path.from_curve import bspline_segment, with_feed_rates
+from brachis.path.legs import Leg, legs_of
 from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, Path, PathSample
 from brachis.path.sequence import PathFrame, SequencePath, check_closed, path_speed
+from brachis.path.time_law import TimeLaw, time_law_of
 
 __all__ = [
     "Array",
     "Curve",
+    "Leg",
     "Path",
     "PathFrame",
     "PathSample",
     "PosePath",
     "SequencePath",
+    "TimeLaw",
     "bspline_segment",
     "build_path",
     "check_closed",
     "check_on_path",
+    "legs_of",
     "path_of",
     "path_speed",
+    "time_law_of",
     "with_feed_rates",
 ]

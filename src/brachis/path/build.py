@@ -41,14 +41,14 @@ def build_path(
     Returns
     -------
     Path
-        The path in the world, three times continuously differentiable in s. For poses `PosePath`, whose samples have
-        the body twist.
+        The path in the world, three times continuously differentiable in s but for its stops. For poses `PosePath`,
+        whose samples have the body twist.
 
     Raises
     ------
     PathError
         A segment does not fit the task space, has zero length or is not defined; or the path has a corner that is not
-        blended, or a blend that does not fit. The message names the key.
+        blended and no stop, or a blend that does not fit. The message names the key.
     UnknownNameError
         The row does not exist.
 
@@ -70,9 +70,10 @@ def build_path(
     for i, segment in enumerate(segments):
         curves.append(coordinates.curve(segment, i, point))
         point = curves[-1].derivatives(np.array([curves[-1].length]), 0)[0, 0]
-    pieces = _join(curves, [segment.blend for segment in segments], coordinates)
+    pieces = _join(curves, segments, coordinates)
     positions = len(position_rows(coordinates.rows))
-    return coordinates.path_type.of(pieces, positions, frame)
+    stopping = [i for i, segment in enumerate(segments) if segment.stop]
+    return coordinates.path_type.of(pieces, positions, frame, stopping)
 
 
 def _coordinates(rows: tuple[str, ...]) -> RowCoordinates:
@@ -84,17 +85,16 @@ def _coordinates(rows: tuple[str, ...]) -> RowCoordinates:
 
 def _join(
     curves: Sequence[Curve],
-    blends: Sequence[float | None],
+    segments: Sequence[Segment],
     coordinates: RowCoordinates,
 ) -> tuple[Piece, ...]:
-    """Return the parts of curves, each of which starts where its predecessor ends, with their corners rounded.
-
-    `blends` says for every curve what its blend with the next one takes from either, m.
+    """Return the parts of the segments' curves, each of which starts where its predecessor ends, with rounded corners.
 
     Raises
     ------
     PathError
-        Curves do not continue each other to the third derivative and are not blended; or a blend does not fit.
+        Curves do not continue each other to the third derivative, are not blended, and the tool does not stop there; or
+        a blend does not fit.
     """
     corners = []
     pieces = []
@@ -102,9 +102,11 @@ def _join(
     for join in find_joins(curves, coordinates.rows):
         i = join.index
         curve = curves[i]
-        size = blends[i]
+        size = segments[i].blend
         pieces.append(Piece(curve, taken, curve.length - (size or 0.0), i))
         taken = size or 0.0
+        if segments[i].stop:
+            continue
         if size is None:
             corners.append(coordinates.corner(join, curve, curves[i + 1]))
         else:

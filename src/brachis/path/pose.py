@@ -20,7 +20,7 @@ class PosePath(SequencePath):
     """A path of poses, whose samples have the body twist; see `brachis.path.protocol.PathSample`."""
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s; beyond [0, 1] as the first or last piece continues.
+        """Return the path at K values of s; beyond its ends as the first or last piece continues.
 
         Parameters
         ----------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -50,14 +50,32 @@ class Path(Protocol):
 
     @property
     def breaks(self) -> Array:
-        """Values of s where segments and blends join, from 0 to 1; the path is C3 there."""
+        """Values of s where segments and blends join, from 0 to 1; the path is C3 there, but for its stops."""
+        ...
+
+    @property
+    def knots(self) -> Array:
+        """Values of s between which the path is analytic, from 0 to 1; the breaks are among them."""
+        ...
+
+    @property
+    def stops(self) -> Array:
+        """Values of s, (b,), at which the tool stops, in order; the path may have corners there."""
+        ...
+
+    def between(self, begin: float, end: float) -> Self:
+        """Return the part of the path from s = `begin` to `end`, in the same s.
+
+        Only the pieces in between are sampled, so that at a corner it is certain which side is meant. Beyond its ends
+        it continues as its first or last piece.
+        """
         ...
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s, shape (K,).
 
-        Beyond [0, 1] the path continues as the formula of its first or last piece, so that an optimiser's trial point
-        just outside meets smooth derivatives.
+        Beyond its ends the path continues as the formula of its first or last piece, so that an optimiser's trial point
+        just outside meets smooth derivatives. At a stop it is the path behind it.
         """
         ...
 

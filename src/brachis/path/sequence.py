@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -11,7 +13,8 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.errors import PathError
 from brachis.path.protocol import Array, Curve, Path, PathSample
-from brachis.robot import TaskMap
+from brachis.robot import TaskMap, task_map_of
+from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES, POSE_ROWS, YAW, position_rows
 from brachis.task import Placement
 from brachis.task.points.units import rotation_by
@@ -112,35 +115,84 @@ class SequencePath:
     ----------
     pieces : tuple of Piece
         Parts of the segments' curves, and blends.
-    breaks : ndarray
-        Values of s where pieces join, from 0 to 1.
-    length : float
-        Arc length of the position rows, m.
+    breaks : (b + 1,) ndarray
+        Values of s where pieces join, from 0 to 1; of a part of a path, from its begin to its end.
+    total : float
+        Range of the summed parameter of the whole path, sigma per unit s.
+    positions : int
+        Number of position rows.
     frame : PathFrame or None
         In which the curves are; None: the world.
+    stops : ndarray
+        Values of s at which the tool stops, so that there may be a corner.
     """
 
     pieces: tuple[Piece, ...]
     breaks: Array
-    length: float
+    total: float
+    positions: int
     frame: PathFrame | None
+    stops: Array
 
     @classmethod
     def of(
-        cls, pieces: tuple[Piece, ...], positions: int, frame: PathFrame | None
+        cls,
+        pieces: tuple[Piece, ...],
+        positions: int,
+        frame: PathFrame | None,
+        stopping: Sequence[int] = (),
     ) -> Self:
-        """Put pieces together whose first `positions` rows are those of the position."""
+        """Put pieces together whose first `positions` rows are those of the position.
+
+        The tool stops at the ends of the segments with the indices `stopping`.
+        """
         ends = np.cumsum([0.0, *(piece.length for piece in pieces)])
-        length = sum(piece.arc_length(positions) for piece in pieces)
-        return cls(pieces, ends / ends[-1], length, frame)
+        total = float(ends[-1])
+        breaks = ends / total
+        last = {
+            piece.segment: end for piece, end in zip(pieces, breaks[1:], strict=True)
+        }
+        stops = np.array([last[segment] for segment in stopping], dtype=float)
+        return cls(pieces, breaks, total, positions, frame, stops)
+
+    @cached_property
+    def length(self) -> float:
+        """Arc length of the position rows, m."""
+        return sum(piece.arc_length(self.positions) for piece in self.pieces)
 
     @property
-    def total(self) -> float:
-        """Range of the summed parameter, sigma per unit s."""
-        return sum(piece.length for piece in self.pieces)
+    def knots(self) -> Array:
+        """Values of s between which the path is analytic, from its begin to its end."""
+        inner = [
+            begin
+            + (knots[(knots > piece.first) & (knots < piece.last)] - piece.first)
+            / self.total
+            for begin, piece in zip(self.breaks, self.pieces, strict=False)
+            for knots in (piece.curve.knots,)
+        ]
+        return np.unique(np.concatenate([self.breaks, *inner]))
+
+    def between(self, begin: float, end: float) -> Self:
+        """Return the part from s = `begin` to `end`, in the same s; see `brachis.path.protocol.Path`."""
+        inner = self.breaks[1:-1]
+        inside = inner[
+            (inner > begin + tolerances.PATH) & (inner < end - tolerances.PATH)
+        ]
+        breaks = np.concatenate([[begin], inside, [end]])
+        middles = 0.5 * (breaks[:-1] + breaks[1:])
+        indices = np.searchsorted(inner, middles, side="right")
+        pieces = []
+        for index, (low, high) in zip(indices, pairwise(breaks), strict=True):
+            piece = self.pieces[index]
+            first, last = (
+                piece.first + (np.array([low, high]) - self.breaks[index]) * self.total
+            )
+            pieces.append(replace(piece, first=float(first), last=float(last)))
+        stops = self.stops[(self.stops > begin) & (self.stops < end)]
+        return replace(self, pieces=tuple(pieces), breaks=breaks, stops=stops)
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s; beyond [0, 1] as the first or last piece continues.
+        """Return the path at K values of s; beyond its ends as the first or last piece continues.
 
         Parameters
         ----------
@@ -153,16 +205,15 @@ class SequencePath:
         """Return the coordinates in the world and their derivatives by s up to the third, shape (4, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
         which = np.searchsorted(self.breaks[1:-1], values, side="right")
-        total = self.total
         rows = self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2]
         result = np.empty((4, values.size, rows))
         order = np.argsort(which, kind="stable")
         used, starts = np.unique(which[order], return_index=True)
         for i, here in zip(used, np.split(order, starts[1:]), strict=False):
             piece = self.pieces[i]
-            sigma = piece.first + (values[here] - self.breaks[i]) * total
+            sigma = piece.first + (values[here] - self.breaks[i]) * self.total
             result[:, here] = piece.curve.derivatives(sigma)
-        result *= total ** np.arange(4)[:, None, None]
+        result *= self.total ** np.arange(4)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T
             result[0] += self.frame.origin
@@ -177,6 +228,37 @@ def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
     sizes = task_map.norms(path.sample(np.array([s])).xi)
     position, angle = (float(size[0]) for size in sizes)
     return position if position > tolerances.LENGTH else angle
+
+
+def tool_derivatives(task_map: TaskMap, path: Path, s: Array) -> Array:
+    """Return the velocity of the tool frame's origin per unit s, and its first two derivatives by s, (3, K, p), m.
+
+    They are those of the p position rows, along the axes of the world, or of the tool frame for poses; of a path of
+    joints all three.
+    """
+    sample = path.sample(s)
+    if not isinstance(task_map, JointSpace):
+        rows = np.stack([sample.xi, sample.xi_ds, sample.xi_dds])
+        return rows[..., : len(task_map.axes)]
+    tool = task_map_of(task_map.robot, "position")
+    twists = tool.twists(sample.target)
+    jacobian = tool.jacobian(twists)
+    slopes = tool.derivatives(twists, sample.xi, sample.xi_ds)
+    terms = (
+        [(jacobian, sample.xi)],
+        [(jacobian, sample.xi_ds), (slopes.velocity_q, sample.xi)],
+        [
+            (jacobian, sample.xi_dds),
+            (slopes.acceleration_qdot, sample.xi_ds),
+            (slopes.acceleration_q, sample.xi),
+        ],
+    )
+    return np.stack(
+        [
+            sum(np.einsum("kij,kj->ki", matrix, vector) for matrix, vector in order)
+            for order in terms
+        ]
+    )
 
 
 def check_closed(task_map: TaskMap, path: Path) -> None:

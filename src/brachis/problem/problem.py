@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,8 +14,17 @@ from brachis.common.summary import Summary
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.kinematics import ClosedFormMap, Newton
 from brachis.limits import Limit, limits_of
-from brachis.limits.process_speed import build_ramp
-from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
+from brachis.path import (
+    Leg,
+    Path,
+    TimeLaw,
+    check_closed,
+    legs_of,
+    path_of,
+    path_speed,
+    time_law_of,
+    with_feed_rates,
+)
 from brachis.problem.feasibility import (
     branch_of,
     check_postures,
@@ -43,6 +54,10 @@ class Problem(Summary):
         Postures, None where free; the same one where the motion is periodic. Otherwise the end is the posture nearest
         to the given one that is on the path, which that one may miss by what its digits leave out.
     limits : tuple of Limit
+    legs : tuple of Leg
+        Parts of the path that are passed in one go.
+    time_laws : tuple of TimeLaw or None
+        One for each leg; None where its speed is free.
     user_limits : tuple of LimitModel
         Those of the limits that are not in the task, as the user gave them.
     """
@@ -54,6 +69,8 @@ class Problem(Summary):
     start: np.ndarray | None
     end: np.ndarray | None
     limits: tuple[Limit, ...]
+    legs: tuple[Leg, ...]
+    time_laws: tuple[TimeLaw | None, ...]
     user_limits: tuple[LimitModel, ...] = ()
 
     @classmethod
@@ -85,23 +102,74 @@ class Problem(Summary):
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
-        ramp = build_ramp(task, robot, task_map, path, end if start is None else start)
-        limits = limits_of(robot, task, user_limits, ramp)
+        legs = legs_of(task, task_map, path)
+        time_laws = tuple(time_law_of(leg, task_map, path) for leg in legs)
+        limits = limits_of(robot, task, user_limits)
         check_smoothness(limits, task.spline)
         tolerance = task.refinement.tolerance
         limits = check_postures(task_map, limits, start, end, path, tolerance)
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
-        return cls(task, robot, task_map, path, start, end, limits, tuple(user_limits))
+        return cls(
+            task,
+            robot,
+            task_map,
+            path,
+            start,
+            end,
+            limits,
+            legs,
+            time_laws,
+            tuple(user_limits),
+        )
+
+    @cached_property
+    def leg_paths(self) -> tuple[Path, ...]:
+        """The path of each leg, of which only the pieces of the leg are sampled."""
+        return tuple(self.path.between(leg.begin, leg.end) for leg in self.legs)
+
+    @cached_property
+    def leg_rates(self) -> tuple[tuple[float, float], ...]:
+        """ds/dt at begin and end of each leg, 1/s.
+
+        It is 0 at rest, and at the ends of a periodic motion without a given speed there.
+        """
+        joints = [
+            self._rate_between(before, before + 1)
+            for before in range(len(self.legs) - 1)
+        ]
+        first, last = self.end_rates
+        rates = [first, *joints, last]
+        return tuple(pairwise(rates))
+
+    def _rate_between(self, before: int, after: int) -> float:
+        """Return ds/dt where a leg ends and another one begins, 1/s."""
+        if self.legs[before].stops:
+            return 0.0
+        for number, end in ((before, -1), (after, 0)):
+            law = self.time_laws[number]
+            if law is not None:
+                return float(law.at_end(end)[1])
+        return 0.0
 
     @property
     def end_rates(self) -> tuple[float, float]:
-        """ds/dt at start and end, 1/s; zero at rest, and where a periodic motion has no ends."""
-        given = self.task.boundary
-        first, last = (
-            speed / path_speed(self.task_map, self.path, s) if speed else 0.0
-            for s, speed in ((0.0, given.start_speed), (1.0, given.end_speed))
-        )
+        """ds/dt at the path's start and end, 1/s."""
+        boundary = self.task.boundary
+        if boundary.periodic:
+            rate = self._rate_between(-1, 0)
+            return rate, rate
+        rates = []
+        for end, speed in ((0, boundary.start_speed), (-1, boundary.end_speed)):
+            law = self.time_laws[end]
+            if law is not None:
+                rates.append(float(law.at_end(end)[1]))
+            elif speed:
+                per_s = path_speed(self.task_map, self.path, -float(end))
+                rates.append(speed / per_s)
+            else:
+                rates.append(0.0)
+        first, last = rates
         return first, last
 
 

@@ -288,12 +288,52 @@ ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its f
 _POSITIONS = 3
 
 
+SHORTEST_DWELL = 1e-3
+"""Shortest dwell, s: one cycle of a robot's controller is as long."""
+
+
 class SegmentModel(Model):
     """What all segments share."""
 
     blend: Positive | None = None
     """Rounds the corner at the END of this segment: the length, m, that is cut from this segment and from the next one.
     """
+    stop: Flag = False
+    """Whether the tool stops at the end of this segment: all joints are at rest there, and the path may have a corner.
+    """
+    dwell: Annotated[
+        NonNegative,
+        must(
+            lambda dwell: dwell == 0.0 or dwell >= SHORTEST_DWELL,
+            "the dwell is too short",
+            "0, or 0.001 s or more",
+        ),
+    ] = 0.0
+    """Time for which the arm waits at the end of this segment, s; with it the tool stops there."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _dwell_is_a_stop(cls, content: object) -> object:
+        if isinstance(content, Mapping) and content.get("dwell"):
+            return {"stop": True, **content}
+        return content
+
+    @model_validator(mode="after")
+    def _stop_fits(self) -> Self:
+        return self.check(
+            (
+                self.dwell and not self.stop,
+                "stop",
+                "a dwell needs a stop",
+                "true, or no dwell",
+            ),
+            (
+                self.stop and self.blend is not None,
+                "blend",
+                "the tool stops at the end of this segment, so its corner is not rounded",
+                "either blend, or stop (or dwell)",
+            ),
+        )
 
     def __add__(
         self, other: SegmentModel | tuple[SegmentModel, ...]

@@ -1,0 +1,189 @@
+"""The time law of a leg with a given speed v of the tool: s(t) with ds/dt = v / g(s).
+
+g(s) is the distance that the tool moves per unit s. With t(s) the integral of g / v, s(t) is its inverse function:
+
+    sdot = v / g,    sddot = -v^2 g' / g^3,    sdddot = v^3 (3 g'^2 - g g'') / g^5
+
+Where g is constant, as on lines and circles, s(t) is linear. Otherwise it is a spline through (t(s), s) that is refined
+until the speed is met in between too. Its knots are double where the path is not analytic, so that it is C3 there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.common import tolerances
+from brachis.errors import PathError
+from brachis.path.legs import Leg
+from brachis.path.protocol import Array, Path
+from brachis.path.sequence import tool_derivatives
+from brachis.robot import TaskMap
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+DEGREE = 5
+"""Degree of the spline where the law is not linear."""
+_ACCURACY = 2e-10
+"""Largest relative deviation from the speed."""
+_MOST_INTERVALS = 20_000
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeLaw:
+    """The path coordinate over time on a leg with a given speed.
+
+    Attributes
+    ----------
+    duration : float
+        s.
+    spline : BSpline
+        s over t in [0, duration], s.
+    ends : (2, 4) ndarray
+        s and three derivatives by time, per second, at the beginning and at the end.
+    """
+
+    duration: float
+    spline: BSpline
+    ends: Array
+
+    def at(self, t: Array) -> Array:
+        """Return s and three derivatives by time, (4, K), per second, at times t, (K,), s."""
+        return np.stack([self.spline(t, nu=order) for order in range(4)])
+
+    def at_end(self, end: int) -> Array:
+        """Return the same, (4,), at the beginning (0) or the end (-1), free of the spline's error."""
+        return np.asarray(self.ends[end])
+
+
+def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
+    """Return the time law of a leg; None where its speed is free.
+
+    Parameters
+    ----------
+    leg : Leg
+    task_map : TaskMap
+    path : Path
+        The whole path.
+
+    Raises
+    ------
+    PathError
+        The path bends too abruptly for a spline.
+    """
+    if leg.speed is None:
+        return None
+    from scipy.interpolate import BSpline
+
+    tool = _ToolAlongPath(task_map, path.between(leg.begin, leg.end), leg.speed)
+    knots = tool.path.knots
+    parts = knots[:-1, None] + np.arange(32) / 32 * np.diff(knots)[:, None]
+    distances = tool.slopes(np.append(parts, leg.end))[0]
+    ends = tool.rates(np.array([leg.begin, leg.end])).T
+    if np.ptp(distances) <= tolerances.ROUNDING * distances.max():
+        duration = float(distances.mean()) * (leg.end - leg.begin) / leg.speed
+        times = [0.0, 0.0, duration, duration]
+        rate = (leg.end - leg.begin) / duration
+        ends = np.array([[leg.begin, rate, 0.0, 0.0], [leg.end, rate, 0.0, 0.0]])
+        line = BSpline(np.array(times), np.array([leg.begin, leg.end]), 1)
+        return TimeLaw(duration, line, ends)
+    breaks = knots
+    while len(breaks) <= _MOST_INTERVALS:
+        spline = _interpolate(tool, breaks, np.isin(breaks, knots), ends)
+        deviation = _deviations(tool, spline)
+        is_off = deviation > _ACCURACY
+        if not is_off.any():
+            return TimeLaw(float(spline.t[-1]), spline, ends)
+        middles = 0.5 * (breaks[:-1] + breaks[1:])
+        breaks = np.sort(np.concatenate([breaks, middles[is_off]]))
+    worst = float(breaks[int(np.argmax(deviation))])
+    raise PathError(
+        "the path bends too abruptly for a constant speed of the tool",
+        s_interval=(worst, worst),
+        where="tool_limits.process_speed",
+        found=f"a speed that is {deviation.max():.2g} off with {len(breaks) - 1} intervals, at s = {worst:.4g}",
+        allowed=f"{_ACCURACY:g} (relative)",
+        hint="Make the path smoother there",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _ToolAlongPath:
+    """How far the tool moves along a part of a path that it passes at a speed, m/s."""
+
+    task_map: TaskMap
+    path: Path
+    speed: float
+
+    def slopes(self, s: Array) -> Array:
+        """Return the distances per unit s and their first two derivatives by s, (3, K), m."""
+        v, v_ds, v_dds = tool_derivatives(self.task_map, self.path, s)
+        g = np.linalg.norm(v, axis=1)
+        g_ds = (v * v_ds).sum(axis=1) / g
+        g_dds = ((v_ds * v_ds + v * v_dds).sum(axis=1) - g_ds**2) / g
+        return np.stack([g, g_ds, g_dds])
+
+    def rates(self, s: Array) -> Array:
+        """Return path coordinates s, (K,), and their three derivatives by time, (4, K)."""
+        g, g_ds, g_dds = self.slopes(s)
+        v = self.speed
+        return np.stack(
+            [s, v / g, -(v**2) * g_ds / g**3, v**3 * (3.0 * g_ds**2 - g * g_dds) / g**5]
+        )
+
+    def times(self, s: Array) -> Array:
+        """Return the times, (K,), s, at ascending path coordinates, from the first one on."""
+        half = np.diff(s)[:, None] / 2.0
+        nodes = s[:-1, None] + half * (_NODES + 1.0)
+        distances = self.slopes(nodes.ravel())[0].reshape(nodes.shape)
+        steps = (distances * half) @ _WEIGHTS / self.speed
+        return np.append(0.0, np.cumsum(steps))
+
+
+def _interpolate(
+    tool: _ToolAlongPath, breaks: Array, is_double: np.ndarray, ends: Array
+) -> BSpline:
+    """Return the spline through s at the times of its Greville abscissae, with given rates at its ends.
+
+    Parameters
+    ----------
+    tool : _ToolAlongPath
+    breaks : (N + 1,) ndarray
+        Path coordinates of the knots.
+    is_double : (N + 1,) ndarray
+        Whether a knot occurs twice.
+    ends : (2, 4) ndarray
+        As in `TimeLaw`.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    often = np.where(is_double, 2, 1)
+    often[[0, -1]] = DEGREE + 1
+    knots = np.repeat(breaks, often)
+    windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], DEGREE)
+    abscissae = windows.mean(axis=1)
+    # Two rates at each end take the places of the abscissae nearest to it.
+    sites = np.concatenate([breaks[:1], abscissae[3:-3], breaks[-1:]])
+    every = np.union1d(breaks, sites)
+    times = tool.times(every)
+    at_knots = times[np.searchsorted(every, knots)]
+    at_sites = times[np.searchsorted(every, sites)]
+    first, last = ([(1, rates[1]), (2, rates[2])] for rates in ends)
+    # The stubs do not know conditions on chosen derivatives, which SciPy documents.
+    return make_interp_spline(
+        at_sites, sites, k=DEGREE, t=at_knots, bc_type=(first, last)
+    )  # type: ignore[arg-type]
+
+
+def _deviations(tool: _ToolAlongPath, spline: BSpline) -> Array:
+    """Return the largest relative deviation from the speed between the knots, (N,)."""
+    times = np.unique(spline.t)
+    t = times[:-1, None] + np.diff(times)[:, None] * (np.arange(8) + 0.5) / 8
+    s = spline(t.ravel())
+    distances = tool.slopes(s)[0]
+    speeds = spline(t.ravel(), nu=1) * distances
+    return np.abs(speeds / tool.speed - 1.0).reshape(t.shape).max(axis=1)
