@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common.arrays import interpolate_columns
 from brachis.errors import UnreachableError
 from brachis.optimise.boundary import greville
 from brachis.optimise.bspline import basis_matrix, spread
@@ -75,8 +76,13 @@ def _motion_along(
     """Duration, s, and values (K, c) at normalised times, (K,), of a motion along a joint path, (S, c).
 
     A path with a duration has its values at even times. Else the motion is smooth from rest to rest, and takes 1 s; or
-    its first curve has a constant acceleration between the rates at the ends.
+    its first curve has a constant acceleration between the rates at the ends. Where a time law gives the first curve,
+    the others follow it.
     """
+    if phase.time_law is not None:
+        s = phase.time_law.at(t_norm * phase.time_law.duration)[0]
+        values = interpolate_columns(s, joint_path[:, 0], joint_path)
+        return phase.time_law.duration, values
     grid = np.linspace(0.0, 1.0, len(joint_path))
     boundary = phase.boundary
     if boundary.periodic:
@@ -94,8 +100,8 @@ def _motion_along(
         part = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
     elif duration is None:
         part = t_norm * (2.0 * first + (last - first) * t_norm) / total
-    values = [np.interp(part, grid, column) for column in joint_path.T]
-    return duration or (2.0 * way / total if total else 1.0), np.column_stack(values)
+    values = interpolate_columns(part, grid, joint_path)
+    return duration or (2.0 * way / total if total else 1.0), values
 
 
 def fit_curves(

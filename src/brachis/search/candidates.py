@@ -181,9 +181,16 @@ def _open_session(
 ) -> SolverSession:
     """Open a session of the guess's solver under the task's bounds."""
     (backend,) = solvers_for(start.solver)
-    settings = start.problem.task.solver
+    problem = start.problem
+    r = start.joint_map.r
+    has_time_law = any(law is not None for law in problem.time_laws)
     return SolverSession.for_task(
-        backend, settings, start.joint_map, deadline, listener
+        backend,
+        problem.task.solver,
+        r,
+        deadline,
+        listener,
+        is_flat=start.in_chart or (has_time_law and r > 0),
     )
 
 
