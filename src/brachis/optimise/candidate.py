@@ -259,6 +259,7 @@ def extract_trajectory(start: InitialGuess, solved: SolvedProgram) -> Trajectory
         knots=motion.knots,
         degree=motion.degree,
         control_points=motion.control_points,
+        phase_ends=nodes.times[-1:],
         chart_rows=rows,
         chart_knots=knots,
     )
