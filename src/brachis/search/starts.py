@@ -29,7 +29,12 @@ from brachis.search.failure import Failure
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.phase_plane import PhasePlane, interpolate, least_time
+from brachis.search.phase_plane import (
+    fastest_times,
+    interpolate,
+    least_time,
+    spread_stations,
+)
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.processes import ignore
 from brachis.search.screening import screen
@@ -137,7 +142,7 @@ def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
     s = joint_path.s
     # More finely than at the lattice's stations.
-    fine = np.linspace(0.0, 1.0, max(2 * len(s) - 1, 97))
+    fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, 97))
     weights = np.ones(len(s))
     weights[[0, -1]] = 1e3  # nearly exact at both ends
     for pieces in (3, 8):
@@ -167,7 +172,7 @@ def _guess_on_branch(
         q = joint_path.q
         curves = np.column_stack([s, q[:, redundant]])
     problem = decomposition.problem
-    estimate = least_time(problem.limits, s, q)
+    estimate = least_time(problem, s, q)
     family = decomposition.match.family
     return InitialGuess(problem, joint_map, curves, estimate, origin, family)
 
@@ -228,7 +233,7 @@ def chart_starts(
     Raises
     ------
     PlanningError
-        No motion along any joint path can hold a least speed, or a mean of a load.
+        No motion along any joint path can hold a speed, or a mean of a load.
     """
     for finer in (1, 2):
         lattice = PostureLattice(
@@ -325,7 +330,7 @@ def _guess_in_chart(
             continue
         if problem.task.boundary.periodic and not chart.rows.closes:
             continue
-        estimate = least_time(problem.limits, s, q)
+        estimate = least_time(problem, s, q)
         curves = chart.curves(s, q)
         return InitialGuess(problem, chart, curves, estimate, origin, CHART)
     return None
