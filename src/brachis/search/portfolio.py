@@ -157,7 +157,7 @@ class Search:
         limit = self._deadline
         if not self.is_satisfied:
             limit = limit.part(_COARSE_SHARE)
-        # No guess may take more than 15 % of the time.
+        # No guess of several may take more than 15 % of the time.
         share = min(0.15, _COARSE_SHARE / max(1, len(batch.starts)))
         seconds = max(_LEAST_SHARE, share * self._problem.task.search.time_limit)
         work = run_in_processes(
@@ -422,10 +422,10 @@ def is_same_motion(first: Candidate, second: Candidate) -> bool:
     for candidate in (first, second):
         assert candidate.program is not None
         try:
-            (state,) = candidate.program.states(candidate.reports[-1].x)
+            states = candidate.program.states(candidate.reports[-1].x)
         except UnreachableError:
             return False
-        postures.append(state.q)
+        postures.append(np.concatenate([state.q for state in states]))
     return bool(np.abs(postures[0] - postures[1]).max() < 0.1)  # rad or m
 
 

@@ -17,9 +17,15 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Listener
 from brachis.errors import PathError, UnreachableError
-from brachis.kinematics import CHART, JointSpaceMap, Newton, chart_around
+from brachis.kinematics import (
+    CHART,
+    JointMap,
+    JointSpaceMap,
+    Newton,
+    chart_around,
+)
 from brachis.limits import Limit
-from brachis.optimise.candidate import InitialGuess, PathMap
+from brachis.optimise.candidate import InitialGuess
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
@@ -416,12 +422,12 @@ def _refuse_beyond(
     raise failure.error()
 
 
-def first_map(
+def first_maps(
     problem: Problem, decompositions: Sequence[Decomposition]
-) -> tuple[PathMap, str]:
-    """Return a joint map of the problem, of a closed form if there is one, and its family.
+) -> tuple[list[JointMap], str]:
+    """Return joint maps of the problem, one for each leg, of a closed form if there is one, and its family.
 
-    It begins at the given start posture, or if that is free at that of the first joint path.
+    They begin at the given start posture, or if that is free, or there are several legs, along the first joint path.
 
     Raises
     ------
@@ -430,10 +436,11 @@ def first_map(
     """
     if isinstance(problem.task_map, JointSpace):
         start = joint_space_start(problem)
-        return start.joint_map, start.family
+        return start.maps_by_leg(), start.family
     first = next(iter(decompositions), None)
-    if first is not None and problem.start is not None:
-        return first.joint_map(problem.start, first.branches[0]), first.match.family
+    is_given = problem.start is not None and len(problem.legs) == 1
+    if first is not None and problem.start is not None and is_given:
+        return [first.joint_map(problem.start, first.branches[0])], first.match.family
     level = SEARCH_LEVELS["fast"][0]
     found = (
         chart_starts(problem, decompositions, level)
@@ -442,4 +449,4 @@ def first_map(
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
-    return found[0].joint_map, found[0].family
+    return found[0].maps_by_leg(), found[0].family
