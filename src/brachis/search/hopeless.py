@@ -241,8 +241,8 @@ class _SpeedCheck:
             return plane.speed_factor(rate, acceleration)
         assert speed.side is not None
         largest, label = plane.largest_rate(speed.side)
-        rate = self.problem.leg_rates[speed.leg][speed.side]
-        return largest / rate, float(plane.s[speed.side]), label
+        asked = self.problem.leg_rates[speed.leg][speed.side]
+        return largest / asked, float(plane.s[speed.side]), label
 
     def speed_at(self, leg: int, side: int) -> int | None:
         """Return the number of the speed that is given at an end of a leg; None at rest."""
@@ -268,7 +268,7 @@ class _SpeedCheck:
         return free
 
     def pass_leg(self, leg: int, shares: np.ndarray) -> np.ndarray | None:
-        """Pass a leg whose speed is free with shares of the speeds, (k,): ds/dt, (P,), 1/s; None if that is impossible."""
+        """Pass a leg whose speed is free with shares of the speeds, (k,): ds/dt, (P,), 1/s; None: it is too short."""
         rates = []
         for side in (0, -1):
             number = self.speed_at(leg, side)

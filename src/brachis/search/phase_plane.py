@@ -25,6 +25,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common.arrays import interpolate_columns
 from brachis.limits import HasPhasePlaneRows, Limit
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
@@ -33,6 +34,8 @@ from brachis.path.legs import Leg
 from brachis.path.time_law import TimeLaw
 from brachis.problem.problem import Problem
 
+_Part = tuple[np.ndarray, float | None]
+"""Guess for a leg: curves, (S, c), and duration, s, if these are a motion's at even times."""
 _TINY = 1e-9
 """Coefficients and slopes below this are taken for zero."""
 _STATIONS = 401
@@ -117,7 +120,7 @@ def stations_on(
     if len(inner) < 3:
         inner = np.linspace(leg.begin, leg.end, 5)[1:-1]
     stations = np.concatenate([[leg.begin], inner, [leg.end]])
-    return stations, interpolate(stations, s, q)
+    return stations, interpolate_columns(stations, s, q)
 
 
 def given_motion(
@@ -215,7 +218,9 @@ class PhasePlane:
         """Largest factor, (P, c), of the speed of a motion for each limit alone."""
         x = rate[:, None] ** 2
         beside = acceleration[:, None] - self._slope * x
-        bound = np.hstack([np.where(beside > 0.0, self._upper, self._lower), self._levels])
+        bound = np.hstack(
+            [np.where(beside > 0.0, self._upper, self._lower), self._levels]
+        )
         used = np.hstack([beside, np.broadcast_to(x, self._levels.shape)])
         squares = np.divide(
             bound, used, out=np.full_like(bound, np.inf), where=used != 0.0
@@ -300,11 +305,6 @@ class PhasePlane:
         return low, high
 
 
-def interpolate(places: np.ndarray, s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Interpolate values (S, c) at s, (S,), linearly at places, (P,)."""
-    return np.column_stack([np.interp(places, s, column) for column in values.T])
-
-
 def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     """Fit splines to the joint path of a guess, as `starting_point` does.
 
@@ -318,11 +318,13 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     -------
     (v,) ndarray or None
     """
-    plain = start.legs()
-    guesses = [plain]
-    if not start.timed:
-        legs = range(len(plain))
-        plain = [_given_guess(start, leg) or plain[leg] for leg in legs]
+    parts = start.legs
+    legs = range(len(parts))
+    guesses: list[list[_Part]]
+    if start.durations is not None:
+        guesses = [list(zip(parts, start.durations, strict=True))]
+    else:
+        plain = [_given_guess(start, leg) or (parts[leg], None) for leg in legs]
         moving = [_moving_ends_guess(start, leg) or plain[leg] for leg in legs]
         guesses = [moving, plain]
     for guess in guesses:
@@ -333,7 +335,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     return None
 
 
-def _given_guess(start: InitialGuess, leg: int) -> tuple[np.ndarray, float] | None:
+def _given_guess(start: InitialGuess, leg: int) -> _Part | None:
     """Curves, (S, c), at even times, and the duration, s, on a leg whose speed is given; else None."""
     law = start.problem.time_laws[leg]
     if law is None:
@@ -342,9 +344,7 @@ def _given_guess(start: InitialGuess, leg: int) -> tuple[np.ndarray, float] | No
     return _curves_along(start, s), law.duration
 
 
-def _moving_ends_guess(
-    start: InitialGuess, leg: int
-) -> tuple[np.ndarray, float] | None:
+def _moving_ends_guess(start: InitialGuess, leg: int) -> _Part | None:
     """Curves and duration likewise on a leg between moving ends whose speed is free; None elsewhere."""
     problem = start.problem
     first, last = problem.leg_rates[leg]
@@ -368,7 +368,7 @@ def _moving_ends_guess(
 def _curves_along(start: InitialGuess, s: np.ndarray) -> np.ndarray:
     """Curves, (S, c), of a guess at path coordinates, (S,)."""
     path = start.joint_path
-    return np.column_stack([s, interpolate(s, path[:, 0], path)[:, 1:]])
+    return np.column_stack([s, interpolate_columns(s, path[:, 0], path)[:, 1:]])
 
 
 def postures_along(start: InitialGuess, s: np.ndarray) -> np.ndarray | None:

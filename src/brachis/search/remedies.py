@@ -82,9 +82,7 @@ def try_remedies(
         if found:
             advice.append(f"{remedy.verb} {remedy.key} to {found}")
     # One number alone may not be enough.
-    untried = " and ".join(
-        f"{remedy.verb} {remedy.key}" for remedy in error.remedies
-    )
+    untried = " and ".join(f"{remedy.verb} {remedy.key}" for remedy in error.remedies)
     text = ", or ".join(advice)
     if untried and not text:
         text = f"{untried} (how far is not known)"
