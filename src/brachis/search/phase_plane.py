@@ -210,9 +210,11 @@ class PhasePlane:
             The largest factor of its speed; the path coordinate and the label of the limit that allow no more.
         """
         factors = self._factors(rate, acceleration)
-        station, column = np.unravel_index(int(np.argmin(factors)), factors.shape)
-        place = float(self.s[station])
-        return float(factors[station, column]), place, self._labels[column]
+        least = factors.min(axis=1)
+        # The first place of equal ones.
+        station = int(np.argmax(least <= least.min() * (1.0 + _ROUNDING)))
+        column = int(np.argmin(factors[station]))
+        return float(least[station]), float(self.s[station]), self._labels[column]
 
     def _factors(self, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
         """Largest factor, (P, c), of the speed of a motion for each limit alone."""
