@@ -260,7 +260,7 @@ def transcribe(
     Returns
     -------
     program : Program
-        Over as many equal knot intervals a phase as the task says; with ``intervals: auto`` over the 10 of the first mesh,
+        Over as many equal knot intervals a phase as the task says; with ``intervals: auto`` over 10, the first mesh,
         which `plan` refines.
     family : str
         Family of the closed form.

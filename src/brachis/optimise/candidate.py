@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from brachis.common.summary import Summary
 from brachis.common.arrays import interpolate_columns
+from brachis.common.summary import Summary
 from brachis.errors import UnreachableError, write_count
 from brachis.kinematics import (
     CHART,

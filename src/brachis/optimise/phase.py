@@ -1,8 +1,8 @@
 """One phase of a motion: spline curves y, mapped to joints, within limits at collocation points.
 
 A phase has variables x = (T, c_1, ..., c_c [, h]), its duration and the free control points of its curves, and rows;
-see `layout`. Where a time law gives s(t), T is given too, and s has no control points. With basis matrices B, B', B'' in
-normalised time,
+see `layout`. Where a time law gives s(t), T is given too, and s has no control points. With basis matrices B, B', ...
+in normalised time,
 
     dy/dc = B,  dydot/dc = B' / T,  dyddot/dc = B'' / T^2,  dydot/dT = -ydot / T,  dyddot/dT = -2 yddot / T
     dy/dh = dB/dh c,  dydot/dh = dB'/dh c / T,  dyddot/dh = dB''/dh c / T^2,  and so on
