@@ -16,16 +16,10 @@ True
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 
 from brachis.limits.checks import build_user_limits
 from brachis.limits.drives import build_torque_speed, build_total_power
 from brachis.limits.joint import JOINT_LIMITS
-from brachis.limits.process_speed import (
-    ConstantAccelerationRamp,
-    GreatestProcessSpeed,
-    LeastProcessSpeed,
-)
 from brachis.limits.protocol import (
     Bound,
     Description,
@@ -57,8 +51,6 @@ _AFTER: dict[str, dict[str, Build]] = {
         "tool_speed": build_tool_speed,
         "tool_acceleration": build_tool_acceleration,
         "tool_angular_speed": build_tool_angular_speed,
-        "process_speed": GreatestProcessSpeed.build,
-        "least_process_speed": LeastProcessSpeed.build,
     },
     "power": {
         "total_power": build_total_power,
@@ -76,7 +68,6 @@ def limits_of(
     robot: Robot,
     task: Task,
     user_limits: Sequence[LimitModel] = (),
-    ramp: ConstantAccelerationRamp | None = None,
 ) -> tuple[Limit, ...]:
     """List the limits of a task on a robot.
 
@@ -86,8 +77,6 @@ def limits_of(
     task : Task
     user_limits : sequence of LimitModel, optional
         Further limits, besides those of the table and of the task's ``custom_limits``.
-    ramp : ConstantAccelerationRamp, optional
-        How speeds are reached along the path; without it the bounds of process speeds switch on abruptly.
 
     Returns
     -------
@@ -99,11 +88,7 @@ def limits_of(
     InputError
         A limit of the user's own does not fit the robot, or is not valid (see `build_user_limits`).
     """
-    with_ramp: dict[str, Build] = {
-        limit.kind: partial(limit.build, ramp=ramp)
-        for limit in (GreatestProcessSpeed, LeastProcessSpeed)
-    }
-    built = [build(robot, task) for build in (TABLE | with_ramp).values()]
+    built = [build(robot, task) for build in TABLE.values()]
     limits = [limit for limit in built if limit is not None]
     limits += build_user_limits(custom_limits(task), robot, limits, "custom_limits")
     limits += build_user_limits(user_limits, robot, limits, "own_limits")

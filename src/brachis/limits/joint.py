@@ -49,7 +49,7 @@ class JointLimit(Limit):
         The limited joints.
     """
 
-    longer_time: Literal["relieves", "violates", "neither"] = "relieves"
+    longer_time: Literal["relieves", "neither"] = "relieves"
     share = ""
     """Title of an axis of ratios; see `Label`."""
 

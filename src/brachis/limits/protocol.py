@@ -242,8 +242,8 @@ class Description:
         Where it holds.
     role : Role
         Whose limit it is.
-    longer_time : {"relieves", "violates", "neither"}
-        What a longer end time does: it relieves a velocity, acceleration or torque, and violates a least speed.
+    longer_time : {"relieves", "neither"}
+        What a longer end time does: it relieves a velocity, acceleration or torque.
     at_rest : {"nothing", "posture", "turns"}
         What it restricts of an arm at rest: the posture up to turns by 2 pi (torque against gravity), or also the
         turn of an angle (position).
@@ -263,7 +263,7 @@ class Description:
     upper: np.ndarray
     guarantee: Guarantee = Guarantee.AT_ALL_INSTANTS
     role: Role = Role.ROBOT
-    longer_time: Literal["relieves", "violates", "neither"] = "neither"
+    longer_time: Literal["relieves", "neither"] = "neither"
     at_rest: Literal["nothing", "posture", "turns"] = "nothing"
     breaks: np.ndarray = np.empty(0)
     order: int = 2

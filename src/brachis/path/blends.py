@@ -149,7 +149,7 @@ def _check_neighbours(
             f"a blend needs motion of the position on both sides, and {still} on one",
             found,
             "no blend here",
-            f"Turn {turning} along a line",
+            f"Turn {turning} along a line, or stop there, with stop: true instead of the blend",
         )
     longest = min(first.length, second.length) / 2
     if size > longest * (1.0 + tolerances.ROUNDING):
@@ -192,7 +192,7 @@ def _blend(start: Array, corner: Array, end: Array, join: Join) -> SepticCurve:
             "the corner is too sharp for a blend: the tool would almost stop and reverse",
             f"a smallest speed of {speed:.3g} relative to the segments",
             f"more than {slowest}",
-            "Turn in two corners, or by an arc",
+            "Turn in two corners, or by an arc; or stop at the corner, with stop: true instead of the blend",
         )
     return curve
 

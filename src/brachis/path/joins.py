@@ -54,8 +54,13 @@ class Join:
 
     @property
     def rounding(self) -> str:
-        """What to set to round the corner."""
-        return f"{self.blend_key} ({self.unit}) to round it"
+        """What to set to round the corner, or to stop at it."""
+        return f"{self.blend_key} ({self.unit}) to round it, or {self.stopping}"
+
+    @property
+    def stopping(self) -> str:
+        """What to set to stop at the corner."""
+        return f"path[{self.index}].stop: true to stop there"
 
     @property
     def unit(self) -> str:
@@ -148,7 +153,7 @@ def refuse_corners(corners: Sequence[Corner]) -> None:
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
         found=found,
-        allowed="segments that continue each other, or a blend",
+        allowed="segments that continue each other, a blend or a stop",
         where=join.where,
         hint=advice + (f"; likewise {others}" if others else ""),
     )
@@ -178,7 +183,7 @@ def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
         return Corner(
             join,
             "a stop: the position moves on one side, and the tool turns on the spot on the other",
-            "Turn the tool along a segment, by its orientation, or in a separate task",
+            f"Turn the tool along a segment, by its orientation, or set {join.stopping}",
         )
     before, after, length = at_join(first, second)
     jump = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)
@@ -186,9 +191,8 @@ def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
         return Corner(join, jump, f"Set {join.rounding}")
     unit = "rad" if on_the_spot[0] else "m"
     jump = _turning_mismatch(before, after, length, unit)
-    advice = "Set profile: smooth where the tool turns"
-    if not on_the_spot[0]:
-        advice += f", or {join.rounding}"
+    otherwise = join.stopping if on_the_spot[0] else join.rounding
+    advice = f"Set profile: smooth where the tool turns, or {otherwise}"
     return Corner(join, jump, advice) if jump else None
 
 

@@ -175,8 +175,12 @@ def _interpolate(
     first, last = ([(1, rates[1]), (2, rates[2])] for rates in ends)
     # The stubs do not know conditions on chosen derivatives, which SciPy documents.
     return make_interp_spline(
-        at_sites, sites, k=DEGREE, t=at_knots, bc_type=(first, last)
-    )  # type: ignore[arg-type]
+        at_sites,
+        sites,
+        k=DEGREE,
+        t=at_knots,
+        bc_type=(first, last),  # type: ignore[arg-type]
+    )
 
 
 def _deviations(tool: _ToolAlongPath, spline: BSpline) -> Array:

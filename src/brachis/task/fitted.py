@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from math import degrees
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -16,9 +16,15 @@ from brachis.task.fields import plain
 from brachis.task.messages import task_error
 from brachis.task.models import Task
 from brachis.task.orientation import Attitude, OrientationMode, Rotate, TurnTo
-from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
+from brachis.task.point_data import (
+    CornerMode,
+    FileUnits,
+    FitReport,
+    FitTolerance,
+    PointFile,
+)
 from brachis.task.points.checks import refuse_repetitions
-from brachis.task.points.curves import check_interpolation, fit_curves
+from brachis.task.points.curves import check_interpolation, cut_at_corners, fit_curves
 from brachis.task.points.gcode import SUFFIXES, read_gcode
 from brachis.task.points.points import QUATERNION, Points, points_from
 from brachis.task.points.tables import (
@@ -76,15 +82,24 @@ def segments_along(
                 hint="Set csv.tolerance, or remove the feed rates",
             )
         report = check_interpolation(points, notes)
-        return [_spline_through(points, report, segment)]
-    curves, report = fit_curves(points, settings.tolerance, notes)
-    if len(curves) > 1:
+        parts = [points]
+        if settings.corner == "stop":
+            parts, report = cut_at_corners(points, report)
         _check_corners(report, segment, where)
+        return [
+            SplineSegment(
+                **_end_of(segment, is_last=i == len(parts) - 1),
+                spline=_spline_through(part, report, settings, number=i),
+            )
+            for i, part in enumerate(parts)
+        ]
+    stops = settings.corner == "stop"
+    curves, report = fit_curves(points, settings.tolerance, notes, stops=stops)
+    _check_corners(report, segment, where)
     fit = report.model_copy(update={"source": settings.file})
     return [
         BSplineSegment(
-            blend=curve.blend or segment.blend,
-            orientation=segment.orientation,
+            **_end_of(segment, is_last=i == len(curves) - 1, blend=curve.blend),
             bspline=BSplineCurve(
                 degree=curve.spline.k,
                 knots=tuple(curve.spline.t.tolist()),
@@ -98,28 +113,41 @@ def segments_along(
     ]
 
 
+def _end_of(
+    segment: CsvSegment, *, is_last: bool, blend: float | None = None
+) -> dict[str, Any]:
+    """Return the keys that a curve takes from its file's segment, or at a corner from its `blend`, m."""
+    keys: dict[str, Any] = {"blend": blend, "stop": blend is None}
+    if is_last:
+        keys = {key: getattr(segment, key) for key in ("blend", "stop", "dwell")}
+    return {"orientation": segment.orientation, **keys}
+
+
 def _rows(values: Any) -> tuple[tuple[float, ...], ...]:
     return tuple(map(tuple, values.tolist()))
 
 
 def _spline_through(
-    points: Points, report: FitReport, segment: CsvSegment
-) -> SplineSegment:
+    points: Points, report: FitReport, settings: PointFile, *, number: int
+) -> SplineThrough:
+    """Return the spline through the points of a part of a file, of which only the first one has the report.
+
+    Behind a corner the waypoints begin with it, so that the first one after it is passed, however near it is.
+    """
+    first = 0 if number else 1
     places = _rows(points.columns)
     turns = None
     if points.turning.shape[1] == QUATERNION:
         places = _rows(points.position)
         turns = [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()]
-    spline = SplineThrough(
-        through=places[1:],
-        orientations=tuple(turns[1:]) if turns else None,
-        relative=segment.csv.relative,
+    fit = report.model_copy(update={"source": settings.file})
+    return SplineThrough(
+        through=places[first:],
+        orientations=tuple(turns[first:]) if turns else None,
+        relative=settings.relative,
         starts_at=places[0],
         starts_oriented=turns[0] if turns else None,
-        fit=report.model_copy(update={"source": segment.csv.file}),
-    )
-    return SplineSegment(
-        blend=segment.blend, orientation=segment.orientation, spline=spline
+        fit=None if number else fit,
     )
 
 
@@ -131,6 +159,8 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
     TaskError
         It lists the corners.
     """
+    if not report.corners:
+        return
     most = 10
     corners = [
         f"{degrees(corner.angle):.3g} deg at row {corner.row}"
@@ -144,7 +174,7 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
             found=found,
             allowed="no corners",
             where=f"{where}.corner",
-            hint="Set corner: blend to round them within the tolerance",
+            hint="Set corner: blend to round them within the tolerance, or corner: stop to stop there",
         )
     if isinstance(segment.orientation, Rotate | TurnTo):
         raise TaskError(
@@ -252,9 +282,7 @@ def _along_joints(
         starts_at=start,
         joints=table.header,
     )
-    return SplineSegment(
-        blend=segment.blend, orientation=segment.orientation, spline=spline
-    )
+    return SplineSegment(**_end_of(segment, is_last=True), spline=spline)
 
 
 def _check_count(rows: int, path: Path) -> None:
@@ -274,7 +302,7 @@ def fit_path(
     orientations: Any = None,
     speed: Any = None,
     units: Mapping[str, str] | FileUnits | None = None,
-    corner: Literal["blend", "refuse"] = "blend",
+    corner: CornerMode = "blend",
     orientation: OrientationMode = None,
     relative: bool = False,
 ) -> tuple[SplineSegment | BSplineSegment, ...]:
@@ -294,7 +322,7 @@ def fit_path(
         Speed of the tool on the way to each point; NaN where none is prescribed. With a tolerance only.
     units : mapping or FileUnits, optional
         ``{"length": "mm", "angle": "deg", "speed": "mm/min"}``; m, rad (of yaw) and m/s unless given.
-    corner : {"blend", "refuse"}, optional
+    corner : {"blend", "refuse", "stop"}, optional
         As in a task file.
     orientation : optional
         How the tool turns along the path where no orientations are given, as in a task file.

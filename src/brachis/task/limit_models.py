@@ -36,7 +36,6 @@ from brachis.task.fields import (
     NonNegative,
     Number,
     Positive,
-    Share,
     must,
     plain,
     refuse,
@@ -238,9 +237,7 @@ class ProcessSpeed(Model):
     ]
     """[begin, end]: path coordinates between which the speed is held. Outside, the motion is as fast as the limits
     allow. A part may begin at 0 or end at 1 only if the speed of the boundary there equals its speed, or the motion is
-    periodic."""
-    tolerance: Annotated[Share, Field(ge=1e-3, le=0.5)] = 0.01
-    """Largest deviation in either direction, as a share of the speed: 1 % or 0.01."""
+    periodic. A stop needs room beside it."""
 
 
 class ToolLimits(Model):
@@ -261,7 +258,7 @@ class ToolLimits(Model):
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
     ] = ()
-    """Parts of the path with a constant speed: {speed, s, tolerance}, or a list of these in order. Between two parts
+    """Parts of the path with a constant speed: {speed, s}, or a list of these in order. Between two parts
     there must be a gap in which the speed can change."""
 
     @field_validator("process_speed")
@@ -282,8 +279,7 @@ class ToolLimits(Model):
     def _speeds_agree(self) -> ToolLimits:
         for number, part in enumerate(self.process_speed):
             cap = _least_between(self.speed, part.s)
-            slowest = part.speed * (1.0 - part.tolerance)
-            if cap is not None and cap < slowest:
+            if cap is not None and cap < part.speed:
                 raise refuse(
                     "the tool's largest speed is below the process speed",
                     key=f"process_speed[{number}].speed",

@@ -338,6 +338,13 @@ class Task(Model):
                 found=self.path[-1].blend,
                 allowed="no blend on the last segment",
             )
+        if self.path[-1].stop:
+            raise refuse(
+                "the last segment cannot stop: the path ends there, and the motion with it",
+                key=f"path[{len(self.path) - 1}].stop",
+                found=True,
+                allowed="no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
+            )
         return self.check(
             (
                 name is not None and name not in self.frames,

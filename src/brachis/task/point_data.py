@@ -10,7 +10,6 @@ from pydantic import (
     Field,
     Strict,
     WithJsonSchema,
-    field_validator,
 )
 
 from brachis.errors import write_count
@@ -110,6 +109,9 @@ class FitTolerance(Model):
         return self.corner or self.position
 
 
+CornerMode = Literal["blend", "refuse", "stop"]
+
+
 class PointFile(Model):
     """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
 
@@ -129,20 +131,9 @@ class PointFile(Model):
     tolerance: FitTolerance | None = None
     """Largest distance of the points from the path. The path is then a fit with few knots, suitable for many or noisy
     points. Null: the path passes through all points."""
-    corner: Literal["blend", "refuse"] = "blend"
-    """What happens to corners if a tolerance is given. blend: they are rounded within the tolerance. refuse: they are
-    listed in an error."""
-
-    @field_validator("corner", mode="before")
-    @classmethod
-    def _no_stops(cls, corner: object) -> object:
-        if corner == "stop":
-            raise refuse(
-                "a path cannot stop at a corner: it is one motion from rest to rest",
-                found=corner,
-                allowed="blend or refuse; or two tasks, one to the corner and one from it",
-            )
-        return corner
+    corner: CornerMode = "blend"
+    """What happens to corners. stop: the tool stops there. blend: they are rounded within the tolerance. refuse: they
+    are listed in an error. Without a tolerance only stop finds corners."""
 
 
 class FoundCorner(Model):
@@ -155,7 +146,7 @@ class FoundCorner(Model):
     distance: Number
     """Along the path from its first point, m."""
     blend: NonNegative
-    """What its blend takes from either side, m."""
+    """What its blend takes from either side, m; 0 where the tool stops."""
 
 
 class FitReport(Model):
@@ -213,9 +204,9 @@ class FitReport(Model):
         ]
         corners += ["..."] if len(self.corners) > _LISTED else []
         count = write_count(len(self.corners), "corner")
-        text += (
-            f"; {count} blended: {', '.join(corners)}" if corners else "; no corners"
-        )
+        is_blended = any(corner.blend for corner in self.corners)
+        what = "blended" if is_blended else "at which the tool stops"
+        text += f"; {count} {what}: {', '.join(corners)}" if corners else "; no corners"
         return f"{text}; {'; '.join(self.told)}" if self.told else text
 
     def to_dict(self) -> dict[str, Any]:

@@ -240,7 +240,10 @@ def _print_fit(fit: FitReport) -> None:
     if corners:
         columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
         print_table(
-            "corners, blended within the tolerance", columns, corners, numbers=columns
+            "corners, blended within the tolerance; with blend 0 the tool stops",
+            columns,
+            corners,
+            numbers=columns,
         )
 
 

@@ -93,18 +93,8 @@ def _fit_between(
     Raises
     ------
     TaskError
-        The path turns back, or no smooth curve lies within the tolerance.
+        No smooth curve lies within the tolerance.
     """
-    for corner in corners:
-        degrees = np.rad2deg(corner.angle)
-        if degrees > 150.0:
-            raise points.wrong(
-                corner.index,
-                f"the path turns back, by {degrees:.4g} degrees",
-                found=points.describe(corner.index),
-                allowed="corners up to 150 degrees",
-                hint="Make two tasks if the path stops there",
-            )
     curves = []
     for start, end in pairwise([None, *corners, None]):
         before = [start.index] if start else []
@@ -122,6 +112,25 @@ def _fit_between(
         distances, angles = _measure_deviations(whole, fit, tolerance)
         curves.append(FittedCurve(whole, given, fit, distances[given], angles[given]))
     return curves
+
+
+def _refuse_to_turn_back(points: Points, corners: tuple[Corner, ...]) -> None:
+    """Refuse corners that are too sharp to be rounded.
+
+    Raises
+    ------
+    TaskError
+    """
+    for corner in corners:
+        degrees = np.rad2deg(corner.angle)
+        if degrees > 150.0:
+            raise points.wrong(
+                corner.index,
+                f"the path turns back, by {degrees:.4g} degrees",
+                found=points.describe(corner.index),
+                allowed="corners up to 150 degrees",
+                hint="Set corner: stop if the tool stops there",
+            )
 
 
 def _measure_deviations(
@@ -175,7 +184,7 @@ def _blend_between(
             f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance",
             found=f"points {1e3 * taken:.3g} mm from the fit at {first.points.describe(-1)}",
             allowed=f"{1e3 * tolerance.at_corners:.3g} mm",
-            hint="Give a larger tolerance.corner",
+            hint="Give a larger tolerance.corner, or set corner: stop",
         )
     return blend_size(corner.angle, left, shortest)
 
@@ -257,7 +266,11 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
 
 
 def fit_curves(
-    points: Points, tolerance: FitTolerance, notes: tuple[str, ...] = ()
+    points: Points,
+    tolerance: FitTolerance,
+    notes: tuple[str, ...] = (),
+    *,
+    stops: bool = False,
 ) -> tuple[tuple[FittedCurve, ...], FitReport]:
     """Return smooth curves within a tolerance of points, and what was found.
 
@@ -267,6 +280,8 @@ def fit_curves(
     tolerance : FitTolerance
     notes : tuple of str, optional
         What was found out before.
+    stops : bool, optional
+        Whether the tool stops at corners, which are rounded otherwise.
 
     Raises
     ------
@@ -279,19 +294,18 @@ def fit_curves(
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = fill_gaps(points)
     corners = find_corners(points, scatter, tolerance.at_corners)
+    if not stops:
+        _refuse_to_turn_back(points, corners)
     note = plausibility_note(points)
     curves = _fit_between(points, corners, tolerance, scatter, note)
     starts = np.cumsum([0.0, *(curve.length for curve in curves)]).tolist()
     found = []
     for i, corner in enumerate(corners):
-        blend = _blend_between(curves[i], curves[i + 1], corner, tolerance)
-        curves[i] = replace(curves[i], blend=blend)
-        row = int(points.rows[corner.index])
-        found.append(
-            FoundCorner(
-                row=row, angle=corner.angle, distance=starts[i + 1], blend=blend
-            )
-        )
+        blend = 0.0
+        if not stops:
+            blend = _blend_between(curves[i], curves[i + 1], corner, tolerance)
+            curves[i] = replace(curves[i], blend=blend)
+        found.append(_report_corner(points, corner, starts[i + 1], blend))
     sigmas = [start + curve.sigma for start, curve in zip(starts, curves, strict=False)]
     along = np.maximum.accumulate(np.concatenate(sigmas))
     distances = np.concatenate([curve.distances for curve in curves])
@@ -314,6 +328,14 @@ def fit_curves(
     return tuple(curves), report
 
 
+def _report_corner(
+    points: Points, corner: Corner, distance: float, blend: float
+) -> FoundCorner:
+    """Return what the report says of a corner at a distance along the path, m, with its blend, m."""
+    row = int(points.rows[corner.index])
+    return FoundCorner(row=row, angle=corner.angle, distance=distance, blend=blend)
+
+
 def _profile(*columns: Array) -> tuple[Any, ...]:
     """Return the largest values of columns in successive groups of rows, at most a few hundred groups."""
     count = len(columns[0])
@@ -321,6 +343,19 @@ def _profile(*columns: Array) -> tuple[Any, ...]:
     starts = np.unique(groups)
     largest = [np.maximum.reduceat(values, starts).tolist() for values in columns]
     return tuple(zip(*largest, strict=True))
+
+
+def cut_at_corners(points: Points, report: FitReport) -> tuple[list[Points], FitReport]:
+    """Return the parts of points between corners, which are their first and last points; report the corners."""
+    corners = find_corners(points, scatter_of(points), 0.0)
+    distances = np.append(0.0, np.cumsum(points.steps))
+    cuts = [0, *(corner.index for corner in corners), len(points) - 1]
+    parts = [points.only(slice(first, last + 1)) for first, last in pairwise(cuts)]
+    found = [
+        _report_corner(points, corner, float(distances[corner.index]), 0.0)
+        for corner in corners
+    ]
+    return parts, report.model_copy(update={"corners": tuple(found)})
 
 
 def check_interpolation(points: Points, notes: tuple[str, ...] = ()) -> FitReport:
