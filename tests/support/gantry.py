@@ -1,7 +1,7 @@
-"""A motion of a gantry by hand: a line, a wait at a corner, and a line of which the tool passes a part at a given speed.
+"""A motion of a gantry by hand: a line, a wait at a corner, and a line with a given speed on a part of it.
 
-The tool moves 0.4 m in x and 0.6 m in y, so that s is a length in m. The gantry has two slides in x: the first one, j1,
-is redundant and moves by 0.2 m in all.
+The tool moves 0.4 m in x and 0.6 m in z, so that s is a length in m. The gantry has two slides in x: the first one,
+j1, is redundant and moves by 0.2 m in all.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SPEED = 0.3
 TASK: dict[str, Any] = {
     "brachis": 1,
     "start": {"joints": [0.0, 0.0, 0.0]},
-    "task_space": ["x", "y"],
+    "task_space": ["x", "z"],
     "path": [
         {"line": {"by": [0.4, 0.0]}, "dwell": DWELL},
         {"line": {"by": [0.0, 0.6]}},
@@ -34,13 +34,15 @@ TASK: dict[str, Any] = {
 
 
 def gantry_urdf() -> str:
-    """Slides j1 and j2 along x, and j3 along y."""
+    """Slides j1 and j2 along x, and j3 along z, against gravity."""
     limit = {"lower": -2.0, "upper": 2.0, "velocity": 2.0, "effort": 100.0}
-    axes = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    axes = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     return chain_urdf([Joint("prismatic", axis=axis, limit=limit) for axis in axes])
 
 
-def quintic(t_end: float, begin: tuple[float, float], end: tuple[float, float]) -> Any:
+def quintic(
+    t_end: float, begin: tuple[float, float], end: tuple[float, float]
+) -> PhaseSpline:
     """The curves s(t) and q1(t) of a phase, from s and ds/dt at its ends, without an acceleration there."""
     (s0, v0), (s1, v1) = begin, end
     before = s0 + v0 * t_end / DEGREE * np.arange(3)
@@ -98,5 +100,5 @@ def _at(spline: PhaseSpline, t: float) -> np.ndarray:
     s, redundant = motion.T
     middle = spline.control_points[0].mean()
     corner = np.array([0.4, 0.0, 0.0])
-    x, y = (s, 0.0 * s) if middle < 0.4 else (corner, s - corner)
-    return np.stack([redundant, x - redundant, y], axis=1)
+    x, z = (s, 0.0 * s) if middle < 0.4 else (corner, s - corner)
+    return np.stack([redundant, x - redundant, z], axis=1)

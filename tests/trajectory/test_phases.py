@@ -47,10 +47,9 @@ def test_derivatives_of_a_phase_are_per_second():
     t = np.linspace(0.05, 0.65, 9)
     h = 1e-5
     orders = spline.at(t)
-    for lower, higher in zip(orders, orders[1:], strict=False):
-        place = [part is lower for part in orders].index(True)
-        slope = (spline.at(t + h)[place] - spline.at(t - h)[place]) / (2.0 * h)
-        np.testing.assert_allclose(slope, higher, rtol=1e-5, atol=1e-4)
+    for order in range(3):
+        slope = (spline.at(t + h)[order] - spline.at(t - h)[order]) / (2.0 * h)
+        np.testing.assert_allclose(slope, orders[order + 1], rtol=1e-5, atol=1e-3)
 
 
 def test_more_knots_leave_the_curves_as_they_are():
@@ -94,8 +93,7 @@ def test_splines_of_the_whole_motion_are_those_of_the_phases(motion):
 def test_at_the_end_of_a_phase_the_spline_is_the_next_ones(motion):
     end = motion.phases[1].end
     jerk = motion.path_spline(np.array([np.nextafter(end, 0.0), end]), nu=3)
-    assert jerk[0] == 0.0
-    assert jerk[1] > 1.0
+    np.testing.assert_allclose(jerk, [0.0, 60.0 * 0.15 - 24.0 * SPEED], atol=1e-9)
 
 
 def test_a_file_has_the_phases(motion, tmp_path):

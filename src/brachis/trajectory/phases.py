@@ -63,7 +63,8 @@ class PhaseSpline(Summary):
         for knot in np.unique(knots):
             if np.abs(self.knots - knot).min() > tolerances.TIME:
                 spline = insert(knot, spline)
-        return PhaseSpline(self.t_end, knots, self.degree, spline.c.T)
+        points = spline.c[: len(knots) - self.degree - 1].T  # without what SciPy pads
+        return PhaseSpline(self.t_end, knots, self.degree, points)
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""

@@ -24,20 +24,14 @@ def check_progress(given: Given) -> list[Check]:
     for phase, curves in zip(trajectory.phases, trajectory.phase_splines, strict=True):
         inside = (given.states.t >= phase.begin) & (given.states.t <= phase.end)
         times, velocity = _path_speeds(curves, given.states.t[inside] - phase.begin)
-        slowest = int(np.argmin(velocity))
-        found.append((float(velocity[slowest]), phase.begin + float(times[slowest])))
-    least, when = min(found)
-    backwards = max(0.0, -least)
+        found.append(np.stack([phase.begin + times, velocity]))
+    times, velocity = np.hstack(found)
+    backwards = abs(float(np.minimum(0.0, velocity).min()))
+    time = float(times[int(np.argmin(velocity))]) if backwards else None
     s = np.array([[phase.s_begin, phase.s_end] for phase in trajectory.phases])
     ends = float(np.abs([s[0, 0], s[-1, -1] - 1.0]).max())
     checks = [
-        Check(
-            "ds/dt below zero",
-            backwards,
-            allowed,
-            "1/s",
-            time=when if backwards else None,
-        ),
+        Check("ds/dt below zero", backwards, allowed, "1/s", time=time),
         Check("s at the ends", ends, allowed, "-"),
     ]
     if len(s) > 1:
@@ -192,7 +186,7 @@ def check_continuity(given: Given) -> list[Check]:
             left = getattr(before, part)
             scale = 1.0 + np.abs(left).max(initial=0.0)
             jumps = np.abs(getattr(after, part) - left).max(axis=1, initial=0.0)
-            if name in ("acceleration", "torque") and what == " jump":
+            if part in ("qddot", "tau") and what == " jump":
                 jumps[at_stops] = 0.0
             value = float(jumps.max(initial=0.0) / scale)
             time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None

@@ -15,7 +15,8 @@ from brachis.verify.report import Check
 _DWELL = 1e-9
 """s: a dwell that is so much longer or shorter is as long as asked; end times are known to 1e-15 of themselves."""
 _SPEED = 1e-6
-"""Relative deviation from a given speed that passes: it is met to rounding, of which quintic pieces leave 1e-8."""
+"""Relative deviation from a given speed that passes: s(t) is given, so that only rounding and what lies between the
+nodes is left."""
 _RESOLUTION = 1e-3
 """Deviations are searched in this unit: `worst_between` tells values apart that differ by 5e-6 units."""
 
@@ -104,7 +105,7 @@ def check_process_speed(given: Given) -> list[Check]:
         part = given.during(phase.begin, phase.end)
         worst = worst_between(part, deviations, (subject,))
         found.append(worst._replace(ratio=worst.ratio * _RESOLUTION))
-    worst = max(found, key=lambda each: each.ratio)
+    worst = found[int(np.argmax([each.ratio for each in found]))]
     speed = (worst.ratio, _SPEED, "relative", worst.subject, worst.time, worst.remark)
     tolerance = given.options.progress_tolerance
     return [
