@@ -13,7 +13,6 @@ from brachis.errors import InputError
 from brachis.optimise.bspline import insert_knots
 from brachis.robot import dynamics
 from brachis.robot.limits import MAGNITUDES
-from brachis.task import ProcessSpeed
 from brachis.task.limit_models import ToolLimits
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
@@ -98,7 +97,6 @@ ORDERS = {
     "tool speed": 1,
     "tool acceleration": 2,
     "tool angular speed": 1,
-    "process speed": 1,
     "power": 1,
     "total power": 1,
 }
@@ -122,17 +120,6 @@ def limited_to(trajectory, kind):
     states = trajectory.at(t)
     if kind == "position":
         return with_limits(free, position_upper=states.q.max(axis=0) + 1e-3), 1.0
-    if kind == "process speed":
-        # Between 40 and 60 % of the path the speed is between the first and the last of these.
-        speed = states.tool_speed[(states.s > 0.4) & (states.s < 0.6)]
-        middle, off = (
-            0.5 * (speed.max() + speed.min()),
-            0.5 * (speed.max() - speed.min()),
-        )
-        part = ProcessSpeed(
-            s=(0.4, 0.6), speed=middle, tolerance=min(1.5 * off / middle, 0.5)
-        )
-        return with_tool_limits(free, process_speed=(part,)), 3.0 * middle
     if kind.startswith("tool"):
         spin = np.abs(states.qdot.sum(axis=1)).max()
         bend = np.linalg.norm(

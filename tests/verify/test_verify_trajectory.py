@@ -29,6 +29,7 @@ def faster(trajectory, factor):
     return replace(
         t,
         times=t.times / factor,
+        phase_ends=t.phase_ends / factor,
         qdot=t.qdot * factor,
         qddot=t.qddot * factor**2,
         qddot_before=t.qddot_before * factor**2,

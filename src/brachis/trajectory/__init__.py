@@ -1,5 +1,11 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
+from brachis.trajectory.phases import (
+    MotionPhase,
+    PhaseSpline,
+    join_splines,
+    split_splines,
+)
 from brachis.trajectory.recovered import Recovered, check_tolerance
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
@@ -15,10 +21,14 @@ __all__ = [
     "CONTINUOUS_TORQUE",
     "SCHEMA",
     "Motion",
+    "MotionPhase",
+    "PhaseSpline",
     "Recovered",
     "Samples",
     "Trajectory",
     "check_tolerance",
+    "join_splines",
     "motion_of",
     "of_motion",
+    "split_splines",
 ]

@@ -37,13 +37,13 @@ def check_tolerance(tolerance: float) -> float:
 
 
 class StoredRecovery(Model, extra="ignore", strict=True):
-    """What a result file says of a motion that was not planned; the rows are missing in schema 2."""
+    """What a result file says of a motion that was not planned."""
 
     source: str
     tolerance: float
     told: list[str]
-    rows: list[list[float]] | None = None
-    error: list[float] | None = None
+    rows: list[list[float]]
+    error: list[float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,7 @@ class Recovered:
     told : tuple of str
         What is known, and what is not, in plain words.
     rows : (K, 1 + n) ndarray
-        Times, s, and joint positions, rad or m, as the file has them; none where they are not known, as in result
-        files of schema 2. Read-only.
+        Times, s, and joint positions, rad or m, as the file has them. Read-only.
     error : (n,) ndarray
         How far these positions may be off, rad or m. Read-only.
     """
@@ -103,11 +102,9 @@ class Recovered:
         InputError
             The rows are not those of such a motion.
         """
-        rows = numbers(
-            stored.rows or np.empty((0, 1 + n)), "recovered.rows", "s, then rad or m"
-        )
-        error = np.array(stored.error or np.zeros(n))
-        fits = rows.shape == (len(rows), 1 + n) and len(rows) != 1
+        rows = numbers(stored.rows, "recovered.rows", "s, then rad or m")
+        error = np.array(stored.error)
+        fits = rows.shape == (len(rows), 1 + n) and len(rows) > 1
         if not (fits and error.shape == (n,) and (np.diff(rows[:, 0]) > 0.0).all()):
             raise InputError(
                 "not the rows of a file",

@@ -23,9 +23,10 @@ from brachis.robot.from_task import robot_from_settings
 from brachis.task import load_task
 from brachis.task.fields import LARGEST, Model
 from brachis.task.messages import task_error
+from brachis.trajectory.phases import phase_places
 from brachis.trajectory.recovered import Recovered, StoredRecovery
 
-SCHEMA = 3
+SCHEMA = 4
 ARRAYS = (
     "times",
     "q",
@@ -34,6 +35,7 @@ ARRAYS = (
     "qddot_before",
     "knots",
     "control_points",
+    "phase_ends",
     "chart_rows",
     "chart_knots",
 )
@@ -120,13 +122,15 @@ def read_result(path: Path) -> dict[str, Any]:
             allowed="a file written by brachis plan",
         ) from error
     schema = meta.get("schema")
-    if schema not in (2, SCHEMA):
+    if schema != SCHEMA:
         raise ResultFileError(
-            "unknown schema version", where=where, found=schema, allowed=SCHEMA
+            "unknown schema version",
+            where=where,
+            found=schema,
+            allowed=SCHEMA,
+            hint="Plan again, or load the file with the release that wrote it",
         )
     try:
-        if schema != SCHEMA:
-            meta["task"] = _renew_task(meta.get("task"))
         return _check_parts(_Meta.model_validate(meta), arrays)
     except (ValidationError, InputError) as error:
         found: Exception = error
@@ -154,33 +158,14 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
     stream.seek(0)
     with np.load(stream, allow_pickle=False) as archive:
         meta = json.loads(str(archive["meta"]))
-        arrays = {name: archive[name] for name in ARRAYS}
-    if not isinstance(meta, dict):
-        raise ValueError("the metadata are not a mapping")  # noqa: TRY004  (a wrong file, not a wrong call)
+        if not isinstance(meta, dict):
+            raise ValueError("the metadata are not a mapping")  # noqa: TRY004  (a wrong file, not a wrong call)
+        ours = meta.get("schema") == SCHEMA
+        arrays = {name: archive[name] for name in ARRAYS if ours}
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):  # of a member without the suffix .npy
             raise ValueError(f"{name} is not an array")  # noqa: TRY004
     return meta, arrays
-
-
-def _renew_task(part: Any) -> Any:
-    """Write a task, or a part of one, of a file of schema 2 as tasks are written now: the order of quaternions."""
-    if isinstance(part, list):
-        return [_renew_task(each) for each in part]
-    if not isinstance(part, dict):
-        return part
-    renewed = {
-        "quaternion_wxyz" if key == "quaternion" else key: _renew_task(value)
-        for key, value in part.items()
-    }
-    place = renewed.get("path_start")
-    of_pose = renewed.get("task_space") in ("pose", "pose_free_roll")
-    if isinstance(place, list) and of_pose:
-        renewed["path_start"] = {"position": place[:3], "quaternion_wxyz": place[3:]}
-    turn = renewed.get("rotate")
-    if isinstance(turn, dict) and turn.get("frame") == "world":
-        renewed["rotate"] = {**turn, "frame": "path"}
-    return renewed
 
 
 def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -294,11 +279,25 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
         found=_describe(knots),
         allowed=f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_MOST['degree']}",
     )
+    inner = knots[degree : len(knots) - degree]
+    ends = knots[phase_places(knots, degree)]
+    gaps = np.diff(inner)
     _refuse_unless(
-        bool((np.diff(knots[degree : len(knots) - degree]) >= shortest).all()),
+        bool(((gaps >= shortest) | np.isin(inner[1:], ends) & (gaps == 0.0)).all()),
         "internal knots are repeated",
         where="knots",
-        allowed=f"every internal knot once, at least {shortest:g} apart",
+        allowed=f"every internal knot once, at least {shortest:g} apart, or degree + 1 times where phases meet",
+    )
+    phase_ends = arrays["phase_ends"]
+    fits = phase_ends.shape == (len(ends) - 1,) and phase_ends[-1] == times[-1]
+    _refuse_unless(
+        fits
+        and bool(np.isin(phase_ends, times).all())
+        and bool((np.abs(phase_ends / times[-1] - ends[1:]) <= shortest).all()),
+        "not the ends of the phases",
+        where="phase_ends",
+        found=_describe(phase_ends),
+        allowed="times of nodes, where knots are repeated; the last one is the end time",
     )
     shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
     shapes["control_points"] = (1 + r, len(knots) - degree - 1)

@@ -7,10 +7,13 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 
-from brachis.common.arrays import freeze
+from brachis.common.arrays import freeze, with_like_signs
 from brachis.common.summary import Summary
 from brachis.errors import NotInstalledError
+from brachis.robot import Robot
+from brachis.robot.task_map import Pose
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,3 +101,29 @@ class Samples(Summary):
             "K": len(self),
             "n": self.q.shape[1],
         }
+
+
+def tool_motion(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pose and speed of the tool frame in the world.
+
+    Parameters
+    ----------
+    robot : Robot
+    q, qdot : (K, n) ndarray
+
+    Returns
+    -------
+    position : (K, 3) ndarray
+        m.
+    quaternion : (K, 4) ndarray
+        w, x, y, z, of length 1, with signs such that neighbours are close.
+    speed : (K,) ndarray
+        m/s.
+    """
+    position, rotations = robot.tool_placements(q)
+    coefficients = [pin.Quaternion(rotation).coeffs() for rotation in rotations]
+    quaternion = np.roll(np.reshape(coefficients, (-1, 4)), 1, axis=1)
+    velocity = np.einsum("ikn,kn->ik", Pose(robot).twists(q)[:3], qdot)
+    return position, with_like_signs(quaternion), np.linalg.norm(velocity, axis=0)

@@ -28,20 +28,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from brachis.common import tolerances
 from brachis.common.arguments import file_name, number, numbers
-from brachis.common.arrays import freeze, with_like_signs
+from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError, UnknownNameError, write_apart, write_count
 from brachis.robot import Robot, dynamics
-from brachis.robot.task_map import Pose
 from brachis.task import Task
+from brachis.trajectory.phases import (
+    MotionPhase,
+    PhaseSpline,
+    list_phases,
+    split_splines,
+    times_of_knots,
+)
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
-from brachis.trajectory.samples import Samples
+from brachis.trajectory.samples import Samples, tool_motion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,32 +109,6 @@ def piece_coefficients(
     return np.stack(positions), np.stack([m - a + b, m - 2.0 * b, m + a + b])
 
 
-def tool_motion(
-    robot: Robot, q: np.ndarray, qdot: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pose and speed of the tool frame in the world.
-
-    Parameters
-    ----------
-    robot : Robot
-    q, qdot : (K, n) ndarray
-
-    Returns
-    -------
-    position : (K, 3) ndarray
-        m.
-    quaternion : (K, 4) ndarray
-        w, x, y, z, of length 1, with signs such that neighbours are close.
-    speed : (K,) ndarray
-        m/s.
-    """
-    position, rotations = robot.tool_placements(q)
-    coefficients = [pin.Quaternion(rotation).coeffs() for rotation in rotations]
-    quaternion = np.roll(np.reshape(coefficients, (-1, 4)), 1, axis=1)
-    velocity = np.einsum("ikn,kn->ik", Pose(robot).twists(q)[:3], qdot)
-    return position, with_like_signs(quaternion), np.linalg.norm(velocity, axis=0)
-
-
 CONTINUOUS_TORQUE = 3
 """Least B-spline degree that gives continuous acceleration, and so torque."""
 
@@ -157,12 +136,14 @@ class Trajectory(Summary):
         Joint motion at the nodes.
     qddot_before : (L + 1, n) ndarray
         Acceleration just before the nodes; differs from `qddot` at knots of splines of degree 2.
-    knots : (N + 2 d + 1,) ndarray
-        B-spline knots in normalised time.
+    knots : ndarray
+        B-spline knots in normalised time, N + 2 d + 1 of one phase; those where phases meet d + 1 times.
     degree : int
         B-spline degree d.
     control_points : (1 + r, N + d) ndarray
         Of s (dimensionless), then of each redundant joint (rad or m) in chain order, or of the chart's sigma.
+    phase_ends : (P,) ndarray
+        Times at which the phases end, ascending, s; the last one is t_end. Most motions have one phase.
     chart_rows : (B, r, n + 1) ndarray
         Coefficients of the chart in which the motion was planned, see `brachis.kinematics.ChartRows`; B = 0 where a
         closed form took its place.
@@ -193,6 +174,7 @@ class Trajectory(Summary):
     knots: np.ndarray
     degree: int
     control_points: np.ndarray
+    phase_ends: np.ndarray
     chart_rows: np.ndarray
     chart_knots: np.ndarray
     recovered: Recovered | None = None
@@ -247,7 +229,21 @@ class Trajectory(Summary):
     def _spline(self, control_points: np.ndarray) -> BSpline:
         from scipy.interpolate import BSpline
 
-        return BSpline(self.knots * self.t_end, control_points, self.degree)
+        knots = times_of_knots(self.knots, self.degree, self.phase_ends)
+        return BSpline(knots, control_points, self.degree)
+
+    @cached_property
+    def phase_splines(self) -> tuple[PhaseSpline, ...]:
+        """Curves of each phase: s, then the redundant joints or sigma."""
+        return split_splines(
+            self.knots, self.degree, self.control_points, self.phase_ends
+        )
+
+    @cached_property
+    def phases(self) -> tuple[MotionPhase, ...]:
+        """What each phase is: its times, its part of the path, and its given speed."""
+        speeds = self.task.tool_limits.process_speed
+        return list_phases(self.phase_splines, self.phase_ends, speeds)
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
         """Path coordinate s at times `t`, same shape."""
@@ -367,7 +363,7 @@ class Trajectory(Summary):
         """Return what is shown."""
         none = "none by name: a chart" if self.chart_rows.size else "none"
         source = Path(self.robot.source)
-        intervals = write_count(len(self.knots) - 2 * self.degree - 1, "interval")
+        intervals = write_count(len(np.unique(self.knots)) - 1, "interval")
         return {
             "end time": f"{self.t_end:.4f} s",
             "robot": f"{source.parent.name}/{source.name}",

@@ -7,33 +7,55 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import UNITS
-from brachis.trajectory import CONTINUOUS_TORQUE
+from brachis.trajectory import CONTINUOUS_TORQUE, PhaseSpline
 from brachis.verify.motion import Given, MotionStates
+from brachis.verify.phases import times_of_stops
 from brachis.verify.report import Check
 
 
 def check_progress(given: Given) -> list[Check]:
     """Check that the path is travelled once, forwards, from its beginning to its end.
 
-    ds/dt is checked at the times of the states, at knots, and where its derivative vanishes.
+    ds/dt is checked, phase by phase, at the times of the states, at knots, and where its derivative vanishes.
     """
-    from scipy.interpolate import PPoly
-
-    spline = given.trajectory.path_spline
+    trajectory = given.trajectory
     allowed = given.options.progress_tolerance
-    curvature = PPoly.from_spline(spline.derivative(2).tck)
-    turning = curvature.roots(discontinuity=True, extrapolate=False)
-    times = np.concatenate(
-        [given.states.t, np.unique(spline.t), turning[np.isfinite(turning)]]
-    )
-    velocity = spline(times, nu=1)
-    backwards = float(np.maximum(0.0, -velocity).max())
+    found = []
+    for phase, curves in zip(trajectory.phases, trajectory.phase_splines, strict=True):
+        inside = (given.states.t >= phase.begin) & (given.states.t <= phase.end)
+        times, velocity = _path_speeds(curves, given.states.t[inside] - phase.begin)
+        found.append(np.stack([phase.begin + times, velocity]))
+    times, velocity = np.hstack(found)
+    backwards = abs(float(np.minimum(0.0, velocity).min()))
     time = float(times[int(np.argmin(velocity))]) if backwards else None
-    ends = float(np.abs([spline(0.0), spline(given.trajectory.t_end) - 1.0]).max())
-    return [
+    s = np.array([[phase.s_begin, phase.s_end] for phase in trajectory.phases])
+    ends = float(np.abs([s[0, 0], s[-1, -1] - 1.0]).max())
+    checks = [
         Check("ds/dt below zero", backwards, allowed, "1/s", time=time),
         Check("s at the ends", ends, allowed, "-"),
     ]
+    if len(s) > 1:
+        jumps = np.abs(s[1:, 0] - s[:-1, 1])
+        worst = int(np.argmax(jumps))
+        time = trajectory.phases[worst].end
+        jump = float(jumps[worst])
+        checks.append(Check("s where phases meet", jump, allowed, "-", time=time))
+    return checks
+
+
+def _path_speeds(
+    curves: PhaseSpline, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return ds/dt, 1/s, of a phase at times since its beginning, s, at its knots, and wherever it turns."""
+    from scipy.interpolate import BSpline, PPoly
+
+    knots = curves.knots * curves.t_end
+    spline = BSpline(knots, curves.control_points[0], curves.degree)
+    curvature = PPoly.from_spline(spline.derivative(2).tck)
+    turning = curvature.roots(discontinuity=True, extrapolate=False)
+    found = [times, np.unique(knots), turning[np.isfinite(turning)]]
+    times = np.concatenate(found).clip(0.0, curves.t_end)
+    return times, spline(times, nu=1)
 
 
 def check_ends(given: Given) -> list[Check]:
@@ -140,13 +162,19 @@ def check_splines(given: Given) -> list[Check]:
 
 
 def check_continuity(given: Given) -> list[Check]:
-    """Check jumps where polynomial pieces join, and where a periodic motion goes on from its end to its beginning."""
+    """Check jumps where polynomial pieces join, and where a periodic motion goes on from its end to its beginning.
+
+    Acceleration and torque may jump at stops, unless rest means that the acceleration vanishes.
+    """
     pieces = given.pieces
     last = len(pieces.lengths) - 1
     ends = np.arange(last)
     joins = {" jump": (ends, ends + 1)}
     if given.task.boundary.periodic:
         joins[" over the seam"] = (np.array([last]), np.array([0]))
+    at_stops = np.zeros(last, dtype=bool)
+    if given.task.spline.vanishing == 1:
+        at_stops = np.isin(pieces.times[1:-1], times_of_stops(given))
     names = {"position": "q", "velocity": "qdot"}
     if given.trajectory.degree >= CONTINUOUS_TORQUE:  # a lower degree lets them jump
         names |= {"acceleration": "qddot", "torque": "tau"}
@@ -158,6 +186,8 @@ def check_continuity(given: Given) -> list[Check]:
             left = getattr(before, part)
             scale = 1.0 + np.abs(left).max(initial=0.0)
             jumps = np.abs(getattr(after, part) - left).max(axis=1, initial=0.0)
+            if part in ("qddot", "tau") and what == " jump":
+                jumps[at_stops] = 0.0
             value = float(jumps.max(initial=0.0) / scale)
             time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
             allowed = given.options.jump_tolerance

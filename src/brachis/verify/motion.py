@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
-from brachis.common import tolerances
 from brachis.errors import InputError
 from brachis.path import Path
+from brachis.path.legs import Leg, legs_of
 from brachis.robot import Robot, TaskMap
 from brachis.task import Task
 from brachis.trajectory import Trajectory
@@ -253,12 +254,16 @@ class Given:
         apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > SAME_PLACE)
         return replace(self, states=both.only(np.append(True, apart)))
 
-    def within(self, begin: float, end: float) -> Given:
-        """Return the same with only the states in a part of the path, its ends included."""
-        more = self.with_states_at(np.array([begin, end]))
-        s = more.states.s
-        inside = (s >= begin - tolerances.PATH) & (s <= end + tolerances.PATH)
-        return replace(more, states=more.states.only(inside))
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """Parts of the path that the task has one phase pass each, read anew."""
+        return legs_of(self.task, self.task_map, self.path)
+
+    def during(self, begin: float, end: float) -> Given:
+        """Return the same with only the states of the pieces between the times of two nodes, s."""
+        first, last = np.searchsorted(self.pieces.times, [begin, end])
+        inside = (self.states.piece >= first) & (self.states.piece < last)
+        return replace(self, states=self.states.only(inside))
 
 
 MOST_INSTANTS = 200_000

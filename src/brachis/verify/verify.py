@@ -27,6 +27,7 @@ from brachis.verify.checks import (
 from brachis.verify.limits import check_limits
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Given, MotionStates, Pieces, all_places
+from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions
 
 
@@ -37,7 +38,7 @@ def verify_trajectory(
     robot: Robot | None = None,
     own_limits: Sequence[LimitModel] = (),
 ) -> Verification:
-    """Check path, limits, progress, start and end, splines, and continuity of a trajectory.
+    """Check path, limits, progress, stops, given speeds, start and end, splines, and continuity of a trajectory.
 
     Parameters
     ----------
@@ -95,6 +96,8 @@ def verify_trajectory(
         path_check,
         *ratios,
         *check_progress(given),
+        *check_stops(given),
+        *check_process_speed(given),
         *check_ends(given),
         *check_splines(given),
         *check_continuity(given),

@@ -66,7 +66,11 @@ def test_check_and_reference(slide, tmp_path):
 
 def test_a_motion_that_is_no_optimum_is_refused(slide, tmp_path):
     trajectory = loaded(slide(intervals=10, rest="full"), tmp_path)
-    slow = dataclasses.replace(trajectory, times=2.0 * trajectory.times)
+    slow = dataclasses.replace(
+        trajectory,
+        times=2.0 * trajectory.times,
+        phase_ends=2.0 * trajectory.phase_ends,
+    )
     with pytest.raises(PlanningError, match="found a different optimum") as caught:
         brachis.bottleneck.report(slow)
     assert f"{trajectory.t_end:.3f}"[:4] in caught.value.found

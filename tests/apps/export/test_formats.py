@@ -167,6 +167,7 @@ def ur10(line_trajectory):
         "times": times,
         "q": q,
     }
+    parts["phase_ends"] = times[-1:]
     none = {"chart_rows": np.empty((0, 0, 0)), "chart_knots": np.empty(0)}
     return Trajectory(**parts, **none, qdot=rest, qddot=rest, qddot_before=rest)
 

@@ -57,6 +57,7 @@ def spatial_trajectory(line_trajectory):
         urdf=robot.urdf,
         redundant_joints=("rail",),
         times=np.array([0.0, 1.1]),
+        phase_ends=np.array([1.1]),
         q=q,
         qdot=np.zeros_like(q),
         qddot=np.zeros_like(q),

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.apps import bottleneck, comparison, export, plots
+from brachis.apps import bottleneck, export, plots
 from brachis.apps.recording import import_motion, read_recording
 from brachis.apps.recording.nodes import nodes_of
 from brachis.apps.recording.recording import Recording
 from brachis.errors import InputError, PathError, ResultFileError
-from brachis.planner import plan
 from brachis.robot import Robot
 from brachis.trajectory import Recovered, Trajectory
 from brachis.verify import verify_trajectory
-from support.result_files import with_parts
 
 from .conftest import DT, ROOT, SCARA
 
@@ -59,36 +57,6 @@ def test_what_is_known_of_it_is_saved(imported, tmp_path):
     export.write(again, tmp_path / "again.csv", dt=0.01)
     (ax, *_) = plots.plot_motion(again).axes
     assert ax.lines[0].get_xdata()[-1] == again.t_end
-
-
-def test_the_rows_of_a_file_of_schema_2_are_not_known(imported, tmp_path):
-    imported.save(tmp_path / "today.npz")
-    old = with_parts(
-        tmp_path / "today.npz",
-        schema=2,
-        recovered=lambda now: {
-            name: now[name] for name in ("source", "tolerance", "told")
-        },
-    )
-    again = Trajectory.load(old)
-    assert again.recovered.to_dict() == imported.recovered.to_dict()
-    assert again.recovered.rows.shape == (0, 1 + imported.robot.n)
-    assert comparison.bound_ratios(imported)
-    assert comparison.bound_ratios(again) == ()
-    again.save(tmp_path / "again.npz")
-    assert (
-        Trajectory.load(tmp_path / "again.npz").recovered.to_file()
-        == again.recovered.to_file()
-    )
-    result = plan(again.task, intervals=8, effort="single", least_motion=False)
-    found = comparison.Comparison(again, verify_trajectory(again), (), result)
-    assert found.uses == ()
-    assert found.to_dict()["today_within_limits"] is None
-    assert "the rows of the recorded motion are not known" in str(found)
-    assert "prove" not in str(found)
-    assert "between its rows" not in str(
-        comparison.plot_both_motions(found).axes[2].get_legend_handles_labels()[1]
-    )
 
 
 def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):

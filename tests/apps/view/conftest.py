@@ -24,6 +24,7 @@ def motion_of(line_result):
             urdf=robot.urdf,
             redundant_joints=(),
             times=np.array([0.0, 1.1]),
+            phase_ends=np.array([1.1]),
             q=q,
             qdot=np.zeros_like(q),
             qddot=np.zeros_like(q),

@@ -81,7 +81,7 @@ class Comparison(Summary):
     verification : Verification
         Of the recorded motion, as interpolated from its rows.
     proven : tuple of RatioBounds
-        What its rows alone prove, limit by limit; empty if they are not known.
+        What its rows alone prove, limit by limit.
     result : Result
         Of the plan along the same path, within the same limits.
 
@@ -152,10 +152,6 @@ class Comparison(Summary):
             remarks.append(
                 "the recorded rows begin or end with an acceleration, so the plan may do so as well (rest: velocity)"
             )
-        if not self.proven:
-            remarks.append(
-                "the rows of the recorded motion are not known: import its CSV file again to compare it with the limits"
-            )
         return tuple(remarks)
 
     def summary(self) -> dict[str, object]:
@@ -197,7 +193,7 @@ class Comparison(Summary):
             "saved": self.saved,
             "verdict": self.verdict,
             "verified": self.result.verified,
-            "today_within_limits": not self.exceeded if self.proven else None,
+            "today_within_limits": not self.exceeded,
             "remarks": list(self.remarks),
             "limits": uses,
             "recovered": self.recorded.recovered.to_dict(),

@@ -53,11 +53,9 @@ class RatioBounds:
 
 
 def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
-    """Compare the rows of an imported motion with every limit of its task; empty if the rows are not known."""
+    """Compare the rows of an imported motion with every limit of its task."""
     assert trajectory.recovered is not None
     t = trajectory.recovered.rows[:, 0]
-    if not len(t):
-        return ()
     robot, _ = bind(trajectory.robot, trajectory.task.task_space)
     bounds = []
     for limit in limits_of(robot, trajectory.task):

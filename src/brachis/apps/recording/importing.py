@@ -169,6 +169,7 @@ def import_motion(
         knots=knots,
         degree=DEGREE,
         control_points=control_points[None],
+        phase_ends=nodes.t[-1:],
         chart_rows=np.empty((0, 0, 0)),
         chart_knots=np.empty(0),
         recovered=recovered,

@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.robot import ROLL_JOINT, Robot
-from brachis.task import ProcessSpeed, SpeedTable
+from brachis.task import SpeedTable
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.motion import Given, MotionStates
 
 
-def _frame_motion(robot: Robot, states: MotionStates, vector: str) -> np.ndarray:
+def frame_motion(robot: Robot, states: MotionStates, vector: str) -> np.ndarray:
     """Sizes, (K, 1), of the tool frame's velocity (``linear``, m/s; ``angular``, rad/s), or ``acceleration``, m/s^2.
 
     The virtual joint of a free roll does not turn the tool.
@@ -45,7 +45,7 @@ def _worst_motion(key: str, vector: str, given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        return _frame_motion(given.robot, states, vector) / limit
+        return frame_motion(given.robot, states, vector) / limit
 
     return worst_between(given, ratios, ("tool",))
 
@@ -74,7 +74,7 @@ def _worst_speed(given: Given) -> Worst | None:
             within = (s >= table.s[0] - _SAME_S) & (s <= table.s[-1] + _SAME_S)
             holds = within | (table is limits.speed)
             limit = np.where(holds, np.minimum(limit, _speed_limit(table, s)), limit)
-        return _frame_motion(given.robot, states, "linear") / limit[:, None]
+        return frame_motion(given.robot, states, "linear") / limit[:, None]
 
     places = np.unique([place for table in tables for place in table.s])
     return worst_between(given.with_states_at(places), ratios, ("tool",))
@@ -88,29 +88,8 @@ def _speed_limit(table: SpeedTable, s: np.ndarray) -> np.ndarray:
     return np.minimum(before, behind)
 
 
-def _worst_process_speed(side: float, given: Given) -> Worst | None:
-    """Find the part of the path with the largest excess of a process speed (side 1), or the largest shortfall (-1).
-
-    A ratio of 1 is at the tolerance; a ratio of 2 less the tolerance is a tool at rest.
-    """
-    parts = given.task.tool_limits.process_speed
-    found = []
-    for part in parts:
-        begin, end = part.s
-
-        def ratios(states: MotionStates, part: ProcessSpeed = part) -> np.ndarray:
-            speeds = _frame_motion(given.robot, states, "linear")
-            return 1.0 - part.tolerance + side * (speeds / part.speed - 1.0)
-
-        where = "tool" if len(parts) == 1 else f"tool, s = {begin:g} to {end:g}"
-        found.append(worst_between(given.within(begin, end), ratios, (where,)))
-    return max(found, key=lambda worst: worst.ratio, default=None)
-
-
 TOOL_CHECKS: dict[str, LimitCheck] = {
     "tool_speed": _worst_speed,
     "tool_acceleration": partial(_worst_motion, "acceleration", "acceleration"),
     "tool_angular_speed": partial(_worst_motion, "angular_speed", "angular"),
-    "process_speed": partial(_worst_process_speed, 1.0),
-    "least_process_speed": partial(_worst_process_speed, -1.0),
 }

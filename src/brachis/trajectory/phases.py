@@ -1,0 +1,197 @@
+"""The phases of a motion: their curves, how these are joined to one spline, and what each phase is.
+
+A motion is a list of phases. One ends where the tool stops, where a wait is over, and where a given speed begins or
+ends. In each phase the curves are B-splines over its own normalised time. One spline over the time of the whole motion
+has their knots, and those where phases meet degree + 1 times: the pieces on both sides share no control point. Its
+value at such a knot is that behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.common import tolerances
+from brachis.common.summary import Summary
+from brachis.task import ProcessSpeed
+
+
+@dataclass(frozen=True, repr=False)
+class PhaseSpline(Summary):
+    """The curves of one phase.
+
+    Attributes
+    ----------
+    t_end : float
+        Duration, s.
+    knots : (N + 2 d + 1,) ndarray
+        Clamped, in normalised time from 0 to 1.
+    degree : int
+        d.
+    control_points : (1 + r, N + d) ndarray
+        Of s, then of each redundant joint in chain order, or of the chart's sigma.
+    """
+
+    t_end: float
+    knots: np.ndarray
+    degree: int
+    control_points: np.ndarray
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times between which the curves are polynomials, (N + 1,), s."""
+        return np.unique(self.knots) * self.t_end
+
+    def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), s.
+
+        At knots those behind them.
+        """
+        from scipy.interpolate import BSpline
+
+        spline = BSpline(self.knots, self.control_points.T, self.degree)
+        t_norm = np.clip(t / self.t_end, 0.0, 1.0)
+        return tuple(spline(t_norm, nu=order) / self.t_end**order for order in range(4))
+
+    def with_knots(self, knots: np.ndarray) -> PhaseSpline:
+        """Return the same curves over a clamped knot vector that contains the present one, to rounding."""
+        from scipy.interpolate import BSpline, insert
+
+        spline = BSpline(self.knots, self.control_points.T, self.degree)
+        for knot in np.unique(knots):
+            if np.abs(self.knots - knot).min() > tolerances.TIME:
+                spline = insert(knot, spline)
+        points = spline.c[: len(knots) - self.degree - 1].T  # without what SciPy pads
+        return PhaseSpline(self.t_end, knots, self.degree, points)
+
+    def times_of(self, s: np.ndarray) -> np.ndarray:
+        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
+        low = np.zeros(len(s))
+        high = np.full(len(s), self.t_end)
+        for _ in range(45 if len(s) else 0):  # to 3e-14 of the duration
+            middle = 0.5 * (low + high)
+            before = self.at(middle)[0][:, 0] < s
+            low = np.where(before, middle, low)
+            high = np.where(before, high, middle)
+        return np.asarray(0.5 * (low + high))
+
+
+@dataclass(frozen=True)
+class MotionPhase:
+    """What a phase of a motion is.
+
+    Attributes
+    ----------
+    begin, end : float
+        Times, s.
+    s_begin, s_end : float
+        Path coordinates.
+    speed : float or None
+        Given speed of the tool, m/s; None: as fast as the limits allow.
+    is_dwell : bool
+        Whether the arm waits at rest.
+    """
+
+    begin: float
+    end: float
+    s_begin: float
+    s_end: float
+    speed: float | None
+    is_dwell: bool
+
+    @property
+    def duration(self) -> float:
+        """Time that it takes, s."""
+        return self.end - self.begin
+
+    @property
+    def kind(self) -> str:
+        """``dwell``, ``given speed`` or ``move``."""
+        if self.is_dwell:
+            return "dwell"
+        return "move" if self.speed is None else "given speed"
+
+
+def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray]:
+    """Write the curves of phases as one spline over the whole motion's normalised time.
+
+    Returns
+    -------
+    knots : ndarray
+        From 0 to 1; those where phases meet degree + 1 times.
+    control_points : (1 + r, ...) ndarray
+    """
+    ends = np.cumsum([spline.t_end for spline in splines])
+    begins = np.append(0.0, ends[:-1])
+    outer = splines[0].degree + 1
+    knots = []
+    for spline, begin, end in zip(splines, begins, ends, strict=True):
+        own = (begin + spline.knots * spline.t_end) / ends[-1]
+        own[-outer:] = end / ends[-1]
+        knots.append(own if begin == 0.0 else own[outer:])
+    points = np.hstack([spline.control_points for spline in splines])
+    return np.concatenate(knots), points
+
+
+def split_splines(
+    knots: np.ndarray, degree: int, control_points: np.ndarray, phase_ends: np.ndarray
+) -> tuple[PhaseSpline, ...]:
+    """Undo `join_splines`, to rounding.
+
+    Parameters
+    ----------
+    knots, degree, control_points
+        Of the whole motion.
+    phase_ends : (P,) ndarray
+        s, ascending.
+    """
+    outer = degree + 1
+    begins = np.append(0.0, phase_ends[:-1])
+    places = phase_places(knots, degree)
+    splines = []
+    for number, (begin, end) in enumerate(zip(begins, phase_ends, strict=True)):
+        first = places[number]
+        last = places[number + 1] + outer
+        own = (knots[first:last] * phase_ends[-1] - begin) / (end - begin)
+        own[:outer] = 0.0
+        own[-outer:] = 1.0
+        points = control_points[:, first : last - outer]
+        splines.append(PhaseSpline(end - begin, own, degree, points))
+    return tuple(splines)
+
+
+def list_phases(
+    splines: Sequence[PhaseSpline],
+    phase_ends: np.ndarray,
+    speeds: Sequence[ProcessSpeed],
+) -> tuple[MotionPhase, ...]:
+    """Say what each phase is, by its curves, its end (s), and the given speeds of the task."""
+    begins = np.append(0.0, phase_ends[:-1])
+    phases = []
+    for spline, begin, end in zip(splines, begins, phase_ends, strict=True):
+        s = spline.control_points[0]
+        middle = 0.5 * (s[0] + s[-1])
+        is_dwell = bool(s[0] == s[-1])
+        given = [part.speed for part in speeds if part.s[0] < middle < part.s[1]]
+        speed = None if is_dwell or not given else given[0]
+        times = (float(begin), float(end))
+        phases.append(MotionPhase(*times, float(s[0]), float(s[-1]), speed, is_dwell))
+    return tuple(phases)
+
+
+def times_of_knots(
+    knots: np.ndarray, degree: int, phase_ends: np.ndarray
+) -> np.ndarray:
+    """Return joined knots in s; those where phases meet are exactly the ends of the phases, (P,), s."""
+    times = knots * phase_ends[-1]
+    for place, end in zip(phase_places(knots, degree)[1:], phase_ends, strict=True):
+        times[place : place + degree + 1] = end
+    return times
+
+
+def phase_places(knots: np.ndarray, degree: int) -> np.ndarray:
+    """Places in a joined knot vector, (P + 1,), of the first of each degree + 1 equal knots."""
+    same = knots[degree:] == knots[: len(knots) - degree]
+    return np.flatnonzero(same)

@@ -1,0 +1,164 @@
+"""What the task asks of the phases of a motion: stops, dwells, and given speeds of the tool."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.path.legs import Leg
+from brachis.robot.joints import UNITS
+from brachis.trajectory import MotionPhase
+from brachis.verify.limits.protocol import worst_between
+from brachis.verify.limits.tool import frame_motion
+from brachis.verify.motion import Given, MotionStates
+from brachis.verify.report import Check
+
+_DWELL = 1e-9
+"""s: a dwell that is so much longer or shorter is as long as asked; end times are known to 1e-15 of themselves."""
+_SPEED = 1e-6
+"""Relative deviation from a given speed that passes: s(t) is given, so that only rounding and what lies between the
+nodes is left."""
+_RESOLUTION = 1e-3
+"""Deviations are searched in this unit: `worst_between` tells values apart that differ by 5e-6 units."""
+
+
+def check_stops(given: Given) -> list[Check]:
+    """Check that the arm is at rest at every stop, where a phase ends, and that it waits there as long as asked."""
+    stops = [leg for leg in given.legs if leg.stops]
+    if not stops:
+        return []
+    options = given.options
+    trajectory = given.trajectory
+    ends = np.array([phase.s_end for phase in trajectory.phases])
+    misses = [float(np.abs(ends - leg.end).min()) for leg in stops]
+    waits = [sum(phase.duration for phase in _dwells(given, leg)) for leg in stops]
+    off = [abs(wait - leg.dwell) for wait, leg in zip(waits, stops, strict=True)]
+    places = [f"s = {leg.end:g}" for leg in stops]
+    checks = [
+        _check_worst("s at stops", misses, options.progress_tolerance, "-", places),
+        _check_worst("duration of dwells", off, _DWELL, "s", places),
+    ]
+    pieces = given.pieces
+    nodes = np.flatnonzero(np.isin(pieces.times, times_of_stops(given)))
+    inner = nodes[(nodes > 0) & (nodes < len(pieces.lengths))]
+    sides = (np.append(inner - 1, inner), np.repeat([1.0, 0.0], len(inner)))
+    states = MotionStates.at(pieces, *sides)
+    jerks = np.abs(pieces.jerk).max(initial=0.0)
+    derivatives = (
+        ("velocity", states.qdot, "velocity", options.rest_velocity_tolerance),
+        (
+            "acceleration",
+            states.qddot,
+            "acceleration",
+            options.rest_acceleration_tolerance,
+        ),
+        ("jerk", states.qdddot / (1.0 + jerks), None, options.rest_jerk_tolerance),
+    )
+    for name, values, kind, allowed in derivatives[
+        : max(given.task.spline.vanishing, 1)
+    ]:
+        checks.append(
+            _check_joints(given, f"{name} at stops", values, states.t, kind, allowed)
+        )
+    moved = [
+        given.during(phase.begin, phase.end).states
+        for leg in stops
+        for phase in _dwells(given, leg)
+    ]
+    if moved:
+        speeds = np.concatenate([each.qdot for each in moved])
+        times = np.concatenate([each.t for each in moved])
+        allowed = options.rest_velocity_tolerance
+        found = (speeds, times, "velocity", allowed)
+        checks.append(_check_joints(given, "velocity in dwells", *found))
+    return checks
+
+
+def times_of_stops(given: Given) -> np.ndarray:
+    """Return the times at which phases end or begin at stops of the task, s."""
+    tolerance = given.options.progress_tolerance
+    stops = np.array([leg.end for leg in given.legs if leg.stops])
+    return np.array(
+        [
+            phase.end
+            for phase in given.trajectory.phases
+            if np.any(np.abs(stops - phase.s_end) <= tolerance)
+        ]
+    )
+
+
+def check_process_speed(given: Given) -> list[Check]:
+    """Check that the tool has the given speed wherever it has one, and that a phase passes each such part."""
+    legs = [leg for leg in given.legs if leg.speed is not None]
+    if not legs:
+        return []
+    subjects = [f"tool, s = {leg.begin:g} to {leg.end:g}" for leg in legs]
+    misses = []
+    found = []
+    for leg, subject in zip(legs, subjects, strict=True):
+        phase, miss = _nearest_phase(given, leg)
+        misses.append(miss)
+
+        def deviations(states: MotionStates, leg: Leg = leg) -> np.ndarray:
+            speeds = frame_motion(given.robot, states, "linear")
+            return np.abs(speeds / leg.speed - 1.0) / _RESOLUTION
+
+        part = given.during(phase.begin, phase.end)
+        worst = worst_between(part, deviations, (subject,))
+        found.append(worst._replace(ratio=worst.ratio * _RESOLUTION))
+    worst = found[int(np.argmax([each.ratio for each in found]))]
+    speed = (worst.ratio, _SPEED, "relative", worst.subject, worst.time, worst.remark)
+    tolerance = given.options.progress_tolerance
+    return [
+        Check("process speed", *speed),
+        _check_worst(
+            "s where process speeds begin and end", misses, tolerance, "-", subjects
+        ),
+    ]
+
+
+def _nearest_phase(given: Given, leg: Leg) -> tuple[MotionPhase, float]:
+    """Return the phase that passes a leg, or nearly so, and how far its ends are off, in s."""
+
+    def miss(phase: MotionPhase) -> float:
+        return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
+
+    nearest = min(given.trajectory.phases, key=miss)
+    return nearest, miss(nearest)
+
+
+def _dwells(given: Given, leg: Leg) -> list[MotionPhase]:
+    """List the dwells at the end of a leg."""
+    tolerance = given.options.progress_tolerance
+    return [
+        phase
+        for phase in given.trajectory.phases
+        if phase.is_dwell and abs(phase.s_end - leg.end) <= tolerance
+    ]
+
+
+def _check_worst(
+    name: str, misses: list[float], allowed: float, unit: str, subjects: list[str]
+) -> Check:
+    """Check what misses most."""
+    worst = int(np.argmax(misses))
+    return Check(name, misses[worst], allowed, unit, subjects[worst])
+
+
+def _check_joints(
+    given: Given,
+    name: str,
+    values: np.ndarray,
+    times: np.ndarray,
+    kind: str | None,
+    allowed: float,
+) -> Check:
+    """Check the joint and the time at which values, (K, n), are largest; `kind` is a key of `UNITS`."""
+    if not len(times):
+        return Check(name, np.inf, allowed, "relative")
+    size = np.abs(values)
+    k, joint = np.unravel_index(int(np.argmax(size)), size.shape)
+    robot = given.robot
+    unit = UNITS[kind][robot.position_units[joint]] if kind else "relative"
+    subject = robot.joint_names[joint]
+    value = float(size[k, joint])
+    return Check(name, value, allowed, unit, subject, float(times[k]))

@@ -1,0 +1,127 @@
+"""Curves of phases are joined to one spline and split again; a trajectory says what its phases are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.errors import ResultFileError
+from brachis.trajectory import PhaseSpline, Trajectory, join_splines, split_splines
+from support.gantry import DWELL, SPEED, SPLINES, gantry_motion
+from support.result_files import with_parts
+
+
+@pytest.fixture(scope="module")
+def motion() -> Trajectory:
+    return gantry_motion()
+
+
+def random_splines(degree: int) -> list[PhaseSpline]:
+    rng = np.random.default_rng(degree)
+    splines = []
+    for duration, inner in ((0.7, [0.2, 0.5]), (1e-3, []), (1 / 3, [1 / 7])):
+        knots = np.repeat(
+            [0.0, *inner, 1.0], [degree + 1, *[1] * len(inner), degree + 1]
+        )
+        points = rng.standard_normal((3, len(knots) - degree - 1))
+        splines.append(PhaseSpline(duration, knots, degree, points))
+    return splines
+
+
+@pytest.mark.parametrize("degree", [2, 3, 5])
+def test_splines_are_split_as_they_were_joined(degree):
+    splines = random_splines(degree)
+    knots, points = join_splines(splines)
+    ends = np.cumsum([spline.t_end for spline in splines])
+    again = split_splines(knots, degree, points, ends)
+    assert len(again) == len(splines)
+    assert len(knots) == points.shape[1] + degree + 1
+    for spline, other in zip(splines, again, strict=True):
+        assert other.t_end == pytest.approx(spline.t_end, rel=1e-12)
+        np.testing.assert_allclose(other.knots, spline.knots, atol=1e-12)
+        np.testing.assert_array_equal(other.control_points, spline.control_points)
+
+
+def test_derivatives_of_a_phase_are_per_second():
+    (spline, *_) = random_splines(5)
+    t = np.linspace(0.05, 0.65, 9)
+    h = 1e-5
+    orders = spline.at(t)
+    for order in range(3):
+        slope = (spline.at(t + h)[order] - spline.at(t - h)[order]) / (2.0 * h)
+        np.testing.assert_allclose(slope, orders[order + 1], rtol=1e-5, atol=1e-3)
+
+
+def test_more_knots_leave_the_curves_as_they_are():
+    (spline, *_) = random_splines(3)
+    knots = np.sort(np.append(spline.knots, [0.1, 0.6, 0.9]))
+    finer = spline.with_knots(knots)
+    t = np.linspace(0.0, spline.t_end, 50)
+    np.testing.assert_allclose(finer.at(t), spline.at(t), rtol=1e-9, atol=1e-9)
+    assert finer.control_points.shape == (3, len(knots) - 4)
+
+
+def test_times_of_path_coordinates():
+    times = SPLINES[3].times_of(np.array([0.55, 0.7, 0.85]))
+    np.testing.assert_allclose(times, [0.0, 0.5, 1.0], atol=1e-12)
+
+
+def test_a_trajectory_says_what_its_phases_are(motion):
+    kinds = [phase.kind for phase in motion.phases]
+    assert kinds == ["move", "dwell", "move", "given speed", "move"]
+    assert [phase.speed for phase in motion.phases] == [None, None, None, SPEED, None]
+    assert motion.phases[1].duration == pytest.approx(DWELL)
+    places = [(phase.s_begin, phase.s_end) for phase in motion.phases]
+    expected = [(0.0, 0.4), (0.4, 0.4), (0.4, 0.55), (0.55, 0.85), (0.85, 1.0)]
+    np.testing.assert_allclose(places, expected)
+    assert motion.phases[-1].end == motion.t_end
+
+
+def test_splines_of_the_whole_motion_are_those_of_the_phases(motion):
+    for phase, spline in zip(motion.phases, motion.phase_splines, strict=True):
+        t = np.linspace(phase.begin, phase.end, 7)[:-1]
+        s, redundant = spline.at(t - phase.begin)[0].T
+        np.testing.assert_allclose(motion.path_coordinate(t), s, atol=1e-12)
+        np.testing.assert_allclose(
+            motion.redundant_spline(t)[:, 0], redundant, atol=1e-12
+        )
+        speed = spline.at(t - phase.begin)[1][:, 0]
+        np.testing.assert_allclose(motion.path_spline(t, nu=1), speed, atol=1e-9)
+        assert motion.path_coordinate(phase.end) == phase.s_end
+
+
+def test_at_the_end_of_a_phase_the_spline_is_the_next_ones(motion):
+    end = motion.phases[1].end
+    jerk = motion.path_spline(np.array([np.nextafter(end, 0.0), end]), nu=3)
+    np.testing.assert_allclose(jerk, [0.0, 60.0 * 0.15 - 24.0 * SPEED], atol=1e-9)
+
+
+def test_a_file_has_the_phases(motion, tmp_path):
+    motion.save(tmp_path / "result.npz")
+    again = Trajectory.load(tmp_path / "result.npz")
+    np.testing.assert_array_equal(again.phase_ends, motion.phase_ends)
+    assert again.phases == motion.phases
+
+
+WRONG = {
+    "an end fewer": {"phase_ends": lambda ends: ends[1:]},
+    "an end moved": {"phase_ends": lambda ends: ends + 1e-6 * (ends < 1.2)},
+    "ends descending": {"phase_ends": lambda ends: ends[[1, 0, 2, 3, 4]]},
+    "knots once less": {
+        "knots": lambda knots: np.sort(np.append(np.delete(knots, 6), 0.1))
+    },
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_file_with_other_phases_than_knots(case, motion, tmp_path):
+    motion.save(tmp_path / "result.npz")
+    with_parts(tmp_path / "result.npz", **WRONG[case])
+    with pytest.raises(
+        ResultFileError, match=r"phase_ends: not the ends|internal knots are repeated"
+    ):
+        Trajectory.load(tmp_path / "result.npz")
+
+
+def test_one_phase_has_its_own_knots():
+    np.testing.assert_array_equal(join_splines(SPLINES[:1])[0], SPLINES[0].knots)

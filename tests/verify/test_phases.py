@@ -1,0 +1,154 @@
+"""Stops, dwells and given speeds are verified: the motion by hand passes, and each check finds its fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from brachis.verify import verify_trajectory
+from support.gantry import DEGREE, DWELL, SPEED, SPLINES, TASK, gantry_motion, quintic
+
+
+def failed(trajectory):
+    return {
+        check.name for check in verify_trajectory(trajectory).checks if not check.passed
+    }
+
+
+def value_of(trajectory, name):
+    checks = {check.name: check for check in verify_trajectory(trajectory).checks}
+    return checks[name].value
+
+
+def with_curve(phase, place, by):
+    """The splines of the motion, with a control point of one phase's s(t) moved."""
+    spline = SPLINES[phase]
+    points = spline.control_points.copy()
+    points[0, place] += by
+    return (
+        *SPLINES[:phase],
+        replace(spline, control_points=points),
+        *SPLINES[phase + 1 :],
+    )
+
+
+def with_acceleration(spline, at_begin):
+    """The spline with an acceleration at its beginning or its end, where it rests."""
+    points = spline.control_points.copy()
+    place = 2 if at_begin else 3
+    points[:, place] += np.array([0.01, 0.002]) * (1.0 if at_begin else -1.0)
+    return replace(spline, control_points=points)
+
+
+def test_the_motion_passes():
+    assert failed(gantry_motion()) == set()
+
+
+@pytest.mark.parametrize("duration", [0.9 * DWELL, DWELL + 1e-6])
+def test_a_dwell_of_another_length(duration):
+    splines = (SPLINES[0], replace(SPLINES[1], t_end=duration), *SPLINES[2:])
+    motion = gantry_motion(splines)
+    assert failed(motion) == {"duration of dwells"}
+    off = value_of(motion, "duration of dwells")
+    assert off == pytest.approx(abs(duration - DWELL), rel=1e-6)
+
+
+def test_a_dwell_that_is_missing():
+    assert failed(gantry_motion((SPLINES[0], *SPLINES[2:]))) == {"duration of dwells"}
+
+
+def test_a_dwell_that_nobody_asked_for():
+    (line, *rest) = TASK["path"]
+    path = [{"line": line["line"], "stop": True}, *rest]
+    assert failed(gantry_motion(path=path)) == {"duration of dwells"}
+    assert failed(gantry_motion((SPLINES[0], *SPLINES[2:]), path=path)) == set()
+
+
+def test_a_stop_without_rest():
+    """The tool passes the corner at a speed."""
+    before = quintic(1.0, (0.0, 0.0), (0.4, 0.1))
+    behind = quintic(1.0, (0.4, 0.1), (0.55, SPEED))
+    found = failed(gantry_motion((before, behind, *SPLINES[3:])))
+    assert "velocity at stops" in found
+
+
+def test_a_stop_at_another_place():
+    before = quintic(1.0, (0.0, 0.0), (0.39, 0.0))
+    dwell = quintic(DWELL, (0.39, 0.0), (0.39, 0.0))
+    behind = quintic(1.0, (0.39, 0.0), (0.55, SPEED))
+    motion = gantry_motion((before, dwell, behind, *SPLINES[3:]))
+    assert {"s at stops", "velocity at stops"} <= failed(motion)
+    assert value_of(motion, "s at stops") == pytest.approx(0.01)
+
+
+def test_an_acceleration_at_a_stop_is_for_rest_in_velocity_alone():
+    splines = (
+        with_acceleration(SPLINES[0], at_begin=False),
+        SPLINES[1],
+        with_acceleration(SPLINES[2], at_begin=True),
+        *SPLINES[3:],
+    )
+    spline = {"degree": DEGREE, "rest": "velocity"}
+    assert failed(gantry_motion(splines, spline=spline)) == set()
+    found = failed(gantry_motion(splines))
+    assert found == {"acceleration at stops", "acceleration jump", "torque jump"}
+
+
+def test_a_jump_at_a_flying_link_is_refused_in_any_case():
+    """The acceleration at a link between a free and a given speed jumps."""
+    splines = (*SPLINES[:4], with_acceleration(SPLINES[4], at_begin=True))
+    motion = gantry_motion(splines, spline={"degree": DEGREE, "rest": "velocity"})
+    assert failed(motion) == {"acceleration jump", "torque jump"}
+
+
+def test_a_motion_in_a_dwell():
+    motion = gantry_motion(spline={"degree": DEGREE, "rest": "velocity"})
+    before = motion.qddot_before.copy()
+    before[2, 0] = 0.1
+    before[2, 1] = -0.1  # the tool stays
+    moving = replace(motion, qddot_before=before)
+    assert "velocity in dwells" in failed(moving)
+    assert "velocity at stops" not in failed(moving)
+    assert "path error" not in failed(moving)
+
+
+@pytest.mark.parametrize(
+    ("factor", "passes"), [(1.0 + 5e-7, True), (1.0 + 2e-6, False)]
+)
+def test_another_speed_than_the_given_one(factor, passes):
+    limits = {"process_speed": {"speed": factor * SPEED, "s": [0.55, 0.85]}}
+    motion = gantry_motion(tool_limits=limits)
+    assert failed(motion) == (set() if passes else {"process speed"})
+    assert value_of(motion, "process speed") == pytest.approx(factor - 1.0, rel=1e-3)
+
+
+def test_a_speed_that_changes_within_its_part():
+    """At both ends it is as given, and so is its mean."""
+    splines = with_curve(3, 2, 1e-5)
+    assert "process speed" in failed(gantry_motion(splines))
+
+
+def test_a_given_speed_that_begins_elsewhere():
+    limits = {"process_speed": {"speed": SPEED, "s": [0.56, 0.85]}}
+    found = failed(gantry_motion(tool_limits=limits))
+    assert found == {"s where process speeds begin and end"}
+
+
+def test_a_motion_that_goes_back():
+    assert "ds/dt below zero" in failed(gantry_motion(with_curve(2, 1, -1e-6)))
+
+
+def test_a_jump_of_s_between_phases():
+    assert "s where phases meet" in failed(gantry_motion(with_curve(2, 0, 1e-6)))
+
+
+def test_holding_torque_in_a_dwell_counts():
+    motion = gantry_motion(robot={"limits": {"rms_torque": 50.0}})
+    t = np.linspace(0.0, motion.t_end, 20_001)
+    mean = np.sqrt(np.trapezoid(motion.torque(t) ** 2, t, axis=0) / motion.t_end)
+    assert motion.torque(1.25)[2] == pytest.approx(2.0 * 9.81, rel=1e-3)
+    assert value_of(motion, "rms torque ratio") == pytest.approx(
+        mean.max() / 50.0, rel=1e-4
+    )
