@@ -12,6 +12,7 @@ friction a part near the path's end may be passed faster.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -286,17 +287,19 @@ class _SpeedCheck:
         assert rate is not None
         return self._planes[leg].active_limit(rate)
 
-    def lower_one(self, number: int) -> float | None:
-        """Largest share of one speed that is possible with the others as they are; None without any."""
+    def lower_one(self, number: int, least: float) -> float | None:
+        """Find the largest share of a speed, above `least`, that is possible with the others as they are; None: none."""
         shares = np.ones(len(self.speeds))
 
         def is_possible(share: float) -> bool:
             shares[number] = share
             return self.is_possible(shares)
 
-        for share in np.linspace(0.95, 0.05, 19).tolist():
+        # Too low a speed may be as impossible beside the others as too high a one.
+        tried = np.geomspace(1.0, least, 20).tolist()
+        for above, share in itertools.pairwise(tried):
             if is_possible(share):
-                return _largest_share(is_possible, share, share + 0.05)
+                return _largest_share(is_possible, share, above)
         return None
 
     def allows(self, share: float) -> bool:
@@ -308,7 +311,7 @@ def _largest_share(
     is_possible: Callable[[float], bool], low: float, high: float
 ) -> float:
     """Find the largest share between one that is possible and one that is not."""
-    while high - low > 1e-3:
+    while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_possible(middle) else (low, middle)
     return low
@@ -358,7 +361,7 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
     why = f"for the {label} limit at s = {place:.3g}"
     if shares[number] > share + 0.01:
         # A leg is too short. One speed alone may be to blame.
-        alone = ((number, check.lower_one(number)) for number in numbers)
+        alone = ((number, check.lower_one(number, 0.9 * share)) for number in numbers)
         shares = {number: own for number, own in alone if own is not None}
         shares = shares or dict.fromkeys(numbers, share)
         leg = next(leg for leg in check.free_legs if check.pass_leg(leg, every) is None)
