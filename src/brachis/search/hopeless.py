@@ -318,13 +318,18 @@ def _largest_share(
     return low
 
 
-def explain_speeds(starts: Sequence[InitialGuess]) -> Failure | None:
+def explain_speeds(
+    starts: Sequence[InitialGuess], *, are_tried: bool = False
+) -> Failure | None:
     """Tell which speeds of the task are out of reach along the joint paths of all guesses; None if they may not be.
 
     Parameters
     ----------
     starts : sequence of InitialGuess
         At least one.
+    are_tried : bool, optional
+        Whether plans from these failed, so that too high a speed is the most likely reason; otherwise it has to be far
+        out of reach.
     """
     problem = starts[0].problem
     speeds = speeds_of(problem)
@@ -343,6 +348,7 @@ def explain_speeds(starts: Sequence[InitialGuess]) -> Failure | None:
         # The phase plane is exact without other joint paths, and without friction that helps to brake.
         is_exact = not check.is_redundant and not has_friction
         enough = _EXACT if is_exact else _UNLIKELY
+        enough = 1.0 if are_tried else enough
         if not check.allows(_LEAST) or check.allows(enough):
             return None
         if best is None or check.allows(share):
