@@ -359,7 +359,8 @@ def _moving_ends_guess(start: InitialGuess, leg: int) -> _Part | None:
     times = None if q is None else PhasePlane(problem.limits, s, q).times((first, last))
     if times is None or not np.isfinite(times[-1]):
         return None
-    rate = np.sqrt(first**2 + (last**2 - first**2) * (s - begin) / (end - begin))
+    part = (s - begin) / (end - begin)
+    rate = np.sqrt(first**2 * (1.0 - part) + last**2 * part)
     with np.errstate(invalid="ignore"):  # 0 / 0 for a motion that starts from rest
         even = np.nan_to_num(2.0 * (s - begin) / (first + rate))
     times = 0.5 * (times + even)
