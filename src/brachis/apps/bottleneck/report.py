@@ -28,8 +28,11 @@ from brachis.apps.bottleneck.reference import (
 )
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
+    SHORTEST_SHARE,
     THRESHOLD,
+    PhaseLimits,
     Saturation,
+    limits_by_phase,
     saturations,
 )
 from brachis.apps.bottleneck.sensitivities import (
@@ -64,7 +67,7 @@ from brachis.robot import ROLL_JOINT
 from brachis.robot.joints import shown_unit
 from brachis.robot.task_map import JOINTS
 from brachis.search.candidates import MARGINS
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Trajectory, phase_rows
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
@@ -172,6 +175,8 @@ class BottleneckReport:
         What every limit costs; None for a motion that was not planned.
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
+    phases : tuple of PhaseLimits
+        Which limits are active in each phase.
     knots : KnotCost or None
         What the knots cost; None if that is not known.
     check : SensitivityCheck or None
@@ -192,6 +197,7 @@ class BottleneckReport:
     t_end: float
     sensitivities: Sensitivities | None
     saturations: tuple[Saturation, ...]
+    phases: tuple[PhaseLimits, ...]
     knots: KnotCost | None = None
     check: SensitivityCheck | None = None
     reference: Reference | None = None
@@ -211,6 +217,8 @@ class BottleneckReport:
         if self.check is not None:
             lines += _check_lines(self.check)
         lines += write_active(self.saturations)
+        if len(self.phases) > 1:
+            lines += write_phases(self.phases)
         if self.reference is not None:
             lines.append(_reference(self.reference, self.t_end))
         elif self.reference_sought:
@@ -233,6 +241,7 @@ class BottleneckReport:
             "sensitivities": self.sensitivities and self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
+            "phases": [each.to_dict() for each in self.phases],
             "knots": self.knots and self.knots.to_dict(),
             "check": self.check and self.check.to_dict(),
             "reference": self.reference and self.reference.to_dict(),
@@ -287,7 +296,9 @@ def report(
                     where=trajectory.recovered.source,
                     hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
                 )
-            return BottleneckReport(trajectory.t_end, None, saturations(trajectory))
+            active = saturations(trajectory)
+            phases = limits_by_phase(trajectory, active)
+            return BottleneckReport(trajectory.t_end, None, active, phases)
         refined = solve_again(trajectory)
     else:
         trajectory = motion.trajectory
@@ -303,10 +314,12 @@ def report(
     limits = [
         limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD
     ]
+    active = saturations(trajectory, limits)
     return BottleneckReport(
         t_end=trajectory.t_end,
         sensitivities=found,
-        saturations=saturations(trajectory, limits),
+        saturations=active,
+        phases=limits_by_phase(trajectory, active),
         knots=knot_cost(trajectory, limits, refined.t_end),
         check=check_sensitivities(refined, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
@@ -436,7 +449,7 @@ def write_active(found: tuple[Saturation, ...]) -> list[str]:
     """Say which limits are active for some time."""
     lines = []
     for entry in found:
-        if entry.share < 5e-4:
+        if entry.share < SHORTEST_SHARE:
             continue
         label = entry.label
         count = len(entry.active)
@@ -446,6 +459,15 @@ def write_active(found: tuple[Saturation, ...]) -> list[str]:
     return [
         *(lines or ["nothing stays at a limit"]),
         f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
+    ]
+
+
+def write_phases(phases: tuple[PhaseLimits, ...]) -> list[str]:
+    """Say of each phase how long it takes and which limits are active in it."""
+    rows = phase_rows([each.phase for each in phases])
+    return [
+        f"phase {name}, s = {s}, {time}, {speed}: at its limits: {each}"
+        for (name, s, time, speed), each in zip(rows, phases, strict=True)
     ]
 
 
