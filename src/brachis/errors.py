@@ -51,15 +51,12 @@ class Remedy:
     guess : float
         A number that may be enough.
     unit : str
-    is_refined : bool
-        Whether to look for the smallest change that is enough.
     """
 
     key: str
     asked: float
     guess: float
     unit: str = ""
-    is_refined: bool = True
 
     @property
     def verb(self) -> str:

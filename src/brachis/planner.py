@@ -38,7 +38,7 @@ from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import report_issues
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
-from brachis.search import Search, first_map, try_remedies
+from brachis.search import Search, first_maps, try_remedies
 from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
 from brachis.trajectory import Motion, motion_of
@@ -260,7 +260,7 @@ def transcribe(
     Returns
     -------
     program : Program
-        Over as many equal knot intervals as the task says; with ``intervals: auto`` over the 10 of the first mesh,
+        Over as many equal knot intervals a phase as the task says; with ``intervals: auto`` over 10, the first mesh,
         which `plan` refines.
     family : str
         Family of the closed form.
@@ -279,8 +279,8 @@ def transcribe(
     """
     robot, asked = _read(robot_or_task, task, keywords)
     problem = Problem.of(robot, asked, own_limits)
-    joint_map, family = first_map(problem, decompositions_of(problem, families))
-    return program_of(problem, joint_map, breaks_of(problem.task)), family
+    joint_maps, family = first_maps(problem, decompositions_of(problem, families))
+    return program_of(problem, joint_maps, breaks_of(problem)), family
 
 
 Outcome = Result | BrachisError

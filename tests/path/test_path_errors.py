@@ -246,7 +246,8 @@ def test_a_corner_names_place_angle_and_key() -> None:
     error = refused([RIGHT, UP], XY)
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0: the path must be smooth to the third derivative; found a corner "
-        "of 90 degrees; allowed: segments that continue each other, or a blend. Set path[0].blend (m) to round it"
+        "of 90 degrees; allowed: segments that continue each other, or a blend or a stop. Set path[0].blend (m) to "
+        "round it, or path[0].stop: true to stop there"
     )
     assert error.s_interval == pytest.approx((0.5, 0.5))
 

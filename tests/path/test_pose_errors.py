@@ -177,7 +177,8 @@ def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0, z = 0: the path must be smooth to the third derivative; found "
         "the tool's turning rate jumps: 1.571 rad/m before and 0 after; allowed: segments that continue each other, or "
-        "a blend. Set profile: smooth where the tool turns, or path[0].blend (m) to round it"
+        "a blend or a stop. Set profile: smooth where the tool turns, or path[0].blend (m) to round it, or "
+        "path[0].stop: true to stop there"
     )
     assert error.s_interval == (0.5, 0.5)
 
@@ -211,7 +212,7 @@ def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
             [{"turn": TURN}, RIGHT],
             ["a stop: ", "Turn the tool along a segment, by its orientation"],
         ),
-        ([RIGHT, {"turn": TURN}], ["a stop: ", "in a separate task"]),
+        ([RIGHT, {"turn": TURN}], ["a stop: ", "or set path[0].stop: true"]),
         (
             [RIGHT, UP, RIGHT, RIGHT | {"orientation": TURN}],
             ["likewise path[1].blend, path[2].blend"],

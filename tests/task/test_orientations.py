@@ -227,7 +227,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"turn": ROTATE, "orientation": "fixed"},
-        ["path[0].orientation: unknown key", "allowed: blend, turn"],
+        ["path[0].orientation: unknown key", "allowed: blend, stop, dwell, turn"],
     ),
     (
         {"spline": SPLINE | {"orientations": [QUATERNION]}},

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from brachis.errors import TaskError
+from brachis.path import build_path
 from brachis.task import BSplineSegment, Task, load_task
+from brachis.task.segments import SplineSegment
 from support.seams import bent, wave
 
 MM = 1e-3
@@ -74,6 +76,72 @@ def test_corners_become_blends() -> None:
     )
 
 
+def sharp(*, turn_back: bool = False) -> np.ndarray:
+    """Points in mm along two lines with a corner at row 40, (0.2 m, 0, 0); the first one after it is 0.02 mm away."""
+    first = np.linspace([0.0, 0.0, 0.0], [200.0, 0.0, 0.0], 41)
+    direction = np.array([-1.0, 0.0, 0.0] if turn_back else [0.0, 1.0, 0.0])
+    distances = np.concatenate([[0.02], np.linspace(5.0, 150.0, 30)])
+    return np.concatenate([first, first[-1] + distances[:, None] * direction])
+
+
+@pytest.mark.parametrize("turn_back", [False, True])
+@pytest.mark.parametrize("tolerance", [None, {"position": "0.1 mm"}])
+def test_the_tool_stops_at_corners(tolerance: Any, turn_back: bool) -> None:
+    rows = sharp(turn_back=turn_back)
+    write(rows)
+    made = task(corner="stop", tolerance=tolerance)
+    assert load_task(json.loads(json.dumps(made.to_dict(), allow_nan=False))) == made
+    assert [(part.stop, part.blend) for part in made.path] == [
+        (True, None),
+        (False, None),
+    ]
+    (fit,) = made.fits
+    assert [corner.blend for corner in fit.corners] == [0.0]
+    assert fit.corners[0].row == 42
+    assert fit.corners[0].distance == pytest.approx(0.2, abs=1e-6)
+    assert "1 corner at which the tool stops: row 42" in str(fit)
+    path = build_path(made.path, rows[0] * MM, ["x", "y", "z"])
+    (stop,) = path.stops
+    np.testing.assert_allclose(
+        path.sample([stop]).target[0], rows[40] * MM, atol=1e-9 if tolerance else 1e-12
+    )
+
+
+def test_the_first_point_after_a_corner_is_passed() -> None:
+    """However near it is: a first waypoint of a segment that nearly equals its start is taken for it."""
+    write(sharp())
+    _, after = task(corner="stop", tolerance=None).path
+    assert isinstance(after, SplineSegment)
+    path = build_path([after], np.array([0.2, 0.0, 0.0]), ["x", "y", "z"])
+    places = path.sample(path.knots).target
+    distances = np.linalg.norm(places - np.array([0.2, 2e-5, 0.0]), axis=1)
+    assert distances.min() < 1e-12
+
+
+def test_a_corner_of_a_file_without_a_stop_is_rounded_or_refused() -> None:
+    write(sharp(turn_back=True))
+    with pytest.raises(TaskError, match=r"the path turns back.*Set corner: stop"):
+        task()
+
+
+def test_the_end_of_a_file_may_be_a_stop() -> None:
+    write(sharp())
+    csv = {"file": "seam.csv", "tolerance": {"position": "0.1 mm"}, "corner": "stop"}
+    made = load_task(
+        {
+            "brachis": 1,
+            "start": "free",
+            "task_space": "position",
+            "path": [{"csv": csv, "dwell": 0.5}, {"line": {"by": [0.0, 0.0, 0.1]}}],
+        }
+    )
+    assert [(part.stop, part.dwell) for part in made.path] == [
+        (True, 0.0),
+        (True, 0.5),
+        (False, 0.0),
+    ]
+
+
 def test_feed_rates_are_kept() -> None:
     rows = np.column_stack([1e3 * wave(500), np.full(500, 600.0)])
     write(rows, "x_mm,y_mm,z_mm,feed_mm/min")
@@ -119,10 +187,6 @@ def test_rough_files_are_named_as_such() -> None:
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    (
-        {"corner": "stop"},
-        r"path\[0\].csv.corner: a path cannot stop at a corner.*found 'stop'.*two tasks",
-    ),
     (
         {"corner": "refuse"},
         r"path\[0\].corner: the points have 2 corners; found .* deg at row 30\d, .*corner: blend",

@@ -16,6 +16,13 @@ def freeze(owner: Any, *names: str) -> None:
         object.__setattr__(owner, name, own)
 
 
+def interpolate_columns(
+    places: np.ndarray, s: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Interpolate values (S, c) at s, (S,), linearly at places, (P,)."""
+    return np.column_stack([np.interp(places, s, column) for column in values.T])
+
+
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Vector product, (3, ...), of vectors with their three components along the FIRST axis; others broadcast."""
     first = a[1] * b[2]

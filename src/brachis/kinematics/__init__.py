@@ -10,7 +10,7 @@ from brachis.kinematics.chart import (
     transversality,
 )
 from brachis.kinematics.closed_form import ClosedFormMap
-from brachis.kinematics.interpolation import Nodes, interpolate
+from brachis.kinematics.interpolation import Nodes, interpolate, join_nodes
 from brachis.kinematics.joint_map import (
     DirectJointMap,
     JointDerivatives,
@@ -33,6 +33,7 @@ __all__ = [
     "Nodes",
     "chart_around",
     "interpolate",
+    "join_nodes",
     "moving_most",
     "null_spaces",
     "solve_each",

@@ -9,7 +9,7 @@ derivative of a quintic's error is largest.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +44,21 @@ class Nodes:
     qddot: np.ndarray
     qddot_before: np.ndarray
     position_error: float
+
+
+def join_nodes(parts: Sequence[Nodes]) -> Nodes:
+    """Put nodes of one phase after the other together; where they meet, those of the later one count."""
+    times = parts[0].times
+    for part in parts[1:]:
+        times = np.concatenate([times[:-1], times[-1] + part.times])
+    arrays = []
+    for name in ("q", "qdot", "qddot"):
+        own = [getattr(part, name) for part in parts]
+        arrays.append(np.concatenate([*(each[:-1] for each in own[:-1]), own[-1]]))
+    before = [part.qddot_before[1:] for part in parts]
+    before = np.concatenate([parts[0].qddot_before[:1], *before])
+    error = max(part.position_error for part in parts)
+    return Nodes(times, *arrays, before, error)
 
 
 def interpolate(

@@ -12,16 +12,17 @@ d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
 of which only the last is new; it is taken by differences along the motion.
 
 Along a path of the tool y = (s, q_r), and the closed form gives the other joints (`closed_form`), or y = (s, sigma)
-(`chart`); along a path of all joints y = (s), and without a path y = q. Everything that lays down,
-solves and refines a program takes any of them.
+(`chart`); along a path of all joints y = (s), and without a path y = q. Everything that lays down, solves and refines
+a program takes any of them.
 """
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -171,6 +172,13 @@ class JointMap(ABC):
     @abstractmethod
     def derivatives(self, state: Any) -> JointDerivatives:
         """Exact derivatives of a state that this map gave."""
+
+    def along(self, path: Path, start: np.ndarray) -> Self:
+        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        part = copy.copy(self)
+        part.path = path
+        part.start = start
+        return part
 
     def start_margins(self) -> np.ndarray:
         """Margins, (b,), of the start to where the map ends to be computable; b = 0 where it never does."""

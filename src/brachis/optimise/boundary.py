@@ -1,13 +1,13 @@
 """Splines whose first and last control points are fixed or tied by the boundary conditions.
 
-    control points = S free + fixed + T rate,    with T the duration
+    control points = S free + sum of T^i given_i,    with T the duration
 
-A clamped spline begins like the straight line y0 + v t, with v given and the derivatives after the first zero up to the
-k-th one, where its first k + 1 control points are those of the line: y0 + v T xi_i, with xi the Greville abscissae. At
-rest, v = 0, these are equal. The other control points fade from the line, v T xi_i (1 - xi_i)^2, plus what is free of
-them: this changes no motion, but lets a longer duration alone leave the curve smooth, which solvers need. What
-derivatives have in common at a seam is linear in the control points too (see `periodic`). Boundary conditions therefore
-need no rows in the NLP.
+A clamped spline begins like the polynomial y0 + v t + a t^2 / 2 + ..., with its first k derivatives given, where its
+first k + 1 control points are those of the polynomial: y0 + v T b_i1 + a T^2 b_i2 + ..., with b_i1 the Greville
+abscissae and b_ij the blossoms of t^j / j!. At rest all but the first are zero, and these control points are equal. The
+other ones fade from the polynomial, as v T xi_i (1 - xi_i)^2, plus what is free of them: this changes no motion, but
+lets a longer duration alone leave the curve smooth, which solvers need. What derivatives have in common at a seam is
+linear in the control points too (see `periodic`). Boundary conditions therefore need no rows in the NLP.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.optimise.bspline import ORDERS, local_basis
+from brachis.path.time_law import TimeLaw
 
 
 @dataclass(frozen=True)
@@ -27,15 +28,12 @@ class EndCondition:
     ----------
     value : float
         NaN where free.
-    rate : float
-        First derivative per second; NaN where free.
-    derivatives : int
-        With a rate: how many derivatives are given, those after the first one as zero.
+    derivatives : (k,) ndarray
+        The first k time derivatives, in seconds; empty where they are free.
     """
 
     value: float
-    rate: float
-    derivatives: int
+    derivatives: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -49,46 +47,40 @@ class BoundarySpline:
         d.
     matrix : (N + d, free) ndarray
         S.
-    fixed : (N + d,) ndarray
-        What the control points have besides.
-    rate : (N + d,) ndarray
-        And what they have for every second of the duration.
+    given : (1 + k, N + d) ndarray
+        What the control points have besides, by powers of the duration.
     """
 
     knots: np.ndarray
     degree: int
     matrix: np.ndarray
-    fixed: np.ndarray
-    rate: np.ndarray
+    given: np.ndarray
 
     @classmethod
     def between(
         cls, knots: np.ndarray, degree: int, start: EndCondition, end: EndCondition
     ) -> BoundarySpline:
         """Build a spline with conditions at both ends."""
-        abscissae = greville(knots, degree)
-        count = len(abscissae)
+        count = len(knots) - degree - 1
         # Control points of one group are one variable; those of group -1 are fixed.
         group = np.arange(count)
-        fixed = np.zeros(count)
-        rate = np.zeros(count)
-        given = [
-            1 if np.isnan(own.rate) else 1 + own.derivatives for own in (start, end)
-        ]
-        first = slice(None, given[0])
-        last = slice(count - given[1], None)
+        numbers = [1 + len(own.derivatives) for own in (start, end)]
+        given = np.zeros((max(numbers), count))
+        first = slice(None, numbers[0])
+        last = slice(count - numbers[1], None)
         sides = ((start, 0, first, last), (end, count - 1, last, first))
         for condition, anchor, own, other in sides:
             group[own] = anchor if np.isnan(condition.value) else -1
-            fixed[own] = np.nan_to_num(condition.value)
-            away = abscissae - abscissae[anchor]
-            fading = away * (1.0 - np.abs(away)) ** 2
-            fading[own] = away[own]
-            fading[other] = 0.0
-            rate += np.nan_to_num(condition.rate) * fading
+            given[0, own] = np.nan_to_num(condition.value)
+            blossoms = _blossoms(knots, degree, anchor, len(condition.derivatives))
+            for power, derivative in enumerate(condition.derivatives, 1):
+                fading = blossoms[power] * (1.0 - np.abs(blossoms[1])) ** 2
+                fading[own] = blossoms[power][own]
+                fading[other] = 0.0
+                given[power] += derivative * fading
         free = np.unique(group[group >= 0])
         matrix = (group[:, None] == free).astype(float)
-        return cls(knots, degree, matrix, fixed, rate)
+        return cls(knots, degree, matrix, given)
 
     @property
     def free(self) -> int:
@@ -100,27 +92,56 @@ class BoundarySpline:
         """Greville abscissae (N + d,): the normalised times to which the control points belong."""
         return greville(self.knots, self.degree)
 
+    def given_points(self, duration: float, *, slope: bool = False) -> np.ndarray:
+        """What the control points (N + d,) have besides the free variables; or its slope by the duration, s."""
+        powers = np.arange(len(self.given))
+        if slope:
+            factors = powers[1:] * duration ** powers[:-1]
+            return np.asarray(factors @ self.given[1:])
+        return np.asarray(duration**powers @ self.given)
+
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
-        return np.asarray(self.matrix @ free + self.fixed + duration * self.rate)
+        return np.asarray(self.matrix @ free + self.given_points(duration))
 
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
         """Free variables that come nearest to given control points: means over those that are one variable each."""
-        own_part = control_points - self.fixed - duration * self.rate
+        own_part = control_points - self.given_points(duration)
         is_alone = np.count_nonzero(self.matrix, axis=1) == 1
         is_alone &= self.matrix.max(axis=1, initial=0.0) == 1.0
         own = self.matrix[is_alone]
         return np.asarray(own_part[is_alone] @ own / own.sum(axis=0))
-
-    def end_variable(self, point: int) -> int:
-        """Variable that the value at the start (`point` 0) or end (-1) is; -1 where that is fixed."""
-        return int(np.argmax(self.matrix[point])) if self.matrix[point].any() else -1
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:
     """Return the Greville abscissae (N + d,) of a clamped knot vector."""
     windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
     return np.asarray(windows.mean(axis=1))
+
+
+def _blossoms(knots: np.ndarray, degree: int, anchor: int, most: int) -> np.ndarray:
+    """Control points of t^j / j!, for j up to `most`, with t from the end of control point `anchor` on.
+
+    The blossom of t^j / j! is the elementary symmetric polynomial e_j of a control point's d knots, over d! / (d - j)!.
+
+    Returns
+    -------
+    (1 + most or 2, N + d) ndarray
+    """
+    abscissae = greville(knots, degree)
+    own = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
+    own = own - abscissae[anchor]
+    symmetric = np.zeros((degree + 1, len(own)))
+    symmetric[0] = 1.0
+    for column in own.T:
+        symmetric[1:] += column * symmetric[:-1]
+    blossoms = np.empty((max(most, 1) + 1, len(own)))
+    size = 1.0
+    for j in range(len(blossoms)):
+        blossoms[j] = symmetric[j] / size
+        size *= degree - j
+    blossoms[1] = abscissae - abscissae[anchor]
+    return blossoms
 
 
 def periodic(
@@ -148,12 +169,12 @@ def periodic(
     matrix = np.eye(free + orders, free)
     matrix[free:, :orders] = np.linalg.solve(last, first)
     matrix[-1] = np.eye(free)[0]  # the value itself, without rounding
-    fixed = np.zeros(len(matrix))
-    fixed[free:] = jump
+    given = np.zeros((1, len(matrix)))
+    given[0, free:] = jump
     if not np.isnan(start):
-        fixed += start * matrix[:, 0]
+        given[0] += start * matrix[:, 0]
         matrix = matrix[:, 1:]
-    return BoundarySpline(knots, degree, matrix, fixed, np.zeros(len(matrix)))
+    return BoundarySpline(knots, degree, matrix, given)
 
 
 @dataclass(frozen=True)
@@ -162,42 +183,51 @@ class Boundary:
 
     Attributes
     ----------
-    start, end : (c,) ndarray
-        Values of the curves there, NaN where free.
-    derivatives : int
-        How many derivatives are given at each end: 1 for velocity, 2 for acceleration too, 3 for jerk.
-    start_rates, end_rates : (c,) ndarray or None
-        First derivatives there per second, NaN where free; None at rest. The further ones that are given are zero.
+    start, end : (c,) tuple of EndCondition
+        Of every curve.
     periodic : bool
         Whether the end continues as the start begins, in derivatives too; nothing else is given of these then. Values
         that are given at both ends say by how much the end is ahead.
+    time_law : TimeLaw or None
+        s(t) where it is given: then the duration is too, and the first curve has no spline.
     """
 
-    start: np.ndarray
-    end: np.ndarray
-    derivatives: int
-    start_rates: np.ndarray | None = None
-    end_rates: np.ndarray | None = None
+    start: tuple[EndCondition, ...]
+    end: tuple[EndCondition, ...]
     periodic: bool = False
+    time_law: TimeLaw | None = None
+
+    @classmethod
+    def at_rest(
+        cls,
+        start: np.ndarray,
+        end: np.ndarray,
+        derivatives: int,
+        *,
+        periodic: bool = False,
+    ) -> Boundary:
+        """Give values, (c,), NaN where free, with as many vanishing derivatives at both ends."""
+        rest = np.zeros(derivatives)
+        sides = [
+            tuple(EndCondition(float(value), rest) for value in values)
+            for values in (start, end)
+        ]
+        return cls(sides[0], sides[1], periodic)
+
+    @property
+    def ahead(self) -> np.ndarray:
+        """By how much the end is ahead of the start, (c,); zero where that is free."""
+        pairs = zip(self.start, self.end, strict=True)
+        return np.nan_to_num([end.value - start.value for start, end in pairs])
 
     def splines(self, knots: np.ndarray, degree: int) -> tuple[BoundarySpline, ...]:
         """Build the conditions into splines."""
         if self.periodic:
-            pairs = zip(self.start, np.nan_to_num(self.end - self.start), strict=True)
-            return tuple(periodic(knots, degree, *pair) for pair in pairs)
-        rest = np.zeros(len(self.start))
-        first_rates = rest if self.start_rates is None else self.start_rates
-        last_rates = rest if self.end_rates is None else self.end_rates
-        columns = zip(self.start, first_rates, self.end, last_rates, strict=True)
-        return tuple(
-            BoundarySpline.between(
-                knots,
-                degree,
-                EndCondition(start, first, self.derivatives),
-                EndCondition(end, last, self.derivatives),
-            )
-            for start, first, end, last in columns
-        )
+            jumps = zip(self.start, self.ahead, strict=True)
+            return tuple(periodic(knots, degree, own.value, jump) for own, jump in jumps)
+        given = 0 if self.time_law is None else 1
+        pairs = zip(self.start[given:], self.end[given:], strict=True)
+        return tuple(BoundarySpline.between(knots, degree, *pair) for pair in pairs)
 
 
 @dataclass(frozen=True)

@@ -10,21 +10,34 @@ from typing import Any
 
 import numpy as np
 
+from brachis.common.arrays import interpolate_columns
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError, write_count
 from brachis.kinematics import (
     CHART,
     ChartMap,
     ClosedFormMap,
+    JointMap,
     JointSpaceMap,
+    Nodes,
     interpolate,
+    join_nodes,
 )
 from brachis.optimise.backends import SolverReport
+from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import Solve, SolvedProgram
-from brachis.optimise.program import Program
+from brachis.optimise.motion import Motion
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions, refine
+from brachis.optimise.transcription import maps_by_leg
 from brachis.problem.problem import Problem
-from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
+from brachis.trajectory import (
+    CONTINUOUS_TORQUE,
+    PhaseSpline,
+    Trajectory,
+    join_splines,
+)
 from brachis.verify import Verification, verify_trajectory
 
 PathMap = ClosedFormMap | ChartMap | JointSpaceMap
@@ -55,8 +68,9 @@ class InitialGuess(Summary):
         Family of the closed form; ``chart`` or ``path of joints`` without one.
     solver : str
         The solver that plans from it; empty while none is chosen.
-    timed : bool
-        Whether the joint path's values are those of a motion, at even times.
+    durations : tuple of float or None
+        Of every leg, s, where the joint path's values are those of a motion: for one leg after the other equally many,
+        at even times. None where they are not.
     """
 
     problem: Problem
@@ -66,7 +80,32 @@ class InitialGuess(Summary):
     origin: str
     family: str
     solver: str = ""
-    timed: bool = False
+    durations: tuple[float, ...] | None = None
+
+    @property
+    def legs(self) -> list[np.ndarray]:
+        """The part of the joint path on every leg, (S, 1 + r) each."""
+        legs = self.problem.legs
+        if self.durations is not None or len(legs) == 1:
+            return np.split(self.joint_path, len(legs))
+        s = self.joint_path[:, 0]
+        parts = []
+        for leg in legs:
+            inside = s[(s > leg.begin) & (s < leg.end)]
+            own = np.concatenate([[leg.begin], inside, [leg.end]])
+            parts.append(interpolate_columns(own, s, self.joint_path))
+        return parts
+
+    def maps_by_leg(self) -> list[JointMap]:
+        """Take the joint map leg by leg; raise UnreachableError where the joint path leaves it."""
+        parts = self.legs
+        if len(parts) == 1:
+            return [self.joint_map]
+        q = self.joint_map.postures(np.concatenate(parts))
+        begins = np.cumsum([0, *(len(part) for part in parts[:-1])])
+        if not np.isfinite(q).all():
+            raise UnreachableError(self.joint_map.no_posture)
+        return maps_by_leg(self.problem, self.joint_map, q[begins])
 
     @property
     def in_chart(self) -> bool:
@@ -232,19 +271,19 @@ def extract_trajectory(start: InitialGuess, solved: SolvedProgram) -> Trajectory
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    (phase,) = solved.program.phases
-    (motion,) = solved.program.motions(solved.x)
-    joint_map = phase.joint_map
-    assert joint_map.path is not None
-    joins = motion.times_of(joint_map.path.breaks[1:-1])
-    gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
-    breaks = np.union1d(motion.breaks, joins[gaps > 1e-7 * motion.t_end])
-    jumps = motion.degree < CONTINUOUS_TORQUE
-    nodes = interpolate(joint_map, motion.at, breaks, jumps=jumps)
+    parts = [_Part.of(solved, 0)]
+    for number in range(1, len(solved.program.phases)):
+        if parts[-1].pause:
+            parts.append(parts[-1].wait())
+        parts.append(_Part.of(solved, number, parts[-1]))
+    splines = [part.spline for part in parts]
+    knots, control_points = join_splines(splines)
+    joint_map = solved.program.phases[0].joint_map
     rows = np.empty((0, 0, 0))
-    knots = np.empty(0)
+    chart_knots = np.empty(0)
     if isinstance(joint_map, ChartMap):
-        rows, knots = joint_map.rows.arrays()
+        rows, chart_knots = joint_map.rows.arrays()
+    nodes = join_nodes([part.nodes for part in parts])
     return Trajectory(
         task=start.problem.task,
         urdf=joint_map.robot.urdf,
@@ -256,13 +295,85 @@ def extract_trajectory(start: InitialGuess, solved: SolvedProgram) -> Trajectory
         qdot=nodes.qdot,
         qddot=nodes.qddot,
         qddot_before=nodes.qddot_before,
-        knots=motion.knots,
-        degree=motion.degree,
-        control_points=motion.control_points,
-        phase_ends=nodes.times[-1:],
+        knots=knots,
+        degree=splines[0].degree,
+        control_points=control_points,
+        phase_ends=np.cumsum([part.nodes.times[-1] for part in parts]),
         chart_rows=rows,
-        chart_knots=knots,
+        chart_knots=chart_knots,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A phase of a trajectory: its curves, its nodes, and how long the arm waits after it, s."""
+
+    spline: PhaseSpline
+    nodes: Nodes
+    pause: float = 0.0
+    motion: Motion | None = None
+
+    @classmethod
+    def of(
+        cls, solved: SolvedProgram, number: int, before: _Part | None = None
+    ) -> _Part:
+        """Extract a phase that goes on exactly as the part before it ends."""
+        phase, x = solved.program.split(solved.x)[number]
+        motion = phase.motion(x)
+        joint_map = phase.joint_map
+        path = joint_map.path
+        assert path is not None
+        if before is not None:
+            joint_map = joint_map.along(path, before.nodes.q[-1])
+            motion = _continue(motion, phase, before, _link_to(solved.program, number))
+        joins = motion.times_of(_inside(path.breaks, motion))
+        gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
+        breaks = np.union1d(motion.breaks, joins[gaps > 1e-7 * motion.t_end])
+        jumps = motion.degree < CONTINUOUS_TORQUE
+        nodes = interpolate(joint_map, motion.at, breaks, jumps=jumps)
+        return cls(motion.as_spline(), nodes, phase.pause, motion)
+
+    def wait(self) -> _Part:
+        """Wait at rest where this part ends."""
+        degree = self.spline.degree
+        knots = clamped_knots(degree, np.array([0.0, 1.0]))
+        points = np.repeat(self.spline.control_points[:, -1:], degree + 1, axis=1)
+        q = np.tile(self.nodes.q[-1], (2, 1))
+        still = np.zeros_like(q)
+        times = np.array([0.0, self.pause])
+        nodes = Nodes(times, q, still, still, still, 0.0)
+        return _Part(PhaseSpline(self.pause, knots, degree, points), nodes)
+
+
+def _link_to(program: Program, number: int) -> Link | None:
+    """Return the link from the phase before; None without one."""
+    pair = (number - 1, number)
+    links = (link for link in program.links if (link.before, link.after) == pair)
+    return next(links, None)
+
+
+def _continue(motion: Motion, phase: Phase, before: _Part, link: Link | None) -> Motion:
+    """Let the redundant curves begin exactly as those of the part before end, which a link holds to rounding."""
+    if link is None:
+        return motion
+    if before.motion is None:
+        last = before.spline.control_points[1:, -1][None]
+    else:
+        ends = before.motion.at(np.array([before.motion.t_end]))
+        last = np.array([ends[order][0, 1:] for order in link.orders])
+    first = 0 if motion.time_law is None else 1
+    own = motion.at(np.zeros(1))
+    given = len(phase.boundary.start[-1].derivatives)
+    count = max(len(last), 1 + given)
+    values = np.array([curves[0, first:] for curves in own[:count]])
+    values[: len(last), 1 - first :] = last
+    return motion.with_start(values)
+
+
+def _inside(s: np.ndarray, motion: Motion) -> np.ndarray:
+    """Path coordinates that a motion passes within, of (P,)."""
+    begin, end = motion.at(np.array([0.0, motion.t_end]))[0][:, 0]
+    return s[(s > begin) & (s < end)]
 
 
 def refine_and_verify(
@@ -315,12 +426,17 @@ def with_points_at_violations(candidate: Candidate) -> Program | None:
     failed = [check for check in candidate.verification.checks if not check.passed]
     if not failed or any(not check.of_limit or check.time is None for check in failed):
         return None
-    t_norm = np.array([check.time for check in failed]) / candidate.t_end
-    # A peak moves when it is held down.
-    near = t_norm[:, None] + 1e-4 * np.array([-1.0, 0.0, 1.0])
-    (phase,) = refined.program.phases
-    points = np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))
-    return refined.program.with_points([points])
+    assert candidate.trajectory is not None
+    moves = [phase for phase in candidate.trajectory.phases if not phase.is_dwell]
+    times = np.array([check.time for check in failed])
+    points = []
+    for phase, move in zip(refined.program.phases, moves, strict=True):
+        own = times[(times >= move.begin) & (times <= move.end)]
+        t_norm = (own - move.begin) / move.duration
+        # A peak moves when it is held down.
+        near = t_norm[:, None] + 1e-4 * np.array([-1.0, 0.0, 1.0])
+        points.append(np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0)))
+    return refined.program.with_points(points)
 
 
 def _verify(
@@ -336,7 +452,7 @@ def _verify(
         with contextlib.suppress(UnreachableError):
             trajectory = extract_trajectory(start, refined)
             verification = verify_trajectory(trajectory, own_limits=problem.user_limits)
-    (phase,) = refined.program.phases
+    phase = refined.program.phases[0]
     tolerance = problem.task.refinement.tolerance
     return dataclasses.replace(
         candidate,

@@ -15,7 +15,6 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
-from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.backends import (
     Progress,
     Solver,
@@ -232,21 +231,23 @@ class SolverSession:
         cls,
         backend: Solver,
         settings: SolverSettings,
-        joint_map: JointMap,
+        r: int,
         deadline: Deadline,
         listener: Listener,
+        *,
+        is_flat: bool,
     ) -> SolverSession:
-        """Take the bounds from the task's ``solver`` part.
+        """Take the bounds from the task's ``solver`` part, for a map with `r` redundant joints.
 
-        In a chart many motions are equally fast, and no branch boundary slows a solve
-        down. So a solve ends there after fewer iterates without gain.
+        Where many motions are equally fast, in charts and where the time is given, a solve ends after fewer iterates
+        without gain.
         """
         iterations = settings.max_iterations
         default = SolverSettings.model_fields["max_iterations"].default
         if settings.name == "auto" and iterations == default:
-            iterations = _ITERATIONS * max(joint_map.r, 1)
+            iterations = _ITERATIONS * max(r, 1)
         options = SolverOptions(settings.tolerance, iterations, settings.time_limit)
-        if isinstance(joint_map, ChartMap):
+        if is_flat:
             options = dataclasses.replace(options, progress=1e-5, patience=10)
 
         def progress(iteration: int, objective: float) -> None:

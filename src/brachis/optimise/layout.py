@@ -1,17 +1,17 @@
 """Where variables, rows and entries of the Jacobian stand in a phase.
 
 Variables: the duration T in seconds, then the free control points (see `boundary`) of each curve: of s(t) where there
-is a path, then of each joint that is chosen freely, in chain order. Boundary conditions are built into the control
-points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
+is a path and no time law, then of each joint that is chosen freely, in chain order. Boundary conditions are built into
+the control points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see
+`grid`). A duration that is given has equal bounds.
 
-Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on, or
-their c means over time where it is held over the whole motion; along a path then differences of successive control
-points of s, which are >= 0 so that ds/dt >= 0 holds at all times (see `Progress`); where the knots are free, last the
-sum of h, which is 1. All rows are dimensionless.
+Rows: for each limit that holds at every instant, in the order of the list, its c values at collocation point 0, then at
+point 1, and so on; along a path then differences of successive control points of s, which are >= 0 so that ds/dt >= 0
+holds at all times (see `Progress`); where the knots are free, last the sum of h, which is 1. All rows are dimensionless.
+Means over time are rows of the program.
 
 Entries of the Jacobian: of all limits that hold at every point, those by T, by the variables of each curve and by h,
-all columns of a point together; then of the means, those by all variables; then those of the differences; last 1 for
-each of h.
+all columns of a point together; then those of the differences; last 1 for each of h.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import numpy as np
 from brachis.limits import Limit
 from brachis.optimise.boundary import BoundarySpline, SparsityPattern
 from brachis.optimise.grid import FixedGrid
+from brachis.path.time_law import TimeLaw
 
 SHORTEST_TIME = 1e-4
 """Least duration of a phase, s: a motion that takes no longer is not held back by any limit."""
@@ -36,34 +37,54 @@ class Progress:
 
     Attributes
     ----------
-    offset : (p,) ndarray
-        What the rows are besides.
+    given : (1 + k, p) ndarray
+        What the rows are besides the free variables, by powers of the duration.
     row, variable : (z,) int ndarray
-        Entries of the Jacobian, which is constant, each place once; variables of the phase, the duration among them.
+        Entries of the Jacobian, each place once; variables of the phase, the duration among them.
     weight : (z,) ndarray
+        The entries; 0 for the duration.
     """
 
-    offset: np.ndarray
+    given: np.ndarray
     row: np.ndarray
     variable: np.ndarray
     weight: np.ndarray
 
     @classmethod
+    def none(cls) -> Progress:
+        """Make no rows."""
+        nothing = np.empty(0, dtype=int)
+        return cls(np.empty((1, 0)), nothing, nothing, np.empty(0))
+
+    @classmethod
     def of(cls, spline: BoundarySpline) -> Progress:
         """Take the differences of a spline whose free variables follow the duration, variable 0."""
-        differences = np.diff(np.column_stack([spline.rate, spline.matrix]), axis=0)
-        several = np.count_nonzero(differences, axis=1) > 1
-        kept = differences[several]
-        row, variable = np.nonzero(kept)
-        offset = np.diff(spline.fixed)[several]
-        return cls(offset, row, variable, kept[row, variable])
+        given = np.diff(spline.given, axis=1)
+        matrix = np.diff(spline.matrix, axis=0)
+        depends = given[1:].any(axis=0)
+        several = np.count_nonzero(matrix, axis=1) + depends > 1
+        several |= given[2:].any(axis=0)
+        weights = np.column_stack([np.zeros(several.sum()), matrix[several]])
+        is_entry = weights != 0.0
+        is_entry[:, 0] = depends[several]
+        row, variable = np.nonzero(is_entry)
+        return cls(given[:, several], row, variable, weights[row, variable])
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (p,)."""
+        powers = np.arange(len(self.given))
         parts = np.bincount(
-            self.row, weights=self.weight * x[self.variable], minlength=len(self.offset)
+            self.row,
+            weights=self.weight * x[self.variable],
+            minlength=self.given.shape[1],
         )
-        return np.asarray(self.offset + parts)
+        return np.asarray(x[0] ** powers @ self.given + parts)
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the Jacobian, (z,)."""
+        powers = np.arange(len(self.given))
+        by_duration = (powers[1:] * x[0] ** powers[:-1]) @ self.given[1:]
+        return np.where(self.variable == 0, by_duration[self.row], self.weight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +103,8 @@ class Layout:
         Where variables matter at all, by T, by each curve, then by h.
     progress : Progress
         Differences of control points of s; empty without a path.
-    limit_rows : tuple of (K, c) or (1, c) int ndarray
-        Numbers of the rows of each limit.
+    limit_rows : tuple of (K, c) int ndarray
+        Numbers of the rows of each limit; none, (0, c), where its means are held.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -113,21 +134,27 @@ class Layout:
         limits: Sequence[Limit],
         *,
         has_path: bool,
+        time_law: TimeLaw | None,
     ) -> Layout:
-        """Lay a phase out over a grid; the first of its `splines` is s where there is a path."""
+        """Lay a phase out over a grid; the first of its `splines` is s where there is a path.
+
+        With a time law the duration is given, and none of the splines is s.
+        """
         ends = np.cumsum([1, *(spline.free for spline in splines)]).tolist()
         slices = tuple(itertools.starmap(slice, itertools.pairwise(ends)))
         lengths = slice(ends[-1], ends[-1] + len(grid.lower))
         x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
         x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
         x_lower[0] = SHORTEST_TIME
-        nothing = np.empty(0, dtype=int)
-        progress = Progress(np.empty(0), nothing, nothing, np.empty(0))
-        if has_path:
+        progress = Progress.none()
+        if time_law is not None:
+            x_lower[0] = time_law.duration
+            x_upper[0] = time_law.duration
+        elif has_path:
             progress = Progress.of(splines[0])
-        if has_path and not splines[0].rate.any():
-            x_lower[slices[0]] = 0.0
-            x_upper[slices[0]] = 1.0
+            if not splines[0].given[1:].any():
+                x_lower[slices[0]] = splines[0].given[0].min()
+                x_upper[slices[0]] = splines[0].given[0].max()
 
         columns = grid.basis(grid.lengths_of(grid.knots)).columns
         patterns = tuple(SparsityPattern.of(columns, spline) for spline in splines)
@@ -145,29 +172,26 @@ class Layout:
         limit_rows = []
         first = 0
         for limit in limits:
-            times = 1 if limit.guarantee.is_mean else count
+            times = 0 if limit.guarantee.is_mean else count
             size = times * len(limit.lower)
-            limit_rows.append(np.arange(first, first + size).reshape(times, -1))
+            shape = (times, len(limit.lower))
+            limit_rows.append(np.arange(first, first + size).reshape(shape))
             first += size
         pairs = list(zip(limits, limit_rows, strict=True))
-        steps = len(progress.offset)
+        steps = progress.given.shape[1]
         lower = [np.tile(limit.lower, len(rows)) for limit, rows in pairs]
         upper = [np.tile(limit.upper, len(rows)) for limit, rows in pairs]
 
-        at_points = [rows for limit, rows in pairs if not limit.guarantee.is_mean]
-        of_means = [rows.ravel() for limit, rows in pairs if limit.guarantee.is_mean]
+        at_points = [rows for rows in limit_rows if len(rows)]
         pointwise = np.hstack([np.empty((count, 0), dtype=int), *at_points])
-        means = np.concatenate([nothing, *of_means])
         h = np.arange(lengths.start, lengths.stop)
         jacobian_rows = [
             pointwise[point].ravel(),
-            np.repeat(means, lengths.stop),
             first + progress.row,
             np.full(len(h), first + steps),
         ]
         jacobian_columns = [
             np.repeat(variable, pointwise.shape[1]),
-            np.tile(np.arange(lengths.stop), len(means)),
             progress.variable,
             h,
         ]

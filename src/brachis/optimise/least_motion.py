@@ -31,7 +31,8 @@ from brachis.optimise.backends import (
 )
 from brachis.optimise.candidate import Candidate, refine_and_verify
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.program import LeastAcceleration, Program
+from brachis.optimise.objective import LeastAcceleration
+from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification

@@ -104,10 +104,7 @@ def _transfer(
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    # Few intervals may not keep a least speed.
-    has_least_speed = any(limit.longer_time == "violates" for limit in program.limits)
-    fewest = 36 if has_least_speed else 12
-    halvings = [int(np.log2(max(own.intervals / fewest, 1))) for own in program.phases]
+    halvings = [int(np.log2(max(own.intervals / 12, 1))) for own in program.phases]
     for k in range(max(halvings), 0, -1):
         pairs = zip(program.phases, halvings, strict=True)
         yield program.with_phases(
@@ -206,7 +203,12 @@ def _choose_intervals(
 
 
 def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Time that each interval loses, (N,), s: how far as many limits as there are curves swing within it."""
+    """Time that each interval loses, (N,), s: how far as many limits as there are curves swing within it.
+
+    Where the duration is given, none is lost.
+    """
+    if phase.time_law is not None:
+        return np.zeros(phase.intervals)
     breaks = phase.breaks
     samples = 8
     ratios = np.abs(phase.with_points(spread(breaks, samples)).time_scaling_ratios(x))

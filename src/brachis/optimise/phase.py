@@ -1,7 +1,8 @@
 """One phase of a motion: spline curves y, mapped to joints, within limits at collocation points.
 
 A phase has variables x = (T, c_1, ..., c_c [, h]), its duration and the free control points of its curves, and rows;
-see `layout`. With basis matrices B, B', B'' in normalised time,
+see `layout`. Where a time law gives s(t), T is given too, and s has no control points. With basis matrices B, B', ...
+in normalised time,
 
     dy/dc = B,  dydot/dc = B' / T,  dyddot/dc = B'' / T^2,  dydot/dT = -ydot / T,  dyddot/dT = -2 yddot / T
     dy/dh = dB/dh c,  dydot/dh = dB'/dh c / T,  dyddot/dh = dB''/dh c / T^2,  and so on
@@ -11,90 +12,33 @@ Slopes of the limits by y and its derivatives come from the `evaluator`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from brachis.common.summary import Summary
 from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Partials, Role
+from brachis.limits import Limit, Moments, Partials, Role
 from brachis.limits.safeguards import MARGIN, build_branch_margins
 from brachis.optimise.boundary import Boundary, LocalBasis
-from brachis.optimise.bspline import insert_knots
+from brachis.optimise.bspline import ORDERS
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.grid import FixedGrid, FreeGrid
 from brachis.optimise.layout import Layout
+from brachis.optimise.motion import Motion, given_orders, per_second
 
 
-def bisect(
-    is_before: Callable[[np.ndarray], np.ndarray], end: np.ndarray
-) -> np.ndarray:
-    """Find numbers between 0 and `end`, (P,), up to which a condition holds.
-
-    Parameters
-    ----------
-    is_before : callable
-        Tells of trial numbers, (P,), whether they come before the ones that are sought.
-    end : (P,) ndarray
-    """
-    low = np.zeros(len(end))
-    high = end
-    for _ in range(45 if len(end) else 0):  # to 3e-14 of the end
-        middle = 0.5 * (low + high)
-        before = is_before(middle)
-        low = np.where(before, middle, low)
-        high = np.where(before, high, middle)
-    return np.asarray(0.5 * (low + high))
-
-
-def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
-    """Value and derivatives per second, from those per unit of normalised time."""
-    return tuple(part / t_end**order for order, part in enumerate(orders))
-
-
-@dataclass(frozen=True, repr=False)
-class Motion(Summary):
-    """A point x of a phase as curves.
+class Means(NamedTuple):
+    """Means over a phase of the values that are held as means, and their slopes.
 
     Attributes
     ----------
-    t_end : float
-        s.
-    knots : ndarray
-        In normalised time.
-    degree : int
-    control_points : (c, N + d) ndarray
-        Of each curve: along a path of s, then of each redundant joint in chain order.
+    values : (m,) ndarray
+    slopes : (m, v) ndarray
     """
 
-    t_end: float
-    knots: np.ndarray
-    degree: int
-    control_points: np.ndarray
-
-    @property
-    def breaks(self) -> np.ndarray:
-        """Times between which the curves are polynomials, (N + 1,), s."""
-        return np.unique(self.knots) * self.t_end
-
-    def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), in seconds.
-
-        At knots those behind them.
-        """
-        basis = LocalBasis.of(self.knots, self.degree, t / self.t_end)
-        return per_second(basis.curves(self.control_points), self.t_end)
-
-    def with_knots(self, knots: np.ndarray) -> Motion:
-        """Return the same curves over a clamped knot vector that contains the present one."""
-        points = insert_knots(self.control_points, self.knots, knots, self.degree)
-        return Motion(self.t_end, knots, self.degree, points)
-
-    def times_of(self, s: np.ndarray) -> np.ndarray:
-        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-        end = np.full(len(s), self.t_end)
-        return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
+    values: np.ndarray
+    slopes: np.ndarray
 
 
 class Phase:
@@ -111,11 +55,15 @@ class Phase:
     margin : float or None, optional
         Least branch margin, where the joint map has one: a safeguard that is added to the limits. None: nothing is
         added.
+    pause : float, optional
+        How long the arm waits at rest after the phase, s.
 
     Attributes
     ----------
-    joint_map, grid, boundary
+    joint_map, grid, boundary, pause
         As given.
+    time_law : TimeLaw or None
+        s(t) where it is given.
     limits : tuple of Limit
         Those given, then the safeguards.
     evaluator : Evaluator
@@ -145,6 +93,7 @@ class Phase:
         boundary: Boundary,
         *,
         margin: float | None = MARGIN,
+        pause: float = 0.0,
     ) -> None:
         safeguards = () if margin is None else build_branch_margins(joint_map, margin)
         self.joint_map = joint_map
@@ -153,8 +102,15 @@ class Phase:
         self.grid = grid
         self.boundary = boundary
         self.splines = boundary.splines(grid.knots, grid.degree)
-        has_path = joint_map.path is not None
-        layout = Layout.of(grid, self.splines, self.limits, has_path=has_path)
+        self.pause = pause
+        self.time_law = boundary.time_law
+        layout = Layout.of(
+            grid,
+            self.splines,
+            self.limits,
+            has_path=joint_map.path is not None,
+            time_law=self.time_law,
+        )
         self._layout = layout
         self.slices = layout.slices
         self.degree = grid.degree
@@ -176,7 +132,9 @@ class Phase:
     def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
         """Return the same phase over another grid, and with other boundary conditions where they are given."""
         boundary = boundary or self.boundary
-        return Phase(self.joint_map, self.limits, grid, boundary, margin=None)
+        return Phase(
+            self.joint_map, self.limits, grid, boundary, margin=None, pause=self.pause
+        )
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
         """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
@@ -201,7 +159,14 @@ class Phase:
 
     def with_limits(self, limits: Sequence[Limit]) -> Phase:
         """Return the same phase with other limits, safeguards included; x keeps its meaning."""
-        return Phase(self.joint_map, limits, self.grid, self.boundary, margin=None)
+        return Phase(
+            self.joint_map,
+            limits,
+            self.grid,
+            self.boundary,
+            margin=None,
+            pause=self.pause,
+        )
 
     def with_margin(self, margin: float) -> Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""
@@ -218,26 +183,33 @@ class Phase:
         """Interval lengths that are variables; empty where the knots are fixed."""
         return x[self._layout.lengths]
 
-    def end_variables(self, point: int) -> np.ndarray:
-        """Variables that are the curves' values at the start (`point` 0) or end (-1), (c,); -1 where fixed."""
-        own = np.array([spline.end_variable(point) for spline in self.splines])
-        first = np.array([part.start for part in self.slices])
-        return np.where(own >= 0, first + own, -1)
-
     def motion(self, x: np.ndarray) -> Motion:
         """Curves that belong to x."""
         h = self._h(x)
         # Should the lengths add up to a little more or less than 1, so much longer or shorter is the motion.
         t_end = float(x[0] * self.grid.t_norm_at(h)[-1])
         points = self._control_points(x)
-        return Motion(t_end, self.grid.knots_at(h), self.degree, points)
+        knots = self.grid.knots_at(h)
+        return Motion(t_end, knots, self.degree, points, self.time_law)
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
         parts = zip(self.splines, self.slices, strict=True)
-        return np.array(
-            [spline.control_points(x[part], x[0]) for spline, part in parts]
-        )
+        points = [spline.control_points(x[part], x[0]) for spline, part in parts]
+        return np.reshape(points, (len(self.splines), self.intervals + self.degree))
+
+    def _orders(
+        self, x: np.ndarray, control_points: np.ndarray, *, is_slope: bool = False
+    ) -> np.ndarray:
+        """Value and derivatives of all curves at the collocation points, (4, K, c), by normalised time.
+
+        With `is_slope` the control points are those of slopes, and that of a curve that is given is zero.
+        """
+        h = self._h(x)
+        own = self.grid.basis(h).curves(control_points)
+        given = given_orders(self.time_law, self.grid.t_norm_at(h))
+        factor = 0.0 if is_slope else 1.0
+        return np.concatenate([*(factor * part for part in given), own], axis=2)
 
     def variables_from(self, motion: Motion) -> np.ndarray:
         """Point x nearest to given curves over the same knots, or over as many where these are free."""
@@ -257,10 +229,8 @@ class Phase:
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self.evaluations["states"] += 1
-            h = self._h(x)
-            basis = self.grid.basis(h)
-            curves = per_second(basis.curves(self._control_points(x)), x[0])
-            t = self.grid.t_norm_at(h) * x[0]
+            curves = per_second(self._orders(x, self._control_points(x)), x[0])
+            t = self.grid.t_norm_at(self._h(x)) * x[0]
             self._last = (key, self.evaluator.evaluate(*curves, t=t))
         return self._last[1]
 
@@ -270,37 +240,48 @@ class Phase:
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError as `evaluate` does."""
-        values = [self._limit_values(limit, x).ravel() for limit in self.limits]
+        evaluation = self.evaluate(x)
+        pairs = zip(self.limits, evaluation.by_limit, strict=True)
+        values = [own.ravel() for limit, own in pairs if not limit.guarantee.is_mean]
         totals = np.full(len(self.grid.total), self._h(x).sum())
         return np.concatenate([*values, self._layout.progress.values(x), totals])
-
-    def _number_of(self, limit: Limit) -> int:
-        """Place of a limit among those of the phase."""
-        return next(i for i, own in enumerate(self.limits) if own is limit)
-
-    def _limit_values(self, limit: Limit, x: np.ndarray) -> np.ndarray:
-        """Values of a limit that are rows, (K, c), or (1, c) where their means are."""
-        values = self.evaluate(x).by_limit[self._number_of(limit)]
-        if limit.guarantee.is_mean:
-            return np.asarray(self.grid.mean_weights(self._h(x))[None] @ values)
-        return values
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
         return any(own is limit for own in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:
-        """Numbers of the rows of one of the limits, (K, c), or (1, c) where its means are rows."""
-        return self._layout.limit_rows[self._number_of(limit)]
+        """Numbers of the rows of one of the limits, (K, c); none, (0, c), where its means are held."""
+        number = next(i for i, own in enumerate(self.limits) if own is limit)
+        return self._layout.limit_rows[number]
 
-    def violation_of_means(self, x: np.ndarray) -> float:
-        """How far the limits that hold over the whole motion are violated; -inf without such limits."""
-        means = [
-            limit.violation(self._limit_values(limit, x)).max()
-            for limit in self.limits
-            if limit.guarantee.is_mean
-        ]
-        return float(max(means, default=-np.inf))
+    def means(self, x: np.ndarray) -> np.ndarray:
+        """Means over the phase of the values that are held as means, (m,)."""
+        weights = self.grid.mean_weights(self._h(x))
+        return np.asarray(weights @ self.evaluate(x).values[:, self.evaluator.is_mean])
+
+    def mean_slopes(self, x: np.ndarray) -> np.ndarray:
+        """Slopes of `means`, (m, v)."""
+        is_mean = self.evaluator.is_mean
+        evaluation = self.evaluate(x)
+        weights = self.grid.mean_weights(self._h(x))
+        slopes = self._chain_rule(evaluation.slopes, x)[:, is_mean]
+        total = self._sum_up(slopes, weights)
+        values = evaluation.values[:, is_mean]
+        total[:, self._layout.lengths] += values.T @ self.grid.mean_slopes.T
+        return total
+
+    def waiting(self, x: np.ndarray) -> Means:
+        """Values that are held as means, and their slopes, while the arm waits at the phase's end."""
+        evaluation = self.evaluate(x)
+        still = Moments.at_rest(evaluation.motion.q[-1:])
+        limits = [limit for limit in self.limits if limit.guarantee.is_mean]
+        values = np.concatenate([limit.values(still)[0] for limit in limits])
+        by_q = [_by_posture(limit.partials(still), still.q) for limit in limits]
+        by_y = np.zeros((len(self.t_norm), len(values), evaluation.motion.y.shape[1]))
+        by_y[-1] = np.concatenate(by_q) @ evaluation.motion.gradient[-1]
+        slopes = self._chain_rule((by_y,), x)
+        return Means(values, self._sum_up(slopes, np.ones(len(self.t_norm))))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
         """How far the limits are violated at every collocation point, (K, c); negative inside.
@@ -329,11 +310,12 @@ class Phase:
         Raises UnreachableError as `evaluate` does.
         """
         every = np.zeros((len(self.t_norm), 1))
-        ratios = [
-            limit.ratio(self._limit_values(limit, x)) + every
-            for limit in self.limits
-            if limit.longer_time == "relieves"
-        ]
+        weights = self.grid.mean_weights(self._h(x))[None]
+        ratios = []
+        for limit, values in zip(self.limits, self.evaluate(x).by_limit, strict=True):
+            if limit.longer_time == "relieves":
+                own = weights @ values if limit.guarantee.is_mean else values
+                ratios.append(limit.ratio(own) + every)
         return np.hstack(ratios)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -342,15 +324,10 @@ class Phase:
         evaluation = self.evaluate(x)
         is_mean = self.evaluator.is_mean
         slopes = self._chain_rule(evaluation.slopes, x)
-        entries = [slopes[:, ~is_mean].ravel()]
-        if is_mean.any():
-            weights = self.grid.mean_weights(self._h(x))
-            of_means = self._sum_up(slopes[:, is_mean], weights)
-            values = evaluation.values[:, is_mean]
-            of_means[:, self._layout.lengths] += values.T @ self.grid.mean_slopes.T
-            entries.append(of_means.ravel())
+        of_limits = slopes[:, ~is_mean].ravel()
+        of_progress = self._layout.progress.jacobian(x)
         of_total = np.ones(len(self.grid.lower))
-        return np.concatenate([*entries, self._layout.progress.weight, of_total])
+        return np.concatenate([of_limits, of_progress, of_total])
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
         """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `evaluate` does.
@@ -361,8 +338,36 @@ class Phase:
             Of its terms with respect to the joints, one term a point: (K, 1, n).
         x : (v,) ndarray
         """
-        slopes = self._chain_rule(self.evaluate(x).chain(partials), x)
-        return self._sum_up(slopes, np.ones(len(self.t_norm)))[0]
+        return self.gradient_by_curves(self.evaluate(x).chain(partials), x)
+
+    def gradient_by_curves(
+        self, slopes: Sequence[np.ndarray], x: np.ndarray
+    ) -> np.ndarray:
+        """Gradient, (v,), of a sum over the collocation points with slopes (K, 1, c) by y, ydot, ... at each."""
+        entries = self._chain_rule(slopes, x)
+        return self._sum_up(entries, np.ones(len(self.t_norm)))[0]
+
+    def end_pattern(self, point: int) -> np.ndarray:
+        """Variables, (z,), that matter for the curves at the first (0) or last (-1) collocation point."""
+        return self._layout.variable[self._at_end(point)]
+
+    def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
+        """Slopes of the curves and their time derivatives at an end, (4, c, z); see `end_pattern`."""
+        curves = len(self.boundary.start)
+        unit = np.zeros((len(self.t_norm), curves, curves))
+        unit[point] = np.eye(curves)
+        zero = np.zeros_like(unit)
+        slopes = []
+        for order in range(ORDERS):
+            by = [unit if own == order else zero for own in range(ORDERS)]
+            slopes.append(self._chain_rule(by, x)[self._at_end(point)].T)
+        return np.array(slopes)
+
+    def _at_end(self, point: int) -> np.ndarray:
+        """Numbers of the entries at the first or last collocation point; not that by a duration that is given."""
+        number = range(len(self.t_norm))[point]
+        is_free = (self._layout.variable > 0) | (self.time_law is None)
+        return np.flatnonzero((self._layout.point == number) & is_free)
 
     def _sum_up(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Add up slopes, (z, c), over the collocation points, with weights (K,): (c, v)."""
@@ -378,8 +383,9 @@ class Phase:
         pairs = zip(by, self._by_duration(x), strict=False)
         of_time = sum(np.einsum("kcj,kj->kc", slope, own) for slope, own in pairs)
         of_curves = []
+        first = by[0].shape[2] - len(self.splines)  # a given curve has no variables
         bases = zip(self._layout.patterns, self._bases(x), strict=True)
-        for j, (pattern, basis) in enumerate(bases):
+        for j, (pattern, basis) in enumerate(bases, first):
             values = per_second(basis[:orders], x[0])
             parts = (
                 slope[pattern.point, :, j] * own[:, None]
@@ -387,15 +393,17 @@ class Phase:
             )
             of_curves.append(sum(parts, start=np.zeros(())))
         by_h = self.grid.slopes(self._h(x), self._control_points(x))[:orders]
-        together = np.concatenate(by, axis=2)[self.grid.point]
+        together = np.concatenate([own[:, :, first:] for own in by], axis=2)
+        together = together[self.grid.point]
         of_lengths = together @ np.hstack(per_second(by_h, x[0]))[:, :, None]
         return np.concatenate([of_time, *of_curves, of_lengths[:, :, 0]])
 
     def _by_duration(self, x: np.ndarray) -> list[np.ndarray]:
         """Slopes of the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
         state = self.state(x)
-        rates = np.array([spline.rate for spline in self.splines])
-        moving = per_second(self.grid.basis(self._h(x)).curves(rates), x[0])
+        given = [spline.given_points(x[0], slope=True) for spline in self.splines]
+        rates = np.reshape(given, (len(self.splines), self.intervals + self.degree))
+        moving = per_second(self._orders(x, rates, is_slope=True), x[0])
         curves = (state.y, state.ydot, state.yddot, state.ydddot)
         pairs = zip(moving, curves, strict=True)
         return [rate - i / x[0] * part for i, (rate, part) in enumerate(pairs)]
@@ -413,3 +421,12 @@ class Phase:
 def _is_checked_at_points(limit: Limit) -> bool:
     """Tell whether a violation of the limit counts at single points."""
     return limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean
+
+
+def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:
+    """Slopes of a limit at rest by the posture, (c, n); zero where it does not depend on it."""
+    if partials.q is None:
+        parts = (partials.qdot, partials.qddot, partials.qdddot)
+        other = next(part for part in parts if part is not None)
+        return np.zeros((other.shape[1], q.shape[1]))
+    return np.asarray(partials.q[0])

@@ -4,128 +4,66 @@
     over        x = the variables of the first phase, then of the second, ...
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
-Rows are those of the phases, one phase after the other, then those of the links. Most motions have one phase and no
-links; see `phase`. The objective is a sum over the phases. Where a link joins two phases, both rest.
+Rows are those of the phases, one phase after the other, then means over the whole motion, then those of the links. Most
+motions have one phase and no links; see `phase`. The objective is a sum over the phases.
+
+A mean is held over all phases, and over the pauses at rest between them, by their durations.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from brachis.common.summary import Summary
 from brachis.kinematics import JointState
-from brachis.limits import Bound, Limit, Partials, Role
-from brachis.optimise.phase import Motion, Phase
-
-
-class Objective(Protocol):
-    """A function of the phases' motions.
-
-    Attributes
-    ----------
-    longest : float or (phases,) ndarray
-        Upper bounds on the phases' durations, s.
-    """
-
-    @property
-    def longest(self) -> float | np.ndarray: ...  # noqa: D102
-
-    def value(self, phase: Phase, x: np.ndarray) -> float:
-        """Share of a phase at its variables x, (v,)."""
-        ...
-
-    def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Gradient of the share, (v,)."""
-        ...
-
-
-@dataclass(frozen=True)
-class EndTime:
-    """The end time t_E, s: the sum of the durations."""
-
-    longest: float = np.inf
-
-    def value(self, _phase: Phase, x: np.ndarray) -> float:
-        """Duration of a phase, s."""
-        return float(x[0])
-
-    def gradient(self, _phase: Phase, x: np.ndarray) -> np.ndarray:
-        """1 for the duration, which is the first variable, else 0."""
-        unit = np.zeros(len(x))
-        unit[0] = 1.0
-        return unit
-
-
-@dataclass(frozen=True, eq=False)
-class LeastAcceleration:
-    """Mean over a phase's time of the sum over the joints of (weights_i qddot_i)^2, by the trapezoidal rule.
-
-    Attributes
-    ----------
-    weights : (n,) ndarray
-        By joint, reciprocals of accelerations.
-    longest : (phases,) ndarray
-        See `Objective`.
-    """
-
-    weights: np.ndarray
-    longest: np.ndarray
-
-    def value(self, phase: Phase, x: np.ndarray) -> float:
-        """Mean over a phase; raises UnreachableError as `Phase.evaluate` does."""
-        squares = (phase.state(x).qddot * self.weights) ** 2
-        return float(_shares(phase) @ squares.sum(axis=1))
-
-    def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Gradient of the mean, (v,); raises UnreachableError as `Phase.evaluate` does."""
-        slopes = 2.0 * _shares(phase)[:, None] * self.weights**2 * phase.state(x).qddot
-        return phase.gradient(Partials(qddot=slopes[:, None]), x)
-
-
-def _shares(phase: Phase) -> np.ndarray:
-    """Weights of the trapezoidal rule at the collocation points, (K,)."""
-    gaps = np.concatenate([[0.0], np.diff(phase.t_norm), [0.0]])
-    return np.asarray(0.5 * (gaps[:-1] + gaps[1:]))
+from brachis.limits import Bound, Limit, Role
+from brachis.optimise.motion import Motion
+from brachis.optimise.objective import EndTime, Objective
+from brachis.optimise.phase import Phase
 
 
 @dataclass(frozen=True)
 class Link:
-    """Joints whose positions at the end of one phase are those at the start of another.
+    """Where one phase ends, another one begins: some curves have the same values and derivatives there.
 
-    A row for each of them is the difference of the two, rad or m, turns included, which is 0. Where a phase fixes a
-    position at its boundary, only the other phase's variables matter; a joint that both phases fix needs no link. Along
-    paths on both sides the redundant joints are enough: the closed form gives the others.
+    A row for each of them is the difference of the two, times the duration of a knot interval to the power of the
+    derivative's order, which is 0. Along a path with the same joint map on both sides, equal curves are equal motions.
 
     Attributes
     ----------
     before, after : int
         Numbers of the phase that ends, and of the one that begins there.
-    joints : tuple of int
+    curves : tuple of int
+    orders : tuple of int
+        What is the same: 0 for the values, 1 for the first time derivatives, ...
     """
 
     before: int
     after: int
-    joints: tuple[int, ...]
+    curves: tuple[int, ...]
+    orders: tuple[int, ...]
 
-    def rows(self, states: Sequence[JointState]) -> np.ndarray:
-        """Values of the rows, (j,), from the states of all phases at their collocation points."""
-        joints = list(self.joints)
-        last = states[self.before].q[-1, joints]
-        return np.asarray(last - states[self.after].q[0, joints])
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return len(self.curves) * len(self.orders)
 
-    def _sides(
-        self, phases: Sequence[Phase]
-    ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
-        """Yield phase, collocation point, the curves whose value is free there, and the variables that these are."""
-        for number, point in ((self.before, -1), (self.after, 0)):
-            variables = phases[number].end_variables(point)
-            free = np.flatnonzero(variables >= 0)
-            yield number, point, free, variables[free]
+    def _scales(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Factors on the rows of every order, (orders, 1)."""
+        interval = x[0] * (1.0 - phase.breaks[-2])
+        return np.asarray(interval ** np.array(self.orders))[:, None]
+
+    def rows(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
+        """Values of the rows, by order and curve; `parts` are all phases, with their variables."""
+        last, first = (
+            _curves_at(*parts[number], point)[np.ix_(self.orders, self.curves)]
+            for number, point in ((self.before, -1), (self.after, 0))
+        )
+        return np.asarray((self._scales(*parts[self.before]) * (last - first)).ravel())
 
     def pattern(
         self, phases: Sequence[Phase], first: Sequence[int]
@@ -139,24 +77,35 @@ class Link:
         first : sequence of int
             Where the variables of each one begin.
         """
-        count = len(self.joints)
-        rows = []
-        columns = []
-        for number, _, _, variables in self._sides(phases):
-            rows.append(np.repeat(np.arange(count), len(variables)))
-            columns.append(np.tile(variables + first[number], count))
-        return np.concatenate(rows), np.concatenate(columns)
-
-    def jacobian(
-        self, phases: Sequence[Phase], states: Sequence[JointState]
-    ) -> np.ndarray:
-        """Entries of the Jacobian on the pattern, (nnz,): the joint maps' gradients at the ends."""
-        joints = list(self.joints)
-        last, first = (
-            states[number].gradient[point][joints][:, free].ravel()
-            for number, point, free, _ in self._sides(phases)
+        columns = np.concatenate(
+            [
+                phases[self.before].end_pattern(-1) + first[self.before],
+                phases[self.after].end_pattern(0) + first[self.after],
+            ]
         )
-        return np.concatenate([last, -first])
+        rows = np.repeat(np.arange(self.size), len(columns))
+        return rows, np.tile(columns, self.size)
+
+    def jacobian(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
+        """Entries of the Jacobian on the pattern, (nnz,)."""
+        orders = np.array(self.orders)
+        chosen = np.ix_(orders, self.curves)
+        phase, x = parts[self.before]
+        after, x_after = parts[self.after]
+        scales = self._scales(phase, x)
+        last = scales[:, :, None] * phase.end_slopes(x, -1)[chosen]
+        first = -scales[:, :, None] * after.end_slopes(x_after, 0)[chosen]
+        # The scales grow with the duration.
+        growth = orders[:, None] / x[0] * self.rows(parts).reshape(len(orders), -1)
+        last[:, :, phase.end_pattern(-1) == 0] += growth[:, :, None]
+        return np.concatenate([last, first], axis=2).ravel()
+
+
+def _curves_at(phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
+    """Value and time derivatives of all curves at a collocation point, (4, c)."""
+    state = phase.state(x)
+    curves = (state.y, state.ydot, state.yddot, state.ydddot)
+    return np.array([own[point] for own in curves])
 
 
 class Program(Summary):
@@ -174,6 +123,8 @@ class Program(Summary):
     phases : tuple of Phase
     links : tuple of Link
     minimised : Objective
+    means : tuple of Limit
+        The limits whose means are held.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -205,17 +156,40 @@ class Program(Summary):
         self._durations = first[:-1]
         self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
         self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
-        self.x_upper[self._durations] = self.minimised.longest
-        joined = np.zeros(sum(len(link.joints) for link in self.links))
-        self.lower = np.concatenate([*(phase.lower for phase in self.phases), joined])
-        self.upper = np.concatenate([*(phase.upper for phase in self.phases), joined])
+        longest = np.broadcast_to(self.minimised.longest, len(self.phases))
+        given = self.x_upper[self._durations]
+        self.x_upper[self._durations] = np.minimum(given, longest)
+        self.means = tuple(
+            limit for limit in self.phases[0].limits if limit.guarantee.is_mean
+        )
+        joined = np.zeros(sum(link.size for link in self.links))
+        self.lower = np.concatenate(
+            [
+                *(phase.lower for phase in self.phases),
+                *(limit.lower for limit in self.means),
+                joined,
+            ]
+        )
+        self.upper = np.concatenate(
+            [
+                *(phase.upper for phase in self.phases),
+                *(limit.upper for limit in self.means),
+                joined,
+            ]
+        )
+        heights = [len(phase.lower) for phase in self.phases]
+        heights.append(sum(len(limit.lower) for limit in self.means))
+        heights += [link.size for link in self.links]
         patterns = [
             (phase.jacobian_rows, phase.jacobian_columns + a)
             for phase, a in zip(self.phases, self._durations, strict=True)
         ]
+        count = heights[len(self.phases)]
+        every = np.arange(first[-1])
+        patterns.append(
+            (np.repeat(np.arange(count), first[-1]), np.tile(every, count))
+        )
         patterns += [link.pattern(self.phases, first) for link in self.links]
-        heights = [len(phase.lower) for phase in self.phases]
-        heights += [len(link.joints) for link in self.links]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
         pairs = zip(patterns, self._first_rows, strict=True)
         self.jacobian_rows = np.concatenate([rows + a for (rows, _), a in pairs])
@@ -242,13 +216,15 @@ class Program(Summary):
         return [(phase, x[part]) for phase, part in pairs]
 
     def end_time(self, x: np.ndarray) -> float:
-        """End time t_E, s: the sum of the durations."""
-        return float(sum(x[first] for first in self._durations))
+        """End time t_E, s: the sum of the durations and the pauses."""
+        pauses = sum(phase.pause for phase in self.phases)
+        return float(sum(x[first] for first in self._durations) + pauses)
 
     def with_time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
-        """Return the same motion, every phase longer by a factor."""
+        """Return the same motion, every phase longer by a factor whose duration is not given."""
         x = x.copy()
-        x[self._durations] *= factor
+        pairs = zip(self.phases, self._durations, strict=True)
+        x[[first for phase, first in pairs if phase.time_law is None]] *= factor
         return x
 
     def objective(self, x: np.ndarray) -> float:
@@ -279,19 +255,52 @@ class Program(Summary):
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError as `states` does."""
-        rows = [phase.rows(part) for phase, part in self.split(x)]
-        if self.links:
-            states = self.states(x)
-            rows += [link.rows(states) for link in self.links]
+        parts = self.split(x)
+        rows = [phase.rows(part) for phase, part in parts]
+        rows.append(self.mean_values(x))
+        rows += [link.rows(parts) for link in self.links]
         return np.concatenate(rows)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `states` does."""
-        entries = [phase.jacobian(part) for phase, part in self.split(x)]
-        if self.links:
-            states = self.states(x)
-            entries += [link.jacobian(self.phases, states) for link in self.links]
+        parts = self.split(x)
+        entries = [phase.jacobian(part) for phase, part in parts]
+        entries.append(self._mean_slopes(x).ravel())
+        entries += [link.jacobian(parts) for link in self.links]
         return np.concatenate(entries)
+
+    def mean_values(self, x: np.ndarray) -> np.ndarray:
+        """Means over the whole motion of the values that are held as means, (m,)."""
+        if not self.means:
+            return np.empty(0)
+        sums = []
+        for phase, part in self.split(x):
+            sums.append(part[0] * phase.means(part))
+            if phase.pause:
+                sums.append(phase.pause * phase.waiting(part).values)
+        return np.asarray(sum(sums) / self.end_time(x))
+
+    def _mean_slopes(self, x: np.ndarray) -> np.ndarray:
+        """Slopes of `mean_values`, (m, v)."""
+        if not self.means:
+            return np.empty((0, len(x)))
+        total = self.mean_values(x)
+        columns = []
+        for phase, part in self.split(x):
+            own = part[0] * phase.mean_slopes(part)
+            own[:, 0] += phase.means(part) - total
+            if phase.pause:
+                own += phase.pause * phase.waiting(part).slopes
+            columns.append(own)
+        return np.hstack(columns) / self.end_time(x)
+
+    def violation_of_means(self, x: np.ndarray) -> float:
+        """How far the limits that hold over the whole motion are violated; -inf without such limits."""
+        ends = np.cumsum([len(limit.lower) for limit in self.means])
+        values = np.split(self.mean_values(x), ends[:-1])
+        pairs = zip(self.means, values, strict=False)
+        found = [limit.violation(own[None]).max() for limit, own in pairs]
+        return float(max(found, default=-np.inf))
 
     @property
     def limits(self) -> tuple[Limit, ...]:
@@ -300,7 +309,15 @@ class Program(Summary):
         return tuple(each.values())
 
     def rows_of(self, limit: Limit) -> np.ndarray:
-        """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it."""
+        """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it.
+
+        One row of numbers, (1, c), where its means are held.
+        """
+        if limit.guarantee.is_mean:
+            number = next(i for i, own in enumerate(self.means) if own is limit)
+            before = sum(len(own.lower) for own in self.means[:number])
+            first = self._first_rows[len(self.phases)] + before
+            return np.arange(first, first + len(limit.lower))[None]
         # The links' rows come behind.
         pairs = zip(self.phases, self._first_rows, strict=False)
         return np.concatenate(

@@ -24,7 +24,8 @@ from brachis.kinematics import JointState
 from brachis.optimise.backends import SolverReport
 from brachis.optimise.bspline import spread
 from brachis.optimise.improve import Solve, SolvedProgram
-from brachis.optimise.phase import Phase, bisect
+from brachis.optimise.motion import bisect
+from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.robot import Friction
 
@@ -113,7 +114,15 @@ def violations(
     Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
     """
     found = [_check_phase(phase, part, goal) for phase, part in dense.split(x)]
-    return max(largest for largest, _ in found), [missing for _, missing in found]
+    violation = max(largest for largest, _ in found)
+    missing = [own for _, own in found]
+    if np.isfinite(violation):
+        of_means = dense.violation_of_means(x)
+        violation = max(violation, of_means)
+        if of_means > goal:  # too few points everywhere
+            pairs = zip(dense.phases, missing, strict=True)
+            missing = [np.union1d(own, phase.t_norm[_EVERYWHERE]) for phase, own in pairs]
+    return violation, missing
 
 
 def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
@@ -121,8 +130,7 @@ def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.nd
     t_norm = dense.t_norm
     try:
         table = dense.violation(x)
-        of_means = dense.violation_of_means(x)
-        largest = max(float(table.max()), of_means)
+        largest = float(table.max())
         peaks = _suspects(t_norm, table, dense.knots, goal - _NEAR)
         if table.max() > 20.0 * goal:
             # The grid's own peaks will do until they are nearly held down.
@@ -137,8 +145,6 @@ def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.nd
             largest = max(largest, np.append(heights, worst).max(initial=-np.inf))
             high = _around(peaks[heights > goal], t_norm)
             missing = np.union1d(high, places[worst > goal])
-            if of_means > goal:  # too few points everywhere
-                missing = np.union1d(missing, t_norm[_EVERYWHERE])
         return largest, np.union1d(missing, _beside_breaks(dense, x, missing))
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
@@ -154,7 +160,8 @@ def _special_times(dense: Phase, x: np.ndarray) -> np.ndarray:
     path = dense.joint_map.path
     pieces = np.empty(0)
     if path is not None and len(path.breaks) > 2:
-        pieces = motion.times_of(spread(path.breaks, 8))
+        begin, end = motion.at(np.array([0.0, motion.t_end]))[0][:, 0]
+        pieces = motion.times_of(np.clip(spread(path.breaks, 8), begin, end))
     friction = dense.joint_map.robot.friction
     reversing = reversals(friction, dense.t_norm * motion.t_end, dense.state(x))
     times = np.concatenate([pieces, reversing])
@@ -366,7 +373,7 @@ def _lengthen(
     """Find the factor, up to 1 + `by`, by which a longer time brings the violation to the goal, and what is left of it.
 
     A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
-    gravity or friction add to by less, and least speeds not at all. So this is tried, and the best is kept.
+    gravity or friction add to by less, and where the time is given nothing. So this is tried, and the best is kept.
     """
     goal = options.tolerance * _GOAL
     longest = min(dense.end_time(x) * (1.0 + by), options.longest)

@@ -1,31 +1,39 @@
-"""The nonlinear program of a task on a robot: one phase, along the path, in the coordinates of a joint map."""
+"""The nonlinear program of a task on a robot: a phase for every leg of the path, in the coordinates of a joint map.
+
+Where the arm stops, the phases on both sides have the same posture, which is free, and rest there. Where the tool's
+speed is given on one side, s and its derivatives are known there, and the redundant joints continue with as many
+derivatives: the links say so.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, JointMap
-from brachis.optimise.boundary import Boundary
+from brachis.optimise.boundary import Boundary, EndCondition
 from brachis.optimise.bspline import clamped_knots, spread
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.mesh import COARSE_INTERVALS
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Program
+from brachis.optimise.program import Link, Program
 from brachis.problem.problem import Problem
-from brachis.task import Task
 
 
-def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Program:
-    """Write the NLP of a decomposition down: one phase, along the path.
+def program_of(
+    problem: Problem, joint_maps: Sequence[JointMap], breaks: np.ndarray
+) -> Program:
+    """Write the NLP of a decomposition down.
 
     Parameters
     ----------
     problem : Problem
-    joint_map : JointMap
-        Beginning at the task's start posture, or at a first guess of it where that is free.
+    joint_maps : sequence of JointMap
+        One for each leg, beginning at, or near, the posture there.
     breaks : (N + 1,) ndarray
-        Ends of the knot intervals in normalised time.
+        Ends of the knot intervals of every phase, in normalised time.
 
     Returns
     -------
@@ -35,38 +43,119 @@ def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Pro
     knots = clamped_knots(spline.degree, breaks)
     t_norm = spread(breaks, spline.points_per_interval)
     grid = FixedGrid(knots, spline.degree, t_norm)
-    return Program([phase_in(problem, joint_map, grid)])
+    return program_over(problem, joint_maps, [grid] * len(joint_maps))
 
 
-def phase_in(problem: Problem, joint_map: JointMap, grid: FixedGrid) -> Phase:
-    """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid.
+def program_over(
+    problem: Problem, joint_maps: Sequence[JointMap], grids: Sequence[FixedGrid]
+) -> Program:
+    """Write the NLP down as `program_of` does, over a grid for each phase.
 
     Raises
     ------
     UnreachableError
         A periodic motion is asked for in coordinates that do not close with the path.
     """
-    return Phase(joint_map, problem.limits, grid, _boundary(problem, joint_map))
-
-
-def _boundary(problem: Problem, joint_map: JointMap) -> Boundary:
-    """Write the task's boundary conditions in the coordinates of a joint map."""
     is_periodic = problem.task.boundary.periodic
-    if is_periodic and isinstance(joint_map, ChartMap) and not joint_map.rows.closes:
+    first = joint_maps[0]
+    if is_periodic and isinstance(first, ChartMap) and not first.rows.closes:
         raise UnreachableError(
             "chart coordinates at start and end differ, so the motion cannot be periodic in them"
         )
+    phases = []
+    for number, (joint_map, grid) in enumerate(zip(joint_maps, grids, strict=True)):
+        boundary = _boundary(problem, joint_map, number)
+        pause = problem.legs[number].dwell
+        phases.append(Phase(joint_map, problem.limits, grid, boundary, pause=pause))
+    return Program(phases, list(_links(problem, joint_maps)))
+
+
+def maps_by_leg(
+    problem: Problem, joint_map: JointMap, starts: np.ndarray
+) -> list[JointMap]:
+    """Take a map of the whole path leg by leg, from the postures, (legs, n), at which these begin."""
+    pairs = zip(problem.leg_paths, starts, strict=True)
+    if len(problem.legs) == 1:
+        return [joint_map]
+    return [joint_map.along(path, start) for path, start in pairs]
+
+
+def _boundary(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
+    """Write the boundary conditions of a leg in the coordinates of a joint map."""
+    leg = problem.legs[number]
+    last = len(problem.legs) - 1
+    is_periodic = problem.task.boundary.periodic
     free = np.full(problem.robot.n, np.nan)
-    start = joint_map.coordinates(0.0, free if problem.start is None else problem.start)
-    end = joint_map.coordinates(1.0, free if problem.end is None else problem.end)
-    derivatives = problem.task.spline.vanishing
-    unknown = np.full(len(start) - 1, np.nan)
-    first, last = (np.append(ds, unknown) if ds else None for ds in problem.end_rates)
-    return Boundary(start, end, derivatives, first, last, is_periodic)
+    start = free if number or problem.start is None else problem.start
+    end = free if number < last or problem.end is None else problem.end
+    y_start = joint_map.coordinates(leg.begin, start)
+    y_end = joint_map.coordinates(leg.end, end)
+    rest = np.zeros(problem.task.spline.vanishing)
+    if is_periodic and not last and problem.time_laws[0] is None:
+        return Boundary.at_rest(y_start, y_end, len(rest), periodic=True)
+    sides = []
+    for side, values in ((0, y_start), (-1, y_end)):
+        s_derivatives = _derivatives_of_s(problem, number, side)
+        others = rest if _rests(problem, number, side) else np.empty(0)
+        first = EndCondition(float(values[0]), s_derivatives)
+        more = (EndCondition(float(value), others) for value in values[1:])
+        sides.append((first, *more))
+    return Boundary(sides[0], sides[1], time_law=problem.time_laws[number])
 
 
-def breaks_of(task: Task) -> np.ndarray:
-    """Return the ends of the task's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
-    intervals = task.spline.intervals
+def _rests(problem: Problem, number: int, side: int) -> bool:
+    """Tell whether the arm rests at the beginning (side 0) or end (-1) of a leg."""
+    place = number + (0 if side == 0 else 1)
+    if 0 < place < len(problem.legs):
+        return problem.legs[place - 1].stops
+    return not problem.task.boundary.periodic and not problem.leg_rates[number][side]
+
+
+def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
+    """Time derivatives of s that are given at the beginning (side 0) or end (-1) of a leg; empty where free."""
+    if _rests(problem, number, side):
+        return np.zeros(problem.task.spline.vanishing)
+    count = len(problem.legs)
+    beside = number - 1 if side == 0 else number + 1
+    if problem.task.boundary.periodic:
+        beside %= count
+    if 0 <= beside < count and beside != number:
+        time_law = problem.time_laws[beside]
+        if time_law is None:
+            return np.empty(0)
+        derivatives = time_law.at_end(-1 - side)
+        return np.asarray(derivatives[1 : 1 + derivatives_in_motion(problem)])
+    derivatives = np.zeros(problem.task.spline.vanishing)
+    derivatives[0] = problem.leg_rates[number][side]
+    return derivatives
+
+
+def derivatives_in_motion(problem: Problem) -> int:
+    """Return how many derivatives continue from phase to phase in motion: up to the jerk where a limit asks for it."""
+    order = max((limit.order for limit in problem.limits), default=2)
+    return min(order, problem.task.spline.degree - 1)
+
+
+def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
+    """Join the phases, and in a periodic motion the last one to the first."""
+    last = len(joint_maps) - 1
+    redundant = tuple(range(1, 1 + joint_maps[0].r))
+    in_motion = tuple(range(1 + derivatives_in_motion(problem)))
+    for number, leg in enumerate(problem.legs[:-1] if redundant else ()):
+        yield Link(number, number + 1, redundant, (0,) if leg.stops else in_motion)
+    is_given = problem.time_laws[0] is not None or problem.time_laws[-1] is not None
+    if not problem.task.boundary.periodic or not (last or is_given):
+        return
+    if redundant:
+        # A start posture that is given fixes both ends.
+        orders = in_motion if problem.start is None else in_motion[1:]
+        yield Link(last, 0, redundant, orders)
+    if not is_given:
+        yield Link(last, 0, (0,), in_motion[1:])
+
+
+def breaks_of(problem: Problem) -> np.ndarray:
+    """Return the ends of a phase's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
+    intervals = problem.task.spline.intervals
     count = COARSE_INTERVALS if intervals == "auto" else intervals
     return np.linspace(0.0, 1.0, count + 1)

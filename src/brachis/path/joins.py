@@ -153,7 +153,7 @@ def refuse_corners(corners: Sequence[Corner]) -> None:
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
         found=found,
-        allowed="segments that continue each other, a blend or a stop",
+        allowed="segments that continue each other, or a blend or a stop",
         where=join.where,
         hint=advice + (f"; likewise {others}" if others else ""),
     )

@@ -2,6 +2,6 @@
 
 from brachis.search.portfolio import Search
 from brachis.search.remedies import try_remedies
-from brachis.search.starts import first_map
+from brachis.search.starts import first_maps
 
-__all__ = ["Search", "first_map", "try_remedies"]
+__all__ = ["Search", "first_maps", "try_remedies"]

@@ -20,7 +20,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -32,6 +32,7 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import (
     ChartMap,
     ChartRows,
+    JointState,
     Newton,
     chart_around,
     null_spaces,
@@ -52,9 +53,14 @@ from brachis.optimise.improve import (
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.optimise.transcription import phase_in, program_of
+from brachis.optimise.transcription import (
+    breaks_of,
+    maps_by_leg,
+    program_of,
+    program_over,
+)
 from brachis.problem.problem import Problem
-from brachis.search.phase_plane import initial_guess, initial_knots
+from brachis.search.phase_plane import initial_guess
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn."""
@@ -85,7 +91,10 @@ def solve_candidate(
     Candidate
     """
     problem = start.problem
-    target = program_of(problem, start.joint_map, initial_knots(start))
+    try:
+        target = program_of(problem, start.maps_by_leg(), breaks_of(problem))
+    except UnreachableError as error:
+        return Candidate.of(start, str(error))
     # With more variables a cold solve takes seconds: it is first solved over some of its knots.
     program = coarsest(target) if target.variables > 150 else target
     x = initial_guess(program, start)
@@ -98,10 +107,9 @@ def solve_candidate(
         x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
         if _is_free_chart(start):
             solved = solve_in_chart(problem, program, x, session)
-            joint_map = solved.program.phases[0].joint_map
-            target = target.with_phases(
-                phase_in(problem, joint_map, phase.grid) for phase in target.phases
-            )
+            maps = [phase.joint_map for phase in solved.program.phases]
+            grids = [phase.grid for phase in target.phases]
+            target = program_over(problem, maps, grids)
         else:
             solved = solve_by_margin_continuation(program, x, session, MARGINS)
     except ImportError as error:
@@ -165,7 +173,7 @@ def finish_candidate(
 
 def _is_free_chart(start: InitialGuess) -> bool:
     """Tell whether the chart may still be changed: that around a motion is kept."""
-    return start.in_chart and not start.timed
+    return start.in_chart and start.durations is None
 
 
 def _open_session(
@@ -173,9 +181,16 @@ def _open_session(
 ) -> SolverSession:
     """Open a session of the guess's solver under the task's bounds."""
     (backend,) = solvers_for(start.solver)
-    settings = start.problem.task.solver
+    problem = start.problem
+    r = start.joint_map.r
+    has_time_law = any(law is not None for law in problem.time_laws)
     return SolverSession.for_task(
-        backend, settings, start.joint_map, deadline, listener
+        backend,
+        problem.task.solver,
+        r,
+        deadline,
+        listener,
+        is_flat=start.in_chart or (has_time_law and r > 0),
     )
 
 
@@ -273,7 +288,7 @@ def solve_in_chart(
     ----------
     problem : Problem
     program : Program
-        Of one phase in a chart.
+        In a chart.
     x : (v,) ndarray
         Starting point.
     solve : callable
@@ -315,7 +330,7 @@ def best_of_joints(
     ----------
     problem : Problem
     solved : SolvedProgram
-        A program of one phase in a chart.
+        A program in a chart.
     solve : callable
 
     Returns
@@ -350,7 +365,6 @@ def move_to_chart(
     ----------
     problem : Problem
     solved : SolvedProgram
-        A program of one phase.
     rows : ChartRows, optional
         Of the chart, as for `chart_around`.
 
@@ -360,30 +374,42 @@ def move_to_chart(
     x : (v,) ndarray
         The same motion but for what splines of the new coordinates cannot say.
     """
-    (phase,) = solved.program.phases
-    (motion,) = solved.program.motions(solved.report.x)
-    t_norm = np.linspace(0.0, 1.0, 4 * len(phase.t_norm) + 1)
-    times = t_norm * motion.t_end
     try:
-        state = phase.joint_map.state(*motion.at(times), t=times)
-        s = state.y[:, 0]
-        chart = chart_around(problem.task_map, problem.path, s, state.q, rows)
-        program = Program([phase_in(problem, chart, phase.grid)])
-        curves = chart.curves(s, state.q)
-        fit = fit_curves(program.phases[0], motion.t_end, t_norm, curves)
-        return program, shortest_time(program, fit)
+        motions = list(_densely(solved))
+        s = np.concatenate([state.s for _, _, state in motions])
+        q = np.concatenate([state.q for _, _, state in motions])
+        chart = chart_around(problem.task_map, problem.path, s, q, rows)
+        starts = np.array([state.q[0] for _, _, state in motions])
+        maps = maps_by_leg(problem, chart, starts)
+        grids = [phase.grid for phase in solved.program.phases]
+        program = program_over(problem, maps, grids)
+        parts = []
+        for phase, (t_end, t_norm, state) in zip(program.phases, motions, strict=True):
+            curves = chart.curves(state.s, state.q)
+            parts.append(fit_curves(phase, t_end, t_norm, curves))
+        return program, shortest_time(program, np.concatenate(parts))
     except UnreachableError:
         return None
 
 
+def _densely(solved: SolvedProgram) -> Iterator[tuple[float, np.ndarray, JointState]]:
+    """Yield the duration of every phase, s, and the motion at many even normalised times, (K,)."""
+    motions = solved.program.motions(solved.report.x)
+    for phase, motion in zip(solved.program.phases, motions, strict=True):
+        t_norm = np.linspace(0.0, 1.0, 4 * len(phase.t_norm) + 1)
+        times = t_norm * motion.t_end
+        yield motion.t_end, t_norm, phase.joint_map.state(*motion.at(times), t=times)
+
+
 def _self_motion(solved: SolvedProgram) -> tuple[ChartMap, np.ndarray, np.ndarray]:
     """Return the chart, and along the motion s, (K,), and bases of the null spaces of the task Jacobian, (K, n, r)."""
-    (state,) = solved.program.states(solved.report.x)
-    (phase,) = solved.program.phases
-    chart = phase.joint_map
+    states = solved.program.states(solved.report.x)
+    chart = solved.program.phases[0].joint_map
     assert isinstance(chart, ChartMap)
-    jacobian = Newton(chart.task_map).task_coordinates(state.q)[1]
-    return chart, state.y[:, 0], null_spaces(jacobian)
+    q = np.concatenate([state.q for state in states])
+    jacobian = Newton(chart.task_map).task_coordinates(q)[1]
+    s = np.concatenate([state.s for state in states])
+    return chart, s, null_spaces(jacobian)
 
 
 def _has_good_chart(solved: SolvedProgram) -> bool:

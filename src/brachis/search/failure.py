@@ -47,8 +47,6 @@ class Failure:
         What to try.
     remedies : sequence of Remedy
         Numbers of the task to change.
-    share : float
-        How much of what is asked for is possible, where that is known.
     """
 
     cause: str
@@ -59,7 +57,6 @@ class Failure:
     needed: str | None = None
     hint: str = ""
     remedies: Sequence[Remedy] = ()
-    share: float = 1.0
 
     def error(self) -> BrachisError:
         """Make the error that says so."""
@@ -341,16 +338,20 @@ def explain_no_motion(
     )
     along = " along any joint path" if has_joint_path else ""
     boundary = problem.task.boundary
-    speeds = {
-        "boundary.start_speed": boundary.start_speed,
-        "boundary.end_speed": boundary.end_speed,
-    }
+    speeds = [
+        ("boundary.start_speed", boundary.start_speed, problem.task.speed_unit),
+        ("boundary.end_speed", boundary.end_speed, problem.task.speed_unit),
+    ]
+    speeds += [
+        (f"tool_limits.process_speed[{number}].speed", part.speed, "m/s")
+        for number, part in enumerate(problem.task.tool_limits.process_speed)
+    ]
     return Failure(
         f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
         hint=reason + more,
         remedies=[
-            Remedy(key, speed, 0.7 * speed, problem.task.speed_unit)
-            for key, speed in speeds.items()
+            Remedy(key, speed, 0.7 * speed, unit)
+            for key, speed, unit in speeds
             if speed
         ],
     )

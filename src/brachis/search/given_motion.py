@@ -6,6 +6,7 @@ the time law. So limits, splines, coordinates and the path may be others than wh
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -51,9 +52,19 @@ def given_guess(
     joints = problem.robot.joint_names
     if motion.joint_names != joints:
         return f"its joints are {', '.join(motion.joint_names)}, the robot's {', '.join(joints)}"
-    t = np.linspace(0.0, motion.t_end, 401)
-    s = np.clip(motion.path_coordinate(t), 0.0, 1.0)
-    s[[0, -1]] = [0.0, 1.0]
+    # The postures over s, and on every leg the time law.
+    splits = np.clip([leg.end for leg in problem.legs[:-1]], 0.0, 1.0)
+    t = np.linspace(0.0, motion.t_end, 4001)
+    passed = np.clip(motion.path_coordinate(t), 0.0, 1.0)
+    ends = np.concatenate([[0.0], np.interp(splits, passed, t), [motion.t_end]])
+    times = [np.linspace(*pair, 401) for pair in itertools.pairwise(ends)]
+    parts = []
+    for leg, own in zip(problem.legs, times, strict=True):
+        s = np.clip(motion.path_coordinate(own), leg.begin, leg.end)
+        s[[0, -1]] = [leg.begin, leg.end]
+        parts.append(s)
+    t = np.concatenate(times)
+    s = np.concatenate(parts)
     try:
         joint_map, curves, family = _in_coordinates(
             problem, decompositions, motion, s, motion.position(t)
@@ -70,7 +81,7 @@ def given_guess(
         GIVEN,
         family,
         solvers_of(problem)[0],
-        timed=True,
+        durations=tuple(np.diff(ends).tolist()),
     )
 
 

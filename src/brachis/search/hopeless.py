@@ -1,51 +1,48 @@
 """What no motion along the known joint paths can hold: a mean of loads below what holds the arm, and speeds.
 
-In the phase plane the fastest motion along a joint path has at every place the largest speed that any motion along that
-joint path has there. If that motion, made without limits that ask for a least speed, falls short of one, every motion
-does; and the speed that it has there is what could be asked for. A redundant robot may have better joint paths than
-those that are known: only what is far from possible is refused before a plan is tried.
+Speeds are given for parts of the path and for its ends. Without friction, where the limits allow a motion and the arm
+can hold its postures, they allow the same motion at a lower speed: (u, x) lies between it and rest (see
+`brachis.search.phase_plane`). So a speed is too high either by itself, along its part or at its end, or because a leg
+beside is too short to reach it or to brake from it. A redundant robot may have better joint paths than those that are
+known: only what is far from possible is refused before a plan is tried.
 
-A tool speed v along a path with the slope z = |dx/ds| asks for ds/dt = v / z and d2s/dt2 = -(dz/ds / z) (ds/dt)^2. A
-limit a u + b x + c (`HasPhasePlaneRows`) then bounds v^2 at every place: which one does, and where, is named.
-
-Limits on the jerk are unknown to the phase plane. What they leave is known from the plan without the least speed.
-Friction is unknown to it too: it helps to brake, so that with friction a part near the path's end may be passed faster.
+Limits on the jerk are unknown to the phase plane. Friction is unknown to it too: it helps to brake, so that with
+friction a part near the path's end may be passed faster.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from brachis.errors import Remedy, UnreachableError
-from brachis.limits import HasPhasePlaneRows, JointStates, Limit, Moments
-from brachis.limits.tool import ToolSpeed
-from brachis.optimise.candidate import Candidate, InitialGuess
-from brachis.problem.feasibility import in_figures, load_remedies
+from brachis.errors import Remedy
+from brachis.limits import Limit, Moments
+from brachis.optimise.candidate import InitialGuess
+from brachis.problem.feasibility import load_remedies
 from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
 from brachis.search.phase_plane import (
     PhasePlane,
-    interpolate,
-    least_speeds,
+    given_motion,
     postures_along,
     spread_stations,
+    stations_on,
 )
 
-UNLIKELY = 0.8
-"""Share of a speed below which no other joint path, and no more knots, make up for what a plan falls short by."""
 _EXACT = 0.97
 """Share of a speed below which it is impossible according to the phase plane, where that is exact."""
+_UNLIKELY = 0.5
+"""Share of a speed below which no other joint path of a redundant robot makes up for what is missing."""
 _FIRST = 0.96
 """Part of the largest speed in the phase plane that is tried first: splines fall a little short of it."""
-_STILL = 1e-9
-"""Speed below which the tool stands still along the path, m per unit s."""
-_S = np.linspace(0.0, 1.0, 401)
-"""Path coordinates at which joint paths are looked at."""
+_HELD = 0.99
+"""Part of the largest speed in the phase plane that is said to be possible, so that rounded it is."""
+_S = np.linspace(0.0, 1.0, 101)
+"""Path coordinates at which the arm is held at rest."""
 
 
 def refuse_hopeless(starts: Sequence[InitialGuess]) -> None:
@@ -63,16 +60,9 @@ def refuse_hopeless(starts: Sequence[InitialGuess]) -> None:
         failure = explain_holding(starts, everywhere=True)
         if failure is not None:
             raise failure.error()
-    failures = []
-    for start in starts:
-        # The phase plane is exact without other joint paths, and without friction that helps to brake.
-        driven = np.isfinite(problem.robot.limits.torque_upper)
-        is_exact = not start.joint_map.r and not (_has_friction(problem) & driven).any()
-        failure = _explain_in_phase_plane(start)
-        if failure is None or failure.share >= (_EXACT if is_exact else 0.5):
-            return
-        failures.append(failure)
-    raise max(failures, key=lambda failure: failure.share).error()
+    failure = explain_speeds(starts)
+    if failure is not None:
+        raise failure.error()
 
 
 def _has_friction(problem: Problem) -> np.ndarray:
@@ -108,7 +98,7 @@ def explain_holding(
 
     worst: list[_Load] = []
     for start in starts:
-        q = postures_along(start, _S[::4])
+        q = postures_along(start, _S)
         if q is None:
             continue
         loads = [
@@ -160,235 +150,240 @@ def _figure(limit: Limit, column: int) -> float:
     return next(bound.figure for bound in limit.bounds if bound.column == column)
 
 
-def explain_speed(
-    candidates: Sequence[Candidate], solve: Callable[[InitialGuess], Candidate]
-) -> Failure | None:
-    """Tell which least speed no candidate could hold, by a plan without it from the most promising guess.
+@dataclass(frozen=True)
+class _Speed:
+    """A speed that the task gives.
+
+    Attributes
+    ----------
+    key, name : str
+        In the task, and in words.
+    figure : float
+        In its unit.
+    unit : str
+    leg : int
+        Whose speed it is, or at whose end.
+    side : int or None
+        At which end of the leg: 0 or -1; None: all along it.
+    """
+
+    key: str
+    name: str
+    figure: float
+    unit: str
+    leg: int
+    side: int | None = None
+
+    def __str__(self) -> str:
+        """Return the speed with its unit."""
+        return f"{self.figure:g} {self.unit}"
+
+
+def speeds_of(problem: Problem) -> list[_Speed]:
+    """List the process speeds of a task, and its speeds at ends that are not at a process speed."""
+    speeds = []
+    given = [i for i, leg in enumerate(problem.legs) if leg.speed is not None]
+    parts = problem.task.tool_limits.process_speed
+    for number, (part, leg) in enumerate(zip(parts, given, strict=True)):
+        key = f"tool_limits.process_speed[{number}].speed"
+        speeds.append(_Speed(key, "process speed", part.speed, "m/s", leg))
+    boundary = problem.task.boundary
+    last = len(problem.legs) - 1
+    ends = (
+        ("start_speed", boundary.start_speed, 0, 0),
+        ("end_speed", boundary.end_speed, last, -1),
+    )
+    for key, figure, leg, side in ends:
+        if figure and leg not in given:
+            name = key.replace("_", " ")
+            unit = problem.task.speed_unit
+            speeds.append(_Speed(f"boundary.{key}", name, figure, unit, leg, side))
+    return speeds
+
+
+class _SpeedCheck:
+    """Which shares of the speeds of a task a joint path allows.
 
     Parameters
     ----------
-    candidates : sequence of Candidate
-        That failed.
-    solve : callable
-        Plans from a guess at the first collocation points.
-
-    Returns
-    -------
-    Failure or None
-        None without a least speed, or if another reason is to blame.
+    start : InitialGuess
+    speeds : sequence of _Speed
+        At least one.
+    s : (S,) ndarray
+        Path coordinates, the ends of the legs among them.
+    q : (S, n) ndarray
+        Postures there.
     """
-    starts = [
-        each.start for each in candidates if each.start is not None and each.solver
-    ]
-    if not starts or not least_speeds(starts[0].problem.limits):
+
+    def __init__(
+        self,
+        start: InitialGuess,
+        speeds: Sequence[_Speed],
+        s: np.ndarray,
+        q: np.ndarray,
+    ) -> None:
+        self.problem = start.problem
+        self.speeds = speeds
+        self.is_redundant = start.joint_map.r > 0
+        limits = self.problem.limits
+        self._planes = [
+            PhasePlane(limits, *stations_on(leg, s, q)) for leg in self.problem.legs
+        ]
+        self.caps = [self._find_cap(speed) for speed in speeds]
+        self._known: dict[tuple[int, float, float], np.ndarray | None] = {}
+
+    def _find_cap(self, speed: _Speed) -> tuple[float, float, str]:
+        """Largest share of a speed by itself; the path coordinate and the label of the limit that allow no more."""
+        plane = self._planes[speed.leg]
+        law = self.problem.time_laws[speed.leg]
+        if law is not None:
+            _, rate, acceleration = given_motion(law, plane.s)
+            return plane.speed_factor(rate, acceleration)
+        assert speed.side is not None
+        largest, label = plane.largest_rate(speed.side)
+        asked = self.problem.leg_rates[speed.leg][speed.side]
+        return largest / asked, float(plane.s[speed.side]), label
+
+    def speed_at(self, leg: int, side: int) -> int | None:
+        """Return the number of the speed that is given at an end of a leg; None at rest."""
+        beside = leg - 1 if side == 0 else leg + 1
+        for number, speed in enumerate(self.speeds):
+            if (speed.leg, speed.side) in ((leg, side), (beside, None)):
+                return number if self.problem.leg_rates[leg][side] else None
         return None
-    start = min(starts, key=lambda start: start.estimate)
-    problem = dataclasses.replace(start.problem, limits=tuple(_others(start.problem)))
-    candidate = solve(dataclasses.replace(start, problem=problem))
-    if not candidate.usable or candidate.program is None:
+
+    def is_possible(self, shares: np.ndarray) -> bool:
+        """Tell whether these shares of the speeds, (k,), are possible at once."""
+        pairs = zip(self.caps, shares, strict=True)
+        if any(cap[0] < share for cap, share in pairs):
+            return False
+        return all(self.pass_leg(leg, shares) is not None for leg in self.free_legs)
+
+    @cached_property
+    def free_legs(self) -> list[int]:
+        """Numbers of the legs whose speed is free, without the ends of a periodic motion, at which it is unknown."""
+        free = [leg for leg, law in enumerate(self.problem.time_laws) if law is None]
+        if self.problem.task.boundary.periodic and not any(self.problem.end_rates):
+            return [leg for leg in free if leg not in (0, len(self.problem.legs) - 1)]
+        return free
+
+    def pass_leg(self, leg: int, shares: np.ndarray) -> np.ndarray | None:
+        """Pass a leg whose speed is free with shares of the speeds, (k,): ds/dt, (P,), 1/s; None: it is too short."""
+        rates = []
+        for side in (0, -1):
+            number = self.speed_at(leg, side)
+            share = 0.0 if number is None else float(shares[number])
+            rates.append(share * self.problem.leg_rates[leg][side])
+        first, last = rates
+        key = (leg, first, last)
+        if key not in self._known:
+            self._known[key] = self._planes[leg].fastest((first, last))
+        return self._known[key]
+
+    def limit_on(self, leg: int, shares: np.ndarray) -> str:
+        """Name the limit that is active for most of a leg that can be passed."""
+        rate = self.pass_leg(leg, shares)
+        assert rate is not None
+        return self._planes[leg].active_limit(rate)
+
+    def lower_one(self, number: int) -> float | None:
+        """Largest share of one speed that is possible with the others as they are; None without any."""
+        shares = np.ones(len(self.speeds))
+
+        def is_possible(share: float) -> bool:
+            shares[number] = share
+            return self.is_possible(shares)
+
+        for share in np.linspace(0.95, 0.05, 19).tolist():
+            if is_possible(share):
+                return _largest_share(is_possible, share, share + 0.05)
         return None
-    (phase,) = candidate.program.phases
-    (motion,) = candidate.program.motions(candidate.reports[-1].x)
-    t = np.linspace(0.0, motion.t_end, 400)
-    try:
-        moments = phase.joint_map.state(*motion.at(t), t=t)
-    except UnreachableError:
+
+    def allows(self, share: float) -> bool:
+        """Tell whether this share of all speeds at once is possible."""
+        return self.is_possible(np.full(len(self.speeds), share))
+
+
+def _largest_share(
+    is_possible: Callable[[float], bool], low: float, high: float
+) -> float:
+    """Find the largest share between one that is possible and one that is not."""
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_possible(middle) else (low, middle)
+    return low
+
+
+def explain_speeds(starts: Sequence[InitialGuess]) -> Failure | None:
+    """Tell which speeds of the task are out of reach along the joint paths of all guesses; None if they may not be.
+
+    Parameters
+    ----------
+    starts : sequence of InitialGuess
+        At least one.
+    """
+    problem = starts[0].problem
+    speeds = speeds_of(problem)
+    if not speeds:
         return None
-    q = interpolate(_S, moments.s, moments.q)
-    return _explain_shortfall(start, moments, "in the fastest motion without it", q)
+    s = spread_stations(problem)
+    driven = np.isfinite(problem.robot.limits.torque_upper)
+    has_friction = bool((_has_friction(problem) & driven).any())
+    best = None
+    share = 0.0
+    for start in starts:
+        q = postures_along(start, s)
+        if q is None:
+            return None
+        check = _SpeedCheck(start, speeds, s, q)
+        # The phase plane is exact without other joint paths, and without friction that helps to brake.
+        is_exact = not check.is_redundant and not has_friction
+        enough = _EXACT if is_exact else _UNLIKELY
+        if not check.allows(0.0) or check.allows(enough):
+            return None
+        if best is None or check.allows(share):
+            share = _largest_share(check.allows, share, enough)
+            best = check
+    assert best is not None
+    return _explain(best, share)
 
 
-def _others(problem: Problem) -> list[Limit]:
-    """Limits that do not ask for a least speed."""
-    return [limit for limit in problem.limits if limit.longer_time != "violates"]
-
-
-def _explain_in_phase_plane(start: InitialGuess) -> Failure | None:
-    """Tell which speed no motion along the guess's joint path has; None if all are possible, or none is asked for."""
-    problem = start.problem
-    rates = problem.end_rates
-    is_asked = any(rates) or bool(least_speeds(problem.limits))
-    q = postures_along(start, _S) if is_asked else None
-    if q is None or problem.task.boundary.periodic:
-        return None
-    stations = spread_stations(problem.limits)
-    if PhasePlane(problem.limits, _S, q, stations).fastest(rates) is not None:
-        return None
-    others = PhasePlane(_others(problem), _S, q, stations)
-    rate = others.fastest(rates)
-    if rate is None:
-        return _explain_end_speed(problem, others)
-    q_ds = np.gradient(q, _S, axis=0, edge_order=2)
-    places = interpolate(stations, _S, q)
-    qdot = interpolate(stations, _S, q_ds) * rate[:, None]
-    still = np.zeros_like(places)
-    moments = Moments(places, qdot, still, still, stations)
-    best = "along the best joint path that was found"
-    return _explain_shortfall(
-        start, moments, best if start.joint_map.r else "in the fastest motion", q
-    )
-
-
-def _explain_end_speed(problem: Problem, plane: PhasePlane) -> Failure | None:
-    """Tell at which end the path cannot be passed as fast as asked for; the other is at rest, or slower likewise."""
-
-    def is_possible(rates: np.ndarray) -> bool:
-        return plane.fastest((float(rates[0]), float(rates[1]))) is not None
-
-    if not is_possible(np.zeros(2)):
-        return None
-    asked = np.array(problem.end_rates)
-    shares: dict[str, float] = {}
-    for end, key in enumerate(("start_speed", "end_speed")):
-        if not asked[end]:
-            continue
-        alone = np.where(np.arange(2) == end, asked, 0.0)
-        low = 0.0
-        high = 1.0
-        for _ in range(10):
-            middle = 0.5 * (low + high)
-            # On a short path a speed may ask for one at the other end.
-            both = is_possible(middle * alone) or is_possible(middle * asked)
-            low, high = (middle, high) if both else (low, middle)
-        shares[key] = low
-    key = min(shares, key=lambda key: (shares[key], key))
-    share = shares[key]
-    if share >= _EXACT:
-        return None
-    unit = problem.task.speed_unit
-    speeds = {key: getattr(problem.task.boundary, key) for key in shares}
-    most = f"{share * speeds[key]:.3g} {unit}"
+def _explain(check: _SpeedCheck, share: float) -> Failure:
+    """Tell which speeds are too high, if this share of all at once is possible."""
+    numbers = range(len(check.speeds))
+    every = np.ones(len(check.speeds))
+    shares = {number: check.caps[number][0] for number in numbers}
+    number = min(numbers, key=lambda number: shares[number])
+    _, place, label = check.caps[number]
+    why = f"for the {label} limit at s = {place:.3g}"
+    if shares[number] > share + 0.01:
+        # A leg is too short. One speed alone may be to blame.
+        alone = ((number, check.lower_one(number)) for number in numbers)
+        shares = {number: own for number, own in alone if own is not None}
+        shares = shares or dict.fromkeys(numbers, share)
+        leg = next(leg for leg in check.free_legs if check.pass_leg(leg, every) is None)
+        ends = [check.speed_at(leg, side) for side in (0, -1)]
+        number = max(shares, key=lambda number: (number in ends, shares[number]))
+        first, last = (
+            "rest" if end is None else str(check.speeds[end]) for end in ends
+        )
+        part = check.problem.legs[leg]
+        why = (
+            f"for the {check.limit_on(leg, share * every)} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
+            f"is too short to get from {first} to {last}"
+        )
+    speed = check.speeds[number]
+    most = f"{_HELD * shares[number] * speed.figure:.3g} {speed.unit}"
+    along = " along the best joint path that was found" if check.is_redundant else ""
     return Failure(
-        f"the limits do not allow this speed at the path's {key.removesuffix('_speed')}",
-        where=f"boundary.{key}",
-        found=f"{speeds[key]:g} {unit}; along one joint path about {most} is possible (estimate)",
+        f"the {speed.name} is too high {why}",
+        where=speed.key,
+        found=str(speed),
+        needed=f"no more than {most}{along} (estimate)",
         hint="Raise the limits that hold the motion back",
         remedies=[
-            Remedy(f"boundary.{key}", speed, _FIRST * shares[key] * speed, unit)
-            for key, speed in speeds.items()
-            if shares[key] < _EXACT
+            Remedy(speed.key, speed.figure, _FIRST * own * speed.figure, speed.unit)
+            for speed, own in ((check.speeds[i], own) for i, own in shares.items())
+            if own < 1.0
         ],
-        share=share,
     )
-
-
-def _explain_shortfall(
-    start: InitialGuess, motion: JointStates, how: str, q: np.ndarray
-) -> Failure | None:
-    """Tell where a motion, whose places ascend, falls short of a least speed most; None if it does not.
-
-    Its joint path is q, (S, n).
-    """
-    problem = start.problem
-    worst = 0.0
-    for each in least_speeds(problem.limits):
-        parts = _parts_of(each, motion.s)
-        everything = each.values(motion)
-        shortfall = np.where(
-            parts.any(axis=1, keepdims=True), each.violation(everything), -np.inf
-        )
-        if shortfall.max() > worst:
-            worst = float(shortfall.max())
-            limit = each
-            column = int(np.argmax(shortfall.max(axis=0)))
-            values = everything[:, column]
-            beyond = shortfall[:, column]
-            # Of the part with the worst place.
-            place = int(np.argmax(beyond))
-            inside = np.flatnonzero(parts[:, int(np.argmax(parts[place]))])
-    if not worst > 0.0:
-        return None
-    label = limit.labels[column]
-    found, allowed = in_figures(limit, column, float(values[place]))
-    best = inside[int(np.argmin(beyond[inside]))]
-    most, _ = in_figures(limit, column, float(values[best]))
-    what, cuts = _describe_reach(motion.s[inside], beyond[inside] <= 0.0)
-    figure = _figure(limit, column)
-    remedies: list[Remedy] = []
-    for number, part in enumerate(problem.task.tool_limits.process_speed):
-        key = f"tool_limits.process_speed[{number}]"
-        if not label.key.startswith(key):
-            continue
-        speed, s, name = _find_speed_cap(problem, q, part.s)
-        if speed < figure:
-            on_path = " on that joint path" if start.joint_map.r else ""
-            what = f"the {name} limit lets the tool keep no more than {speed:.3g} m/s at s = {s:.3g}{on_path}"
-            cuts = {}
-        guess = _FIRST * part.speed * min(float(found), speed) / figure
-        remedies.append(Remedy(f"{key}.speed", part.speed, guess, "m/s"))
-        remedies += [
-            Remedy(f"{key}.s[{end}]", part.s[end], cut, is_refined=False)
-            for end, cut in cuts.items()
-        ]
-    return Failure(
-        f"no motion was found with the required {label.kind}: {what}",
-        where=f"{label.key or limit.name} ({label.subject})",
-        found=f"{found} to {most} {label.unit} on that part, the least at s = {motion.s[place]:.2g}, {how}",
-        needed=f"{allowed} {label.unit}",
-        hint="Raise the limits that hold the motion back",
-        remedies=remedies,
-        share=1.0 - worst,
-    )
-
-
-def _find_speed_cap(
-    problem: Problem, q: np.ndarray, part: tuple[float, float]
-) -> tuple[float, float, str]:
-    """Find the largest speed that the tool can keep on a part of a joint path, (S, n), m/s; where, and which limit."""
-    q_ds = np.gradient(q, _S, axis=0, edge_order=2)
-    q_dds = np.gradient(q_ds, _S, axis=0, edge_order=2)
-    slope = ToolSpeed(problem.robot).slope(q, q_ds)
-    bend = -np.gradient(slope, _S) / np.maximum(slope, _STILL)
-    inside = (part[0] <= _S) & (part[1] >= _S) & (slope > _STILL)
-    cap = (math.inf, 0.0, "")
-    for limit in _others(problem) if inside.any() else ():
-        if not isinstance(limit, HasPhasePlaneRows):
-            continue
-        rows = limit.phase_plane_rows(
-            _S[inside], q[inside], q_ds[inside], q_dds[inside]
-        )
-        slant = rows.x
-        lower = -np.inf
-        if rows.u is not None:
-            slant = rows.x + rows.u * bend[inside, None]
-            lower = -1.0
-        end = np.where(slant > 0.0, 1.0, lower) - rows.constant
-        with np.errstate(divide="ignore", invalid="ignore"):
-            level = np.where(slant == 0.0, np.inf, np.maximum(end / slant, 0.0))
-        squares = level * slope[inside, None] ** 2
-        row, column = np.unravel_index(int(np.argmin(squares)), squares.shape)
-        speed = math.sqrt(squares[row, column])
-        if speed < cap[0]:
-            label = limit.labels[column if squares.shape[1] == len(limit.labels) else 0]
-            cap = (speed, float(_S[inside][row]), str(label))
-    return cap
-
-
-def _parts_of(limit: Limit, s: np.ndarray) -> np.ndarray:
-    """Tell which places, (P,), are within which parts between breaks of a limit, (P, p) bool; breaks come in pairs."""
-    breaks = np.sort(limit.breaks)
-    if not len(breaks) or len(breaks) % 2:
-        breaks = np.array([0.0, 1.0])
-    ends = breaks.reshape(-1, 2)
-    return np.asarray((s[:, None] >= ends[:, 0]) & (s[:, None] <= ends[:, 1]))
-
-
-def _describe_reach(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, float]]:
-    """Say where of the places, (P,), a speed is reached, (P,) bool, and to which s ends of the part could be moved."""
-    if not reached.any():
-        return "it is not reached anywhere on that part", {}
-    first, last = (float(end) for end in s[reached][[0, -1]])
-    if not reached[(s >= first) & (s <= last)].all():
-        return f"it cannot be held all the way from s = {first:.3g} to {last:.3g}", {}
-    # The part begins behind, or ends before, the run-up to the speed.
-    places = {}
-    cuts = {}
-    if not reached[0]:
-        places[0] = f"before s = {s[0]:.2g}"
-        cuts[0] = first + 0.01
-    if not reached[-1]:
-        places[1] = f"after s = {s[-1]:.2g}"
-        cuts[1] = last - 0.01
-    text = f"the path {' and '.join(places.values())} is too short to reach it"
-    # Of two ends neither is enough by itself.
-    return text, cuts if len(cuts) == 1 else {}

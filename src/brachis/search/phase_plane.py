@@ -10,50 +10,127 @@ be reached is kept; forwards, the largest u that stays within is taken (Pham, Ph
 Torque may jump here, and viscous and Coulomb friction are left out, so the time is an estimate by which joint paths are
 ranked, not a bound.
 
-The usual first guess follows its joint path smoothly from rest to rest, and its time is scaled until nothing is too
-fast. No such scaling meets a least speed over a part of the path. With a least speed the guess therefore keeps the
-times of the phase plane, and knots are ever closer towards the ends and the times at which its acceleration jumps: a
-part of the path at a constant speed may be long, and the run-up to it short.
+A joint path has kinks where the tool stops, so every leg of the path is looked at by itself. A leg with a given speed
+has no fastest motion, but one motion, which the limits allow or do not allow.
 
-Between moving ends the first guess lies half-way between a constant acceleration and the phase plane. The former alone
-may need no force at all, so that no limit's change with the end time tells a solver where to go.
+The usual first guess of a leg follows its joint path smoothly from rest to rest, and its time is scaled until nothing
+is too fast. Between moving ends the first guess lies half-way between a constant acceleration and the phase plane. The
+former alone may need no force at all, so that no limit's change with the end time tells a solver where to go.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common.arrays import interpolate_columns
 from brachis.limits import HasPhasePlaneRows, Limit
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
 from brachis.optimise.program import Program
-from brachis.optimise.transcription import breaks_of
+from brachis.path.legs import Leg
+from brachis.path.time_law import TimeLaw
+from brachis.problem.problem import Problem
 
+_Part = tuple[np.ndarray, float | None]
+"""Guess for a leg: curves, (S, c), and duration, s, if these are a motion's at even times."""
 _TINY = 1e-9
 """Coefficients and slopes below this are taken for zero."""
 _STATIONS = 401
 """Stations along a joint path of a guess."""
-_GRADING = 0.5
-"""Length that knot intervals gain with their distance from a switch, as a part of it."""
+_LEAST_STATIONS = 41
+"""Stations along a leg, at least."""
+_NEAR = 1e-4
+"""Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
+_ROUNDING = 1e-6
+"""Part of (ds/dt)^2 at the ends by which rounding may exceed a limit."""
+_ROUGH = 0.99
+"""Part of a given speed that the limits have to allow: derivatives of a joint path are differences."""
 
 
-def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
-    """Estimate the least time along a joint path from rest to rest.
+def least_time(problem: Problem, s: np.ndarray, q: np.ndarray) -> float:
+    """Estimate the least time along a joint path, with its stops and given speeds.
 
     Parameters
     ----------
-    limits, s, q
-        As of `PhasePlane`.
+    problem, s, q
+        As of `fastest_times`.
 
     Returns
     -------
     float
-        s; infinite for a joint path that cannot be followed at any speed.
+        s; infinite for a joint path that cannot be followed at any speed, or not at the given one.
     """
-    times = PhasePlane(limits, s, q).times()
-    return np.inf if times is None else float(times[-1])
+    total = sum(leg.dwell for leg in problem.legs)
+    for part in fastest_times(problem, s, q):
+        total += np.inf if part is None else float(part[1][-1])
+    return total
+
+
+def fastest_times(
+    problem: Problem, s: np.ndarray, q: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray] | None]:
+    """Estimate when a joint path is passed on each leg.
+
+    Parameters
+    ----------
+    problem : Problem
+    s : (S,) ndarray
+        Path coordinates, ascending from 0 to 1.
+    q : (S, n) ndarray
+        Postures there, rad or m, continuous.
+
+    Returns
+    -------
+    list of (stations, times) or None
+        For each leg path coordinates (P,) from its beginning to its end, and times (P,) from 0 on, s. None for a leg
+        that cannot be passed.
+    """
+    found: list[tuple[np.ndarray, np.ndarray] | None] = []
+    parts = zip(problem.legs, problem.leg_rates, problem.time_laws, strict=True)
+    for leg, rates, law in parts:
+        stations, postures = stations_on(leg, s, q)
+        plane = PhasePlane(problem.limits, stations, postures)
+        times = plane.times(rates) if law is None else None
+        if law is not None:
+            times, rate, acceleration = given_motion(law, stations)
+            if plane.speed_factor(rate, acceleration)[0] < _ROUGH:
+                times = None
+        found.append(None if times is None else (stations, times))
+    return found
+
+
+def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
+    """Spread about so many path coordinates, (S,), evenly over each leg, the ends of the legs among them."""
+    parts = [np.zeros(1)]
+    for leg in problem.legs:
+        least = min(count, _LEAST_STATIONS)
+        own = max(least, math.ceil((count - 1) * (leg.end - leg.begin)) + 1)
+        parts.append(np.linspace(leg.begin, leg.end, own)[1:])
+    return np.concatenate(parts)
+
+
+def stations_on(
+    leg: Leg, s: np.ndarray, q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Take the part of a joint path, (S,) and (S, n), on a leg: path coordinates (P,) and postures (P, n)."""
+    inner = s[(s > leg.begin + _NEAR) & (s < leg.end - _NEAR)]
+    if len(inner) < 3:
+        inner = np.linspace(leg.begin, leg.end, 5)[1:-1]
+    stations = np.concatenate([[leg.begin], inner, [leg.end]])
+    return stations, interpolate_columns(stations, s, q)
+
+
+def given_motion(
+    law: TimeLaw, stations: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find when a time law passes stations, (P,), s, and ds/dt, 1/s, and d2s/dt2, 1/s^2, there."""
+    t = np.linspace(0.0, law.duration, 8 * len(stations))
+    times = np.interp(stations, law.at(t)[0], t)
+    _, rate, acceleration, _ = law.at(times)
+    return times, rate, acceleration
 
 
 class PhasePlane:
@@ -62,42 +139,45 @@ class PhasePlane:
     Parameters
     ----------
     limits : sequence of Limit
-    s : (S,) ndarray
-        Path coordinates, ascending.
-    q : (S, n) ndarray
-        Postures there, rad or m, continuous.
-    stations : (P,) ndarray, optional
-        Path coordinates, ascending from s[0] to s[-1]; s by default. Derivatives of the joint path are interpolated.
+    s : (P,) ndarray
+        Path coordinates, ascending, at least three.
+    q : (P, n) ndarray
+        Postures there, rad or m, continuous with their derivatives.
     """
 
-    def __init__(
-        self,
-        limits: Sequence[Limit],
-        s: np.ndarray,
-        q: np.ndarray,
-        stations: np.ndarray | None = None,
-    ) -> None:
-        stations = s if stations is None else stations
+    def __init__(self, limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> None:
         q_ds = np.gradient(q, s, axis=0, edge_order=2)
         q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
-        joints = [interpolate(stations, s, part) for part in (q, q_ds, q_dds)]
-        self._steps = np.diff(stations)
-        self._floor = np.zeros(len(stations))
-        self._ceiling = np.full(len(stations), np.inf)
+        self.s = s
+        self._steps = np.diff(s)
+        self._floor = np.zeros(len(s))
         sloped = []
+        levels = [np.empty((len(s), 0))]
+        names: list[str] = []
+        level_names: list[str] = []
         for limit in limits:
             if not isinstance(limit, HasPhasePlaneRows):
                 continue
-            line = limit.phase_plane_rows(stations, *joints)
-            if line.u is not None:
-                sloped.append((line.u, line.x, line.constant))
+            rows = limit.phase_plane_rows(s, q, q_ds, q_dds)
+            labels = [str(label) for label in limit.labels]
+            own = (
+                labels
+                if rows.x.shape[1] == len(labels)
+                else labels[:1] * rows.x.shape[1]
+            )
+            if rows.u is not None:
+                sloped.append((rows.u, rows.x, rows.constant))
+                names += own
                 continue
             with np.errstate(divide="ignore", invalid="ignore"):
-                level = (1.0 - line.constant) / line.x
-            highest = np.where(line.x > 0.0, level, np.inf).min(axis=1)
-            lowest = np.where(line.x < 0.0, level, 0.0).max(axis=1)
-            self._ceiling = np.minimum(self._ceiling, highest)
+                level = (1.0 - rows.constant) / rows.x
+            lowest = np.where(rows.x < 0.0, level, 0.0).max(axis=1)
             self._floor = np.maximum(self._floor, lowest)
+            levels.append(np.where(rows.x > 0.0, level, np.inf))
+            level_names += own
+        self._levels = np.concatenate(levels, axis=1)
+        self._ceiling = self._levels.min(axis=1, initial=np.inf)
+        self._labels = [*names, *level_names]
         a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
         # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
         a = np.where(np.abs(a) < _TINY, _TINY, a)
@@ -113,6 +193,60 @@ class PhasePlane:
             return None
         durations = 2.0 * self._steps / (rate[1:] + rate[:-1])
         return np.append(0.0, np.cumsum(durations))
+
+    def speed_factor(
+        self, rate: np.ndarray, acceleration: np.ndarray
+    ) -> tuple[float, float, str]:
+        """Find by how much a motion may be faster, or has to be slower.
+
+        Parameters
+        ----------
+        rate, acceleration : (P,) ndarray
+            ds/dt, 1/s, and d2s/dt2, 1/s^2, at the stations.
+
+        Returns
+        -------
+        tuple of float, float and str
+            The largest factor of its speed; the path coordinate and the label of the limit that allow no more.
+        """
+        factors = self._factors(rate, acceleration)
+        least = factors.min(axis=1)
+        # The first place of equal ones.
+        station = int(np.argmax(least <= least.min() * (1.0 + _ROUNDING)))
+        column = int(np.argmin(factors[station]))
+        return float(least[station]), float(self.s[station]), self._labels[column]
+
+    def _factors(self, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """Largest factor, (P, c), of the speed of a motion for each limit alone."""
+        x = rate[:, None] ** 2
+        beside = acceleration[:, None] - self._slope * x
+        bound = np.hstack(
+            [np.where(beside > 0.0, self._upper, self._lower), self._levels]
+        )
+        used = np.hstack([beside, np.broadcast_to(x, self._levels.shape)])
+        squares = np.divide(
+            bound, used, out=np.full_like(bound, np.inf), where=used != 0.0
+        )
+        return np.sqrt(np.maximum(squares, 0.0))
+
+    def active_limit(self, rate: np.ndarray) -> str:
+        """Name the limit that a motion, ds/dt (P,), 1/s, as fast as possible, is at for most of its way."""
+        acceleration = np.diff(rate**2) / (2.0 * self._steps)
+        factors = self._factors(rate, np.append(acceleration, acceleration[-1]))
+        columns = np.argmin(factors[:-1], axis=1)
+        return self._labels[int(np.argmax(np.bincount(columns, self._steps)))]
+
+    def largest_rate(self, station: int) -> tuple[float, str]:
+        """Find the largest ds/dt, 1/s, that the limits allow at a station, and which one allows no more."""
+        tilt = self._slope[station][:, None] - self._slope[station]
+        clearance = self._upper[station][:, None] - self._lower[station]
+        falls = tilt < -_TINY
+        squares = np.divide(
+            clearance, -tilt, out=np.full_like(tilt, np.inf), where=falls
+        )
+        highest = np.append(squares.min(axis=1), self._levels[station])
+        column = int(np.argmin(highest))
+        return math.sqrt(max(highest[column], 0.0)), self._labels[column]
 
     def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
         """Largest ds/dt at the stations, (P,), 1/s, each as large as any motion along the joint path has it there.
@@ -132,7 +266,7 @@ class PhasePlane:
         if intervals is None:
             return None
         low, high = intervals
-        if not low[0] <= first <= high[0]:
+        if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
             return None
         x = np.full(len(low), first)
         for i, step in enumerate(self._steps):
@@ -147,8 +281,8 @@ class PhasePlane:
 
     def _go_backwards(self, last: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Find the intervals of x, (P,), from which the end can be reached with x = `last`; None if one is empty."""
-        lowest = self._floor[-1] * (1.0 - 1e-6)  # of the rounding
-        if not lowest <= last <= self._ceiling[-1] * (1.0 + 1e-6):
+        lowest = self._floor[-1] * (1.0 - _ROUNDING)
+        if not lowest <= last <= self._ceiling[-1] * (1.0 + _ROUNDING):
             return None
         low = np.full(len(self._floor), last)
         high = low.copy()
@@ -173,141 +307,73 @@ class PhasePlane:
         return low, high
 
 
-def interpolate(places: np.ndarray, s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Interpolate values (S, c) at s, (S,), linearly at places, (P,)."""
-    return np.column_stack([np.interp(places, s, column) for column in values.T])
-
-
-def least_speeds(limits: Sequence[Limit]) -> list[Limit]:
-    """Limits that ask for a least speed."""
-    return [limit for limit in limits if limit.longer_time == "violates"]
-
-
-def initial_knots(start: InitialGuess) -> np.ndarray:
-    """Choose the ends of the knot intervals in normalised time, (N + 1,), for a plan from a guess."""
-    breaks = breaks_of(start.problem.task)
-    guess = _least_speed_guess(start)
-    if guess is None:
-        return breaks
-    curves, times = guess
-    # Switches: times at which the acceleration along the path jumps by a tenth of its range.
-    t_norm = times / times[-1]
-    middle = 0.5 * (t_norm[1:] + t_norm[:-1])
-    acceleration = np.diff(np.diff(curves[:, 0]) / np.diff(t_norm)) / np.diff(middle)
-    # Changes by less than 0.01 paths per square of the duration are rounding.
-    jumps = np.abs(np.diff(acceleration)) > max(0.1 * np.ptp(acceleration), 1e-2)
-    switches = middle[1:-1][jumps]
-    if not len(switches):
-        return breaks
-    is_refined = start.problem.task.spline.intervals == "auto"
-    return grade_knots(
-        np.union1d([0.0, 1.0], switches), 60 if is_refined else len(breaks) - 1
-    )
-
-
-def grade_knots(switches: np.ndarray, count: int) -> np.ndarray:
-    """Find the ends, (count + 1,), of so many intervals, m + g d long at distances d from the nearest switch."""
-    halves = np.repeat(0.5 * np.diff(switches), 2)
-    # With more intervals than the least length needs all of them become shorter: slopes over 1e-9 of the time would
-    # say nothing.
-    low = 1e-5
-    high = 1.0
-    for _ in range(60):
-        least = np.sqrt(low * high)
-        numbers = np.log1p(_GRADING * halves / least) / _GRADING  # in every half
-        low, high = (least, high) if numbers.sum() > count else (low, least)
-    behind = np.append(0.0, np.cumsum(numbers))
-    wanted = np.linspace(0.0, behind[-1], count + 1)
-    half = np.searchsorted(behind, wanted, side="right") - 1
-    half = np.clip(half, 0, len(halves) - 1)
-    is_after = half % 2 == 0  # the nearest switch
-    away = np.where(is_after, wanted - behind[half], behind[half + 1] - wanted)
-    distance = least / _GRADING * np.expm1(_GRADING * away)
-    after = switches[half // 2] + distance
-    before = switches[half // 2 + 1] - distance
-    breaks = np.where(is_after, after, before)
-    return np.concatenate([[0.0], breaks[1:-1], [1.0]])
-
-
 def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     """Fit splines to the joint path of a guess, as `starting_point` does.
 
     Parameters
     ----------
     program : Program
+        With a phase for each leg of the path.
     start : InitialGuess
 
     Returns
     -------
     (v,) ndarray or None
     """
-    guesses = ((_least_speed_guess(start), True), (_moving_ends_guess(start), False))
-    for guess, keep in guesses:
-        if guess is None:
-            continue
-        curves, times = guess
-        # Even times: the run-up to a speed is passed in milliseconds.
-        even = np.linspace(0.0, times[-1], 64 * _STATIONS)
-        motion = interpolate(even, times, curves)
-        x = starting_point(program, [motion], times[-1], keep=keep)
+    parts = start.legs
+    legs = range(len(parts))
+    guesses: list[list[_Part]]
+    if start.durations is not None:
+        guesses = [list(zip(parts, start.durations, strict=True))]
+    else:
+        plain = [_given_guess(start, leg) or (parts[leg], None) for leg in legs]
+        moving = [_moving_ends_guess(start, leg) or plain[leg] for leg in legs]
+        guesses = [moving, plain]
+    for guess in guesses:
+        curves, durations = zip(*guess, strict=True)
+        x = starting_point(program, curves, durations)
         if x is not None:
             return x
-    return starting_point(
-        program, [start.joint_path], start.estimate if start.timed else None
-    )
+    return None
 
 
-def _least_speed_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
-    """Curves along the joint path, (S, c), and their times, (S,), s; None if no limit asks for a least speed."""
-    return _phase_plane_guess(start) if least_speeds(start.problem.limits) else None
-
-
-def _moving_ends_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
-    """Curves and times likewise for a joint path between moving ends that is not a motion's yet; else None."""
-    first, last = start.problem.end_rates
-    if start.timed or first == last == 0.0:
+def _given_guess(start: InitialGuess, leg: int) -> _Part | None:
+    """Curves, (S, c), at even times, and the duration, s, on a leg whose speed is given; else None."""
+    law = start.problem.time_laws[leg]
+    if law is None:
         return None
-    guess = _phase_plane_guess(start)
-    if guess is None:
-        return None
-    curves, times = guess
-    s = curves[:, 0]
-    with np.errstate(invalid="ignore"):  # 0 / 0 for a motion that starts from rest
-        even = 2.0 * s / (first + np.sqrt(first**2 + (last**2 - first**2) * s))
-    return curves, 0.5 * (times + np.nan_to_num(even))
+    s = law.at(np.linspace(0.0, law.duration, _STATIONS))[0]
+    return _curves_along(start, s), law.duration
 
 
-def _phase_plane_guess(start: InitialGuess) -> tuple[np.ndarray, np.ndarray] | None:
-    """Curves along the joint path, (S, c), and when the phase plane passes them, (S,), s; None if it cannot."""
+def _moving_ends_guess(start: InitialGuess, leg: int) -> _Part | None:
+    """Curves and duration likewise on a leg between moving ends whose speed is free; None elsewhere."""
     problem = start.problem
-    s = np.linspace(0.0, 1.0, _STATIONS)
-    q = postures_along(start, s)
-    if q is None:
+    first, last = problem.leg_rates[leg]
+    if problem.time_laws[leg] is not None or first == last == 0.0:
         return None
-    stations = spread_stations(problem.limits)
-    times = PhasePlane(problem.limits, s, q, stations).times(problem.end_rates)
+    begin = problem.legs[leg].begin
+    end = problem.legs[leg].end
+    s = np.linspace(begin, end, _STATIONS)
+    q = postures_along(start, s)
+    times = None if q is None else PhasePlane(problem.limits, s, q).times((first, last))
     if times is None or not np.isfinite(times[-1]):
         return None
-    return _curves_along(start, stations), times
+    rate = np.sqrt(first**2 + (last**2 - first**2) * (s - begin) / (end - begin))
+    with np.errstate(invalid="ignore"):  # 0 / 0 for a motion that starts from rest
+        even = np.nan_to_num(2.0 * (s - begin) / (first + rate))
+    times = 0.5 * (times + even)
+    t = np.linspace(0.0, times[-1], 8 * _STATIONS)
+    return _curves_along(start, np.interp(t, times, s)), float(times[-1])
 
 
 def _curves_along(start: InitialGuess, s: np.ndarray) -> np.ndarray:
     """Curves, (S, c), of a guess at path coordinates, (S,)."""
     path = start.joint_path
-    return np.column_stack([s, interpolate(s, path[:, 0], path)[:, 1:]])
+    return np.column_stack([s, interpolate_columns(s, path[:, 0], path)[:, 1:]])
 
 
 def postures_along(start: InitialGuess, s: np.ndarray) -> np.ndarray | None:
     """Postures of a guess, (S, n), at path coordinates, (S,); None if some do not exist."""
     q = start.joint_map.postures(_curves_along(start, s))
     return q if np.isfinite(q).all() else None
-
-
-def spread_stations(limits: Sequence[Limit]) -> np.ndarray:
-    """Spread stations evenly, and ever closer towards places at which a least speed sets in or ends."""
-    even = np.linspace(0.0, 1.0, _STATIONS)
-    steps = even[1] * 0.5 ** np.arange(12)
-    breaks = [limit.breaks for limit in least_speeds(limits)]
-    near = np.concatenate([np.empty(0), *breaks])[:, None] + np.r_[-steps, 0.0, steps]
-    places = np.union1d(even, np.clip(near, 0.0, 1.0))
-    return places[np.append(np.diff(places) > 0.5 * steps[-1], True)]

@@ -37,7 +37,7 @@ from brachis.search.failure import (
     explain_time_limit,
 )
 from brachis.search.given_motion import GIVEN, given_guess
-from brachis.search.hopeless import UNLIKELY, explain_holding, explain_speed
+from brachis.search.hopeless import explain_holding
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.search.schedule import Batch, batches
@@ -91,7 +91,6 @@ class Search:
         self._listener = listener
         self._dead_ends: dict[str, DeadEnd] = {}
         self._unfinished_lattices: dict[str, None] = {}
-        self._too_fast: Failure | None = None
         self._given_motion = ""
         self._solved: dict[int, Candidate] = {}
         self._waiting: list[int] = []
@@ -157,7 +156,7 @@ class Search:
         limit = self._deadline
         if not self.is_satisfied:
             limit = limit.part(_COARSE_SHARE)
-        # No guess may take more than 15 % of the time.
+        # No guess of several may take more than 15 % of the time.
         share = min(0.15, _COARSE_SHARE / max(1, len(batch.starts)))
         seconds = max(_LEAST_SHARE, share * self._problem.task.search.time_limit)
         work = run_in_processes(
@@ -242,7 +241,7 @@ class Search:
     def explain(self) -> Failure:
         """Tell why no motion was found."""
         starts = [each.start for each in self.candidates if each.start is not None]
-        failure = self._too_fast or explain_holding(starts)
+        failure = explain_holding(starts)
         if failure is None and (self.interrupted or self._is_cut_short()):
             self.interrupted = True
             failure = explain_time_limit(self._problem.task, self.not_completed())
@@ -325,18 +324,10 @@ class Search:
         )
 
     def _refuse_what_is_out_of_reach(self) -> None:
-        """Refuse paths out of reach, and least speeds far out of reach, before fallbacks are tried."""
+        """Refuse paths out of reach before fallbacks are tried."""
         failure = explain_first_failures(
             self._decompositions, self.candidates, self._deadline
         )
-        if failure is None:
-            limit = self._deadline.part(_COARSE_SHARE).within(_LEAST_SHARE)
-            self._too_fast = explain_speed(
-                self.candidates,
-                lambda start: candidates.solve_candidate(start, limit, self._listener),
-            )
-            if self._too_fast is not None and self._too_fast.share < UNLIKELY:
-                failure = self._too_fast
         if failure is not None:
             raise failure.error()
 
@@ -422,10 +413,10 @@ def is_same_motion(first: Candidate, second: Candidate) -> bool:
     for candidate in (first, second):
         assert candidate.program is not None
         try:
-            (state,) = candidate.program.states(candidate.reports[-1].x)
+            states = candidate.program.states(candidate.reports[-1].x)
         except UnreachableError:
             return False
-        postures.append(state.q)
+        postures.append(np.concatenate([state.q for state in states]))
     return bool(np.abs(postures[0] - postures[1]).max() < 0.1)  # rad or m
 
 

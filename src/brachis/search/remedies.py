@@ -51,10 +51,8 @@ def try_remedies(
     deadline = deadline.within(_TIME)
     content = task.to_dict()
     advice: list[str] = []
-    # A number that is tried once may take as long as three trials of one that is refined.
-    weights = [_TRIALS if remedy.is_refined else 3 for remedy in error.remedies]
     for number, remedy in enumerate(error.remedies):
-        own = deadline.part(weights[number] / sum(weights[number:]))
+        own = deadline.part(1.0 / (len(error.remedies) - number))
 
         def is_enough(
             value: float, most: int | None, key: str = remedy.key, own: Deadline = own
@@ -84,9 +82,7 @@ def try_remedies(
         if found:
             advice.append(f"{remedy.verb} {remedy.key} to {found}")
     # One number alone may not be enough.
-    untried = " and ".join(
-        f"{remedy.verb} {remedy.key}" for remedy in error.remedies if remedy.is_refined
-    )
+    untried = " and ".join(f"{remedy.verb} {remedy.key}" for remedy in error.remedies)
     text = ", or ".join(advice)
     if untried and not text:
         text = f"{untried} (how far is not known)"
@@ -131,7 +127,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
         return ""
     verified = "(a plan with it was verified"
     # Quick trials may miss a plan: only after a whole search the message says that it found none.
-    if remedy.is_refined and bad != remedy.asked and not deadline.passed:
+    if bad != remedy.asked and not deadline.passed:
         outcome = is_enough(bad, None)
         if outcome:
             good = bad
@@ -150,7 +146,7 @@ def _bracket(
     bad = remedy.asked
     step = _NEAR
     value = _round(remedy.guess, down=lowers)
-    for _ in range(_TRIALS if remedy.is_refined else 1):
+    for _ in range(_TRIALS):
         if deadline.passed or value in (good, bad) or value <= 0.0:
             break
         if is_enough(value, 1):

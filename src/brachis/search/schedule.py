@@ -103,7 +103,7 @@ def batches(
     Raises
     ------
     PlanningError
-        No motion along any joint path can hold a least speed, or a mean of a load.
+        No motion along any joint path can hold a speed, or a mean of a load.
     """
     solvers = solvers_of(problem)
     levels = SEARCH_LEVELS[problem.task.search.effort]

@@ -98,24 +98,27 @@ def _solve_quickly(
     # An answer that nearly holds the limits will do, and so will one that hardly gets any faster.
     options = SolverOptions(1e-3, 25, np.inf, progress=5e-3, patience=3)
     session = SolverSession(backend, options, deadline, acceptable=1e-2)
-    program = program_of(problem, start.joint_map, np.linspace(0.0, 1.0, 13))
-    x = initial_guess(program, start)
-    if x is None:
-        return hopeless
     try:
+        maps = start.maps_by_leg()
+        program = program_of(problem, maps, np.linspace(0.0, 1.0, 13))
+        x = initial_guess(program, start)
+        if x is None:
+            return hopeless
         solved = solve_in_chart(problem, program, x, session)
         if not solved.usable:
             return hopeless
-        (motion,) = solved.program.motions(solved.report.x)
-        (phase,) = solved.program.phases
-        chart = phase.joint_map
+        motions = solved.program.motions(solved.report.x)
+        chart = solved.program.phases[0].joint_map
         assert isinstance(chart, ChartMap)
+        even = [
+            motion.at(np.linspace(0.0, motion.t_end, 97))[0] for motion in motions
+        ]
         return dataclasses.replace(
             start,
-            joint_map=chart,
-            joint_path=motion.at(np.linspace(0.0, motion.t_end, 97))[0],
+            joint_map=chart.along(problem.path, chart.start),
+            joint_path=np.concatenate(even),
             estimate=float(solved.report.objective),
-            timed=True,
+            durations=tuple(motion.t_end for motion in motions),
         )
     except (ImportError, UnreachableError):  # the plan says which backend is missing
         return hopeless

@@ -14,12 +14,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common.arrays import interpolate_columns
 from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Listener
 from brachis.errors import PathError, UnreachableError
-from brachis.kinematics import CHART, JointSpaceMap, Newton, chart_around
+from brachis.kinematics import (
+    CHART,
+    JointMap,
+    JointSpaceMap,
+    Newton,
+    chart_around,
+)
 from brachis.limits import Limit
-from brachis.optimise.candidate import InitialGuess, PathMap
+from brachis.optimise.candidate import InitialGuess
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
@@ -29,7 +36,11 @@ from brachis.search.failure import Failure
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.phase_plane import PhasePlane, interpolate, least_time
+from brachis.search.phase_plane import (
+    fastest_times,
+    least_time,
+    spread_stations,
+)
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.processes import ignore
 from brachis.search.screening import screen
@@ -137,14 +148,14 @@ def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
     s = joint_path.s
     # More finely than at the lattice's stations.
-    fine = np.linspace(0.0, 1.0, max(2 * len(s) - 1, 97))
+    fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, 97))
     weights = np.ones(len(s))
     weights[[0, -1]] = 1e3  # nearly exact at both ends
     for pieces in (3, 8):
         knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, pieces + 1), np.ones(3)]
         spline = make_lsq_spline(s, joint_path.q, knots, k=3, w=weights)
         yield fine, np.asarray(spline(fine))
-    yield fine, interpolate(fine, s, joint_path.q)
+    yield fine, interpolate_columns(fine, s, joint_path.q)
 
 
 def _guess_on_branch(
@@ -167,7 +178,7 @@ def _guess_on_branch(
         q = joint_path.q
         curves = np.column_stack([s, q[:, redundant]])
     problem = decomposition.problem
-    estimate = least_time(problem.limits, s, q)
+    estimate = least_time(problem, s, q)
     family = decomposition.match.family
     return InitialGuess(problem, joint_map, curves, estimate, origin, family)
 
@@ -228,7 +239,7 @@ def chart_starts(
     Raises
     ------
     PlanningError
-        No motion along any joint path can hold a least speed, or a mean of a load.
+        No motion along any joint path can hold a speed, or a mean of a load.
     """
     for finer in (1, 2):
         lattice = PostureLattice(
@@ -325,7 +336,7 @@ def _guess_in_chart(
             continue
         if problem.task.boundary.periodic and not chart.rows.closes:
             continue
-        estimate = least_time(problem.limits, s, q)
+        estimate = least_time(problem, s, q)
         curves = chart.curves(s, q)
         return InitialGuess(problem, chart, curves, estimate, origin, CHART)
     return None
@@ -369,20 +380,26 @@ def joint_space_start(problem: Problem) -> InitialGuess:
     PathError
         The path leaves the joint ranges, or no motion along it was found and the arm cannot hold a posture on it.
     """
-    s = np.linspace(0.0, 1.0, 401)
+    s = spread_stations(problem)
     q = problem.path.sample(s).target
-    times = PhasePlane(problem.limits, s, q).times(problem.end_rates)
+    passed = [part for part in fastest_times(problem, s, q) if part is not None]
+    is_passed = len(passed) == len(problem.legs)
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
-        is_needed = times is None or limit.longer_time != "relieves"
+        is_needed = not is_passed or limit.longer_time != "relieves"
         if limit.at_rest != "nothing" and is_needed:
             _refuse_beyond(problem, limit, s, q)
     joint_map = JointSpaceMap(problem.robot, problem.path)
-    if times is None:
+    if not is_passed:
         return InitialGuess(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
-    estimate = float(times[-1])
-    timed = np.interp(s * estimate, times, s)[:, None]
-    return InitialGuess(problem, joint_map, timed, estimate, FAMILY, FAMILY, timed=True)
+    durations = tuple(float(times[-1]) for _, times in passed)
+    even = np.linspace(0.0, 1.0, 401)
+    timed = [np.interp(even * times[-1], times, stations) for stations, times in passed]
+    estimate = sum(durations) + sum(leg.dwell for leg in problem.legs)
+    motion = np.concatenate(timed)[:, None]
+    return InitialGuess(
+        problem, joint_map, motion, estimate, FAMILY, FAMILY, durations=durations
+    )
 
 
 def _refuse_beyond(
@@ -411,12 +428,12 @@ def _refuse_beyond(
     raise failure.error()
 
 
-def first_map(
+def first_maps(
     problem: Problem, decompositions: Sequence[Decomposition]
-) -> tuple[PathMap, str]:
-    """Return a joint map of the problem, of a closed form if there is one, and its family.
+) -> tuple[list[JointMap], str]:
+    """Return joint maps of the problem, one for each leg, of a closed form if there is one, and its family.
 
-    It begins at the given start posture, or if that is free at that of the first joint path.
+    They begin at the given start posture, or if that is free, or there are several legs, along the first joint path.
 
     Raises
     ------
@@ -425,10 +442,11 @@ def first_map(
     """
     if isinstance(problem.task_map, JointSpace):
         start = joint_space_start(problem)
-        return start.joint_map, start.family
+        return start.maps_by_leg(), start.family
     first = next(iter(decompositions), None)
-    if first is not None and problem.start is not None:
-        return first.joint_map(problem.start, first.branches[0]), first.match.family
+    is_given = problem.start is not None and len(problem.legs) == 1
+    if first is not None and problem.start is not None and is_given:
+        return [first.joint_map(problem.start, first.branches[0])], first.match.family
     level = SEARCH_LEVELS["fast"][0]
     found = (
         chart_starts(problem, decompositions, level)
@@ -437,4 +455,4 @@ def first_map(
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
-    return found[0].joint_map, found[0].family
+    return found[0].maps_by_leg(), found[0].family

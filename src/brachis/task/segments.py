@@ -288,10 +288,6 @@ ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its f
 _POSITIONS = 3
 
 
-SHORTEST_DWELL = 1e-3
-"""Shortest dwell, s: one cycle of a robot's controller is as long."""
-
-
 class SegmentModel(Model):
     """What all segments share."""
 
@@ -301,14 +297,7 @@ class SegmentModel(Model):
     stop: Flag = False
     """Whether the tool stops at the end of this segment: all joints are at rest there, and the path may have a corner.
     """
-    dwell: Annotated[
-        NonNegative,
-        must(
-            lambda dwell: dwell == 0.0 or dwell >= SHORTEST_DWELL,
-            "the dwell is too short",
-            "0, or 0.001 s or more",
-        ),
-    ] = 0.0
+    dwell: NonNegative = 0.0
     """Time for which the arm waits at the end of this segment, s; with it the tool stops there."""
 
     @model_validator(mode="before")
@@ -321,6 +310,12 @@ class SegmentModel(Model):
     @model_validator(mode="after")
     def _stop_fits(self) -> Self:
         return self.check(
+            (
+                0.0 < self.dwell < 1e-3,
+                "dwell",
+                "the dwell is shorter than a cycle of a robot's controller",
+                "0, or 0.001 s and more",
+            ),
             (
                 self.dwell and not self.stop,
                 "stop",

@@ -1,0 +1,101 @@
+"""What is minimised: the end time, or the accelerations of the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from brachis.limits import Partials
+from brachis.optimise.phase import Phase
+
+_CALM = 1e-5
+"""Weight of the redundant joints' accelerations where the time is given, s; it decides only what nothing else does."""
+
+
+class Objective(Protocol):
+    """A function of the phases' motions.
+
+    Attributes
+    ----------
+    longest : float or (phases,) ndarray
+        Upper bounds on the phases' durations, s.
+    """
+
+    @property
+    def longest(self) -> float | np.ndarray: ...  # noqa: D102
+
+    def value(self, phase: Phase, x: np.ndarray) -> float:
+        """Share of a phase at its variables x, (v,)."""
+        ...
+
+    def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Gradient of the share, (v,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class EndTime:
+    """The end time t_E, s: the sum of the durations.
+
+    Where the duration of a phase is given, the mean square of the redundant joints' accelerations is added, per
+    duration squared, with a weight so small that no end time notices it. Many motions are as fast there, and solvers
+    need one that is best.
+    """
+
+    longest: float = np.inf
+
+    def value(self, phase: Phase, x: np.ndarray) -> float:
+        """Duration of a phase, s, and of the pause after it."""
+        duration = float(x[0]) + phase.pause
+        if phase.time_law is None:
+            return duration
+        bends = phase.state(x).yddot[:, 1:] * x[0] ** 2
+        return duration + _CALM * float(_shares(phase) @ (bends**2).sum(axis=1))
+
+    def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Gradient of the value, (v,)."""
+        if phase.time_law is None:
+            unit = np.zeros(len(x))
+            unit[0] = 1.0
+            return unit
+        bends = phase.state(x).yddot * x[0] ** 4
+        bends[:, 0] = 0.0
+        slopes = 2.0 * _CALM * _shares(phase)[:, None] * bends
+        zero = np.zeros_like(slopes)[:, None]
+        gradient = phase.gradient_by_curves((zero, zero, slopes[:, None]), x)
+        gradient[0] = 1.0  # the duration does not change
+        return gradient
+
+
+@dataclass(frozen=True, eq=False)
+class LeastAcceleration:
+    """Mean over a phase's time of the sum over the joints of (weights_i qddot_i)^2, by the trapezoidal rule.
+
+    Attributes
+    ----------
+    weights : (n,) ndarray
+        By joint, reciprocals of accelerations.
+    longest : (phases,) ndarray
+        See `Objective`.
+    """
+
+    weights: np.ndarray
+    longest: np.ndarray
+
+    def value(self, phase: Phase, x: np.ndarray) -> float:
+        """Mean over a phase; raises UnreachableError as `Phase.evaluate` does."""
+        squares = (phase.state(x).qddot * self.weights) ** 2
+        return float(_shares(phase) @ squares.sum(axis=1))
+
+    def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Gradient of the mean, (v,); raises UnreachableError as `Phase.evaluate` does."""
+        slopes = 2.0 * _shares(phase)[:, None] * self.weights**2 * phase.state(x).qddot
+        return phase.gradient(Partials(qddot=slopes[:, None]), x)
+
+
+def _shares(phase: Phase) -> np.ndarray:
+    """Weights of the trapezoidal rule at the collocation points, (K,)."""
+    gaps = np.concatenate([[0.0], np.diff(phase.t_norm), [0.0]])
+    return np.asarray(0.5 * (gaps[:-1] + gaps[1:]))

@@ -1,0 +1,101 @@
+"""Stops of a path, where it may have corners, and the parts of a path between two places."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brachis.errors import PathError
+from brachis.path import Path, PathFrame, build_path
+from brachis.task import Placement, load_task
+
+RIGHT: dict[str, Any] = {"line": {"by": [0.3, 0.0, 0.0]}}
+UP: dict[str, Any] = {"line": {"by": [0.0, 0.0, 0.1]}}
+TURN: dict[str, Any] = {"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 90}}}
+POSE = [0.5, 0.0, 0.4, *np.eye(3).ravel()]
+
+
+def path_of(
+    segments: list[dict[str, Any]], space: Any = "position", frame: Any = None
+) -> Path:
+    task = load_task(
+        {
+            "brachis": 1,
+            "start": {"joints": [0]},
+            "task_space": space,
+            "path": segments,
+        }
+    )
+    rows = ("x", "y", "z", "rx", "ry", "rz") if space == "pose" else ("x", "y", "z")
+    return build_path(task.path, POSE if space == "pose" else POSE[:3], rows, frame)
+
+
+def test_a_path_has_corners_at_its_stops_alone() -> None:
+    path = path_of([{**RIGHT, "stop": True}, {**UP, "dwell": 0.5}, RIGHT])
+    np.testing.assert_allclose(path.stops, [3 / 7, 4 / 7], atol=1e-15)
+    assert len(path_of([RIGHT, RIGHT]).stops) == 0
+    with pytest.raises(PathError, match=r"path\[1\].blend .* or path\[1\].stop: true"):
+        path_of([{**RIGHT, "stop": True}, UP, RIGHT])
+
+
+def test_blends_and_stops_follow_each_other() -> None:
+    path = path_of([{**RIGHT, "blend": 0.05}, {**UP, "stop": True}, RIGHT])
+    (stop,) = path.stops
+    assert stop == path.breaks[3]
+    np.testing.assert_allclose(path.sample([stop]).target, [[0.8, 0.0, 0.5]])
+
+
+def test_the_tool_turns_on_the_spot_at_a_stop() -> None:
+    with pytest.raises(PathError, match=r"a stop: .*set path\[0\].stop: true"):
+        path_of([RIGHT, {**TURN, "stop": True}, UP], "pose")
+    path = path_of([{**RIGHT, "stop": True}, {**TURN, "stop": True}, UP], "pose")
+    assert len(path.stops) == 2
+    sample = path.sample(path.stops)
+    np.testing.assert_allclose(sample.target[:, :3], [[0.8, 0, 0.4]] * 2, atol=1e-15)
+    assert np.abs(sample.xi[0, :3]).max() < 1e-12
+    assert np.abs(sample.xi[1, 3:]).max() < 1e-12
+
+
+FRAME = PathFrame.of(
+    Placement(xyz=(0.1, 0.2, 0.3), rpy_deg=(0, 0, 30)), ("x", "y", "z")
+)
+
+
+@pytest.mark.parametrize(("space", "frame"), [("position", FRAME), ("pose", None)])
+def test_a_part_of_a_path_is_the_path(space: str, frame: Any) -> None:
+    """Inside its ends to rounding, in the same s and frame, to all derivatives."""
+    spline = {
+        "spline": {"through": [[0.1, 0.1, 0.0], [0.2, 0.3, 0.1]], "relative": True}
+    }
+    path = path_of(
+        [{**RIGHT, "blend": 0.05}, {**UP, "stop": True}, spline], space, frame
+    )
+    begin, end = 0.13, 0.87
+    part = path.between(begin, end)
+    assert part.breaks[[0, -1]].tolist() == [begin, end]
+    inside = (path.knots > begin) & (path.knots < end)
+    np.testing.assert_array_equal(part.knots[1:-1], path.knots[inside])
+    np.testing.assert_array_equal(part.stops, path.stops)
+    s = np.linspace(begin, end, 1000)
+    one, other = path.sample(s), part.sample(s)
+    for name in ("target", "xi", "xi_ds", "xi_dds"):
+        expected = getattr(one, name)
+        off = 1e-11 * np.abs(expected).max()
+        np.testing.assert_allclose(getattr(other, name), expected, atol=off)
+
+
+def test_a_part_goes_on_as_it_begins_and_ends() -> None:
+    path = path_of([{**RIGHT, "stop": True}, {**UP, "stop": True}, RIGHT])
+    first, last = path.stops
+    middle = path.between(first, last)
+    sample = middle.sample([first, last, first - 0.1, last + 0.1])
+    np.testing.assert_allclose(sample.xi, [[0.0, 0.0, 0.7]] * 4, atol=1e-12)
+    np.testing.assert_allclose(sample.target[2:, 2], [0.4 - 0.07, 0.5 + 0.07])
+    assert len(middle.stops) == 0
+    assert middle.length == pytest.approx(0.1)
+    # The path itself has the side behind the stop.
+    np.testing.assert_allclose(path.sample([last]).xi, [[0.7, 0.0, 0.0]], atol=1e-12)
+    before = path.between(0.0, first).sample([first]).xi
+    np.testing.assert_allclose(before, [[0.7, 0.0, 0.0]], atol=1e-12)

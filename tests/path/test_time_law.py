@@ -1,0 +1,142 @@
+"""The time law of a given speed: s(t) by hand on lines, the speed at all times elsewhere, its derivatives and ends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.path import Leg, Path, TimeLaw, path_of, time_law_of
+from brachis.robot import TaskMap, bind, task_map_of
+from brachis.task import load_task
+
+LINE: dict[str, Any] = {"line": {"by": [0.2, 0.0, 0.0]}}
+UP: dict[str, Any] = {"line": {"by": [0.0, 0.0, 0.2]}}
+WAVE = [[0.05, 0.05, 0.0], [0.15, -0.05, 0.05], [0.2, 0.1, 0.0], [0.3, 0.1, 0.1]]
+SPLINE: dict[str, Any] = {"spline": {"through": WAVE, "relative": True}}
+CIRCLE: dict[str, Any] = {
+    "circle": {"center": [0.5, 0.0, 0.5], "normal": [0, 0, 1], "turns": 3}
+}
+POSE = {"position": [0.4, 0.0, 0.5], "rpy_deg": [180, 0, 0]}
+
+
+def path_and_map(
+    segments: list[dict[str, Any]], space: str = "position"
+) -> tuple[TaskMap, Path]:
+    start = POSE if space == "pose" else POSE["position"]
+    keys: dict[str, Any] = {"start": "free", "path_start": start}
+    if space == "joints":
+        keys = {"start": {"joints": [0.0, 0.5, 0.0, -1.0, 0.0, 0.5, 0.0]}}
+    task = load_task({"brachis": 1, **keys, "task_space": space, "path": segments})
+    _, task_map = bind(brachis.robots.iiwa14, task.task_space)
+    return task_map, path_of(task_map, task)
+
+
+def law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw:
+    law = time_law_of(leg, task_map, path)
+    assert law is not None
+    return law
+
+
+@pytest.mark.parametrize(("segment", "length"), [(LINE, 0.2), (CIRCLE, 0.6 * np.pi)])
+def test_it_is_linear_on_lines_and_circles(
+    segment: dict[str, Any], length: float
+) -> None:
+    task_map, path = path_and_map([segment])
+    law = law_of(Leg(0.2, 0.7, speed=0.1), task_map, path)
+    assert law.spline.k == 1
+    assert law.duration == pytest.approx(0.5 * length / 0.1, rel=1e-12)
+    s, *rates = law.at(np.linspace(0.0, law.duration, 5))
+    np.testing.assert_allclose(s, np.linspace(0.2, 0.7, 5), atol=1e-14)
+    np.testing.assert_allclose(rates[0], 0.1 / length, rtol=1e-12)
+    assert np.abs(rates[1:]).max() == 0.0
+    np.testing.assert_allclose(law.at_end(-1), [0.7, 0.1 / length, 0, 0], rtol=1e-12)
+
+
+def test_a_free_leg_has_none() -> None:
+    assert time_law_of(Leg(0.0, 1.0), *path_and_map([LINE])) is None
+
+
+WINDING = [[0.3, 0.7, 0.1, -1.2, 0.2, 0.7, 0.1], [0.6, 0.6, 0.3, -1.0, 0.4, 0.5, 0.5]]
+CASES: dict[str, tuple[list[dict[str, Any]], str]] = {
+    "blend": ([{**LINE, "blend": 0.05}, UP], "position"),
+    "spline": ([SPLINE], "position"),
+    "turning": ([{**SPLINE, "orientation": "tangent"}], "pose"),
+    "joints": ([{"spline": {"through": WINDING}}], "joints"),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def case(request: pytest.FixtureRequest) -> tuple[TaskMap, Path, TimeLaw]:
+    task_map, path = path_and_map(*CASES[request.param])
+    return task_map, path, law_of(Leg(0.1, 0.9, speed=0.3), task_map, path)
+
+
+def speeds(
+    task_map: TaskMap, path: Path, s: np.ndarray, rate: np.ndarray
+) -> np.ndarray:
+    """Speed of the tool, (K,), m/s; of a path of joints by Jacobians."""
+    sample = path.sample(s)
+    velocity = sample.xi[:, :3]
+    if not task_map.axes:
+        tool = task_map_of(task_map.robot, "position")
+        jacobian = tool.jacobian(tool.twists(sample.target))
+        velocity = np.einsum("kij,kj->ki", jacobian, sample.xi)
+    return np.linalg.norm(velocity, axis=1) * rate
+
+
+def test_the_speed_is_met_at_all_times(case: Any) -> None:
+    task_map, path, law = case
+    s, rate, *_ = law.at(np.linspace(0.0, law.duration, 20_001))
+    steady = np.full(len(s), rate.mean())
+    off = np.abs(speeds(task_map, path, s, steady) / 0.3 - 1.0).max()
+    assert off > 0.02, "a linear law would not meet it"
+    assert np.abs(speeds(task_map, path, s, rate) / 0.3 - 1.0).max() < 1e-9
+    assert s[[0, -1]] == pytest.approx([0.1, 0.9], abs=1e-14)
+
+
+def test_the_tool_passes_its_length_in_the_duration(case: Any) -> None:
+    task_map, path, law = case
+    s = np.linspace(0.1, 0.9, 40_001)
+    per_s = speeds(task_map, path, s, np.ones(len(s)))
+    length = np.sum(0.5 * (per_s[1:] + per_s[:-1]) * np.diff(s))
+    assert law.duration == pytest.approx(length / 0.3, rel=1e-8)
+
+
+def test_derivatives_equal_differences_and_continue(case: Any) -> None:
+    *_, law = case
+    t = np.linspace(0.01, 0.99, 301) * law.duration
+    h = 1e-5 * law.duration
+    before, now, after = (law.at(t + step) for step in (-h, 0.0, h))
+    slopes = (after - before)[:3] / (2.0 * h)
+    for order in range(3):
+        size = np.abs(now[order + 1]).max()
+        np.testing.assert_allclose(slopes[order], now[order + 1], atol=2e-4 * size)
+    knots = np.unique(law.spline.t)[1:-1]
+    tiny = 1e-12 * law.duration
+    jump = np.abs(law.at(knots + tiny) - law.at(knots - tiny)).max(axis=1)
+    assert np.all(jump < 1e-6 * np.abs(now).max(axis=1))
+
+
+def test_its_ends_are_exact(case: Any) -> None:
+    """By differences of the exact rate: sddot = d(sdot^2 / 2)/ds, and so on."""
+    task_map, path, law = case
+    for end, s in ((0, 0.1), (-1, 0.9)):
+        h = 1e-4
+        around = s + h * np.arange(-2, 3)
+        rate = 0.3 / speeds(task_map, path, around, np.ones(5))
+        slope = (rate[0] - 8 * rate[1] + 8 * rate[3] - rate[4]) / (12 * h)
+        bend = (-rate[0] + 16 * rate[1] - 30 * rate[2] + 16 * rate[3] - rate[4]) / (
+            12 * h**2
+        )
+        expected = [
+            s,
+            rate[2],
+            slope * rate[2],
+            (bend * rate[2] + slope**2) * rate[2],
+        ]
+        np.testing.assert_allclose(law.at_end(end), expected, rtol=1e-4, atol=1e-6)
+        spline = law.at(np.array([0.0, law.duration]))[:, end]
+        np.testing.assert_allclose(law.at_end(end), spline, rtol=1e-5, atol=1e-6)

@@ -1,0 +1,78 @@
+"""Stops and dwells at the ends of segments, as a task writes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import brachis
+from brachis.errors import TaskError
+from brachis.task import Task, load_task
+
+UP: dict[str, Any] = {"line": {"by": [0.0, 0.1]}}
+
+
+def task(**keys: Any) -> Task:
+    path = [{"line": {"by": [0.1, 0.0]}, **keys}, UP]
+    return load_task(
+        {"brachis": 1, "start": {"joints": [0]}, "task_space": ["x", "y"], "path": path}
+    )
+
+
+def test_a_dwell_is_a_stop() -> None:
+    for keys, stop, dwell in (
+        ({}, False, 0.0),
+        ({"stop": True}, True, 0.0),
+        ({"dwell": 0.5}, True, 0.5),
+        ({"stop": True, "dwell": 0.5}, True, 0.5),
+        ({"dwell": 0}, False, 0.0),
+        ({"stop": True, "dwell": 0.001}, True, 0.001),
+    ):
+        made = task(**keys)
+        assert (made.path[0].stop, made.path[0].dwell) == (stop, dwell)
+        assert load_task(made.to_dict()) == made
+
+
+def test_segments_of_a_program_stop() -> None:
+    first, second = brachis.Line(by=[0.1, 0.0], dwell=0.5) + brachis.Circle(
+        [0.0, 0.0], stop=True
+    )
+    assert (first.stop, first.dwell, second.stop) == (True, 0.5, True)
+
+
+@pytest.mark.parametrize(
+    ("keys", "where", "said"),
+    [
+        ({"stop": True, "blend": 0.01}, "blend", "so its corner is not rounded"),
+        ({"dwell": 0.5, "blend": 0.01}, "blend", "so its corner is not rounded"),
+        ({"stop": False, "dwell": 0.5}, "stop", "a dwell needs a stop"),
+        ({"dwell": 0.0005}, "dwell", "0.001 s"),
+        ({"dwell": -0.5}, "dwell", ">= 0"),
+        ({"dwell": "long"}, "dwell", "number"),
+        ({"stop": 1}, "stop", "true or false"),
+    ],
+)
+def test_what_is_no_stop_is_refused_with_its_key(
+    keys: dict[str, Any], where: str, said: str
+) -> None:
+    with pytest.raises(TaskError) as caught:
+        task(**keys)
+    assert f"path[0].{where}: " in str(caught.value)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("keys", [{"stop": True}, {"dwell": 1.0}])
+def test_the_last_segment_ends_the_motion_anyway(keys: dict[str, Any]) -> None:
+    path = [UP, {**UP, **keys}]
+    with pytest.raises(
+        TaskError, match=r"path\[1\].stop: the last .*boundary.end_speed"
+    ):
+        load_task(
+            {
+                "brachis": 1,
+                "start": {"joints": [0]},
+                "task_space": ["x", "y"],
+                "path": path,
+            }
+        )
