@@ -50,6 +50,7 @@ from brachis.errors import (
     write_count,
 )
 from brachis.kinematics import (
+    ChartMap,
     ChartRows,
     JointMap,
     JointSpaceMap,
@@ -57,11 +58,13 @@ from brachis.kinematics import (
 )
 from brachis.limits import Role
 from brachis.optimise.backends import solvers_for
+from brachis.optimise.bspline import spread
+from brachis.optimise.grid import FixedGrid
 from brachis.optimise.improve import SolvedProgram, SolverSession
-from brachis.optimise.phase import Motion
+from brachis.optimise.motion import Motion
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.optimise.transcription import program_of
+from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
 from brachis.robot.joints import shown_unit
@@ -102,13 +105,20 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
     ends = []
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         program, x = _problem(trajectory)
-        joint_map = program.phases[0].joint_map
+        first = program.phases[0].joint_map
+        has_law = any(phase.time_law is not None for phase in program.phases)
+        is_flat = isinstance(first, ChartMap) or (has_law and first.r > 0)
         curved = any(limit.guarantee.is_mean for limit in program.limits)
         for backend in solvers_for(task.solver.name, curved=curved):
             if deadline.passed:
                 break
             solve = SolverSession.for_task(
-                backend, task.solver, joint_map, deadline, lambda _text: None
+                backend,
+                task.solver,
+                first.r,
+                deadline,
+                lambda _text: None,
+                is_flat=is_flat,
             )
             try:
                 refined = refine(program, solve(program, x), solve, options)
@@ -130,31 +140,39 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
 
 def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     """Build the problem over the saved knots; the motion is its point x."""
+    task = trajectory.task
     joint_map: JointMap
     if len(trajectory.chart_rows):
-        problem = Problem.of(trajectory.robot, trajectory.task)
+        problem = Problem.of(trajectory.robot, task)
         rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
         s = trajectory.path_coordinate(trajectory.times)
         path = problem.path
         joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
-    elif trajectory.task.task_space == JOINTS:
-        problem = Problem.of(trajectory.robot, trajectory.task)
+    elif task.task_space == JOINTS:
+        problem = Problem.of(trajectory.robot, task)
         joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
         names = tuple(
             name for name in trajectory.redundant_joints if name != ROLL_JOINT
         )
-        task = trajectory.task.model_copy(
+        own = task.model_copy(
             update={"redundant_joints": names, "branch": trajectory.branch}
         )
-        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, task))
+        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, own))
         problem = decomposition.problem
         joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
-    program = program_of(problem, joint_map, np.unique(trajectory.knots))
-    motion = Motion(
-        trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points
-    )
-    x = program.variables_from([motion])
+    parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)
+    moving = [(phase, spline) for phase, spline in parts if not phase.is_dwell]
+    starts = trajectory.position([phase.begin for phase, _ in moving])
+    grids = []
+    motions = []
+    for (_, spline), law in zip(moving, problem.time_laws, strict=True):
+        t_norm = spread(np.unique(spline.knots), task.spline.points_per_interval)
+        grids.append(FixedGrid(spline.knots, spline.degree, t_norm))
+        points = spline.control_points[0 if law is None else 1 :]
+        motions.append(Motion(spline.t_end, spline.knots, spline.degree, points, law))
+    program = program_over(problem, maps_by_leg(problem, joint_map, starts), grids)
+    x = program.variables_from(motions)
     for margin in MARGINS:
         program = program.with_margin(margin)
         # Solvers and interpolation are not exact.
