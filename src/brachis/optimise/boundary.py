@@ -12,7 +12,7 @@ linear in the control points too (see `periodic`). Boundary conditions therefore
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -214,6 +214,14 @@ class Boundary:
         ]
         return cls(sides[0], sides[1], periodic)
 
+    def up_to_velocity(self) -> Boundary:
+        """Return the conditions without derivatives above the first."""
+        sides = [
+            tuple(replace(own, derivatives=own.derivatives[:1]) for own in side)
+            for side in (self.start, self.end)
+        ]
+        return replace(self, start=sides[0], end=sides[1])
+
     @property
     def ahead(self) -> np.ndarray:
         """By how much the end is ahead of the start, (c,); zero where that is free."""
@@ -224,7 +232,9 @@ class Boundary:
         """Build the conditions into splines."""
         if self.periodic:
             jumps = zip(self.start, self.ahead, strict=True)
-            return tuple(periodic(knots, degree, own.value, jump) for own, jump in jumps)
+            return tuple(
+                periodic(knots, degree, own.value, jump) for own, jump in jumps
+            )
         given = 0 if self.time_law is None else 1
         pairs = zip(self.start[given:], self.end[given:], strict=True)
         return tuple(BoundarySpline.between(knots, degree, *pair) for pair in pairs)
