@@ -385,7 +385,7 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
     possible = {
         each: _round_down(own * check.speeds[each].figure)
         for each, own in shares.items()
-        if own < 1.0
+        if own < _EXACT or each == number
     }
     speed = check.speeds[number]
     along = " along the best joint path that was found" if check.is_redundant else ""
