@@ -358,7 +358,7 @@ def initial_breaks(start: InitialGuess) -> list[np.ndarray]:
             continue
         beside = [np.inf, *times, np.inf][number : number + 3 : 2]
         first, last = (0.5 * even[1] * time / law.duration for time in beside)
-        breaks[number] = grade_breaks(2 * (len(even) - 1), first, last)
+        breaks[number] = grade_breaks(2 * (len(even) // 2), first, last)
     return breaks
 
 
