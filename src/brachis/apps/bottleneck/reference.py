@@ -268,7 +268,9 @@ def knot_cost(
     """
     phases = trajectory.phases
     has_means = any(limit.guarantee.is_mean for limit in limits)
-    if any(limit.order > _JUMPING for limit in limits) or (has_means and len(phases) > 1):
+    if any(limit.order > _JUMPING for limit in limits) or (
+        has_means and len(phases) > 1
+    ):
         return None
     least = 0.0
     intervals = 0

@@ -484,7 +484,7 @@ def write_phases(phases: tuple[PhaseLimits, ...]) -> list[str]:
     """Say of each phase how long it takes and which limits are active in it."""
     rows = phase_rows([each.phase for each in phases])
     return [
-        f"phase {name}, s = {s}, {time}, {speed}: at its limits: {each}"
+        f"phase {name}, s = {s}, {time}, {speed}; active limits: {each}"
         for (name, s, time, speed), each in zip(rows, phases, strict=True)
     ]
 

@@ -231,7 +231,7 @@ class PhaseLimits:
         texts = [
             f"{label} ({100.0 * share:.0f} % of the time)" for label, share in shares
         ]
-        return ", ".join(texts) or "no limit"
+        return ", ".join(texts) or "none"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""

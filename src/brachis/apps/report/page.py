@@ -117,7 +117,7 @@ def make_report(
         figures=tables.figures_of_merit(reported),
         what_limits=tables.what_limits(reported),
         joints=tables.joint_rows(reported),
-        phase_columns=(*PHASE_COLUMNS, "at its limits"),
+        phase_columns=(*PHASE_COLUMNS, "active limits"),
         phases=tables.phases_with_limits(reported),
         held_back=reported.held_back,
         remarks=reported.remarks,
