@@ -9,9 +9,9 @@ import pytest
 
 import brachis
 from brachis.optimise.program import Program
-from brachis.optimise.transcription import breaks_of, program_of
+from brachis.optimise.transcription import program_of
 from brachis.problem.problem import Problem
-from brachis.search.phase_plane import initial_guess
+from brachis.search.phase_plane import initial_breaks, initial_guess
 from brachis.search.starts import FAMILY, joint_space_start
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
@@ -41,7 +41,7 @@ def guess(content: dict, *, is_timed: bool) -> tuple[Problem, Program, np.ndarra
     if not is_timed:
         even = np.linspace(0.0, 1.0, 101)[:, None]
         start = type(start)(problem, start.joint_map, even, np.inf, "", FAMILY)
-    program = program_of(problem, start.maps_by_leg(), breaks_of(problem))
+    program = program_of(problem, start.maps_by_leg(), initial_breaks(start))
     x = initial_guess(program, start)
     assert x is not None
     return problem, program, x
