@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from brachis.errors import ResultFileError
-from brachis.trajectory import PhaseSpline, Trajectory, join_splines, split_splines
+from brachis.trajectory import (
+    PHASE_COLUMNS,
+    PhaseSpline,
+    Trajectory,
+    join_splines,
+    phase_rows,
+    split_splines,
+)
 from support.gantry import DWELL, SPEED, SPLINES, gantry_motion
 from support.result_files import with_parts
 
@@ -125,3 +132,20 @@ def test_a_file_with_other_phases_than_knots(case, motion, tmp_path):
 
 def test_one_phase_has_its_own_knots():
     np.testing.assert_array_equal(join_splines(SPLINES[:1])[0], SPLINES[0].knots)
+
+
+def test_a_table_says_what_the_phases_are(motion):
+    rows = phase_rows(motion.phases)
+    assert rows[1] == ("2 dwell", "0.4", "0.5000 s (1.0000 to 1.5000 s)", "at rest")
+    assert rows[3][1:] == ("0.55 to 0.85", "1.0000 s (2.5000 to 3.5000 s)", "0.3 m/s")
+    assert {len(row) for row in rows} == {len(PHASE_COLUMNS)}
+
+
+def test_phases_as_plain_data(motion):
+    assert motion.phases[3].to_dict() == {
+        "kind": "given speed",
+        "begin": 2.5,
+        "end": 3.5,
+        "s": [0.55, 0.85],
+        "speed": SPEED,
+    }

@@ -12,7 +12,7 @@ linear in the control points too (see `periodic`). Boundary conditions therefore
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -213,6 +213,14 @@ class Boundary:
             for values in (start, end)
         ]
         return cls(sides[0], sides[1], periodic)
+
+    def up_to_velocity(self) -> Boundary:
+        """Return the conditions without derivatives above the first."""
+        sides = [
+            tuple(replace(own, derivatives=own.derivatives[:1]) for own in side)
+            for side in (self.start, self.end)
+        ]
+        return replace(self, start=sides[0], end=sides[1])
 
     @property
     def ahead(self) -> np.ndarray:

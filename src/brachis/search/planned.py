@@ -101,6 +101,7 @@ class PlannedMotion(Summary):
             "t_end": self.t_end,
             "redundant_joints": list(trajectory.redundant_joints),
             "branch": trajectory.branch,
+            "phases": [phase.to_dict() for phase in trajectory.phases],
             "start_posture": trajectory.position(0.0).tolist(),
             "end_posture": trajectory.position(self.t_end).tolist(),
             "position_units": list(trajectory.robot.position_units),

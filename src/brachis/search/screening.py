@@ -100,7 +100,7 @@ def _solve_quickly(
     session = SolverSession(backend, options, deadline, acceptable=1e-2)
     try:
         maps = start.maps_by_leg()
-        program = program_of(problem, maps, np.linspace(0.0, 1.0, 13))
+        program = program_of(problem, maps, [np.linspace(0.0, 1.0, 13)] * len(maps))
         x = initial_guess(program, start)
         if x is None:
             return hopeless

@@ -1,9 +1,11 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
 from brachis.trajectory.phases import (
+    PHASE_COLUMNS,
     MotionPhase,
     PhaseSpline,
     join_splines,
+    phase_rows,
     split_splines,
 )
 from brachis.trajectory.recovered import Recovered, check_tolerance
@@ -19,6 +21,7 @@ from brachis.trajectory.trajectory import (
 
 __all__ = [
     "CONTINUOUS_TORQUE",
+    "PHASE_COLUMNS",
     "SCHEMA",
     "Motion",
     "MotionPhase",
@@ -30,5 +33,6 @@ __all__ = [
     "join_splines",
     "motion_of",
     "of_motion",
+    "phase_rows",
     "split_splines",
 ]

@@ -113,6 +113,34 @@ class MotionPhase:
             return "dwell"
         return "move" if self.speed is None else "given speed"
 
+    def to_dict(self) -> dict[str, object]:
+        """Return plain data for JSON; times in s, the speed in m/s."""
+        return {
+            "kind": self.kind,
+            "begin": self.begin,
+            "end": self.end,
+            "s": [self.s_begin, self.s_end],
+            "speed": self.speed,
+        }
+
+
+PHASE_COLUMNS = ("phase", "s", "time", "speed")
+"""Headings of `phase_rows`."""
+
+
+def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
+    """Write phases as the rows of a table, with their units."""
+    speeds = {"dwell": "at rest", "move": "as fast as the limits allow"}
+    rows: list[tuple[str, ...]] = []
+    for number, phase in enumerate(phases, start=1):
+        s = f"{phase.s_begin:.4g}"
+        if not phase.is_dwell:
+            s += f" to {phase.s_end:.4g}"
+        time = f"{phase.duration:.4f} s ({phase.begin:.4f} to {phase.end:.4f} s)"
+        speed = speeds.get(phase.kind, f"{phase.speed} m/s")
+        rows.append((f"{number} {phase.kind}", s, time, speed))
+    return rows
+
 
 def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray]:
     """Write the curves of phases as one spline over the whole motion's normalised time.

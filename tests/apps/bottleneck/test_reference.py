@@ -61,11 +61,11 @@ def test_end_posture_is_kept(slide):
         redundant=["j1"],
         robot={"limits": limits},
     )
-    np.testing.assert_array_equal(
-        free.candidate.refined.program.phases[0].boundary.end, [1.0, np.nan]
-    )
+    end = free.candidate.refined.program.phases[0].boundary.end
+    np.testing.assert_array_equal([own.value for own in end], [1.0, np.nan])
     task = free.task.to_dict()
     task["end"] = {"joints": [0.1, LENGTH - 0.1]}
     given, _ = brachis.transcribe(free.trajectory.robot, brachis.load_task(task))
-    fine = _on_mesh(given.phases[0], 3, 40)
+    (fine,) = _on_mesh(given, 3, 2).phases
+    assert fine.intervals == 2 * given.phases[0].intervals
     assert fine.motion(np.zeros(fine.variables) + 0.5).control_points[1, -1] == 0.1

@@ -25,8 +25,10 @@ from brachis.apps.bottleneck.saturation import (
     THRESHOLD,
     ActiveInterval,
     LimitRatios,
+    PhaseLimits,
     Saturation,
     limit_ratios,
+    limits_by_phase,
     saturations,
 )
 from brachis.apps.bottleneck.sensitivities import (
@@ -45,6 +47,7 @@ __all__ = [
     "CheckedSensitivity",
     "KnotCost",
     "LimitRatios",
+    "PhaseLimits",
     "Reference",
     "Saturation",
     "Sensitivities",
@@ -54,6 +57,7 @@ __all__ = [
     "find_reference",
     "knot_cost",
     "limit_ratios",
+    "limits_by_phase",
     "report",
     "saturations",
     "sensitivities",

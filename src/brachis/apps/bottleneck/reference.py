@@ -6,7 +6,7 @@ are tried on the answer's own mesh and then on finer ones, and finally parabolas
 torques jump at every knot. Each begins at the best motion so far; redundant joints and
 branch stay. The result is a local optimum on a finite mesh, not a proven bound.
 
-The cost of the knots compares the motion with the fastest timing of its own joint path.
+The cost of the knots compares the motion with the fastest timing of its own joint path, phase by phase.
 A spline can only ramp from one limit to another, so few knot intervals cost time. The
 phase plane (`brachis.search.phase_plane`) times the same joint path with torques that
 may jump. Its motion counts only if it also keeps the limits that the phase plane leaves
@@ -38,11 +38,10 @@ from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import fit_curves, shortest_time, worst_time_scaling_ratio
 from brachis.optimise.improve import SolvedProgram
-from brachis.optimise.phase import Motion, Phase
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.search.phase_plane import PhasePlane
-from brachis.trajectory import Trajectory
+from brachis.trajectory import MotionPhase, PhaseSpline, Trajectory
 
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _PARABOLAS = 2
@@ -119,53 +118,66 @@ def find_reference(
     """
     began = time.perf_counter()
     deadline = began + time_limit
-    (phase,) = refined.program.without_orders_above(_JUMPING).phases
-    (motion,) = refined.program.motions(refined.x)
+    own = refined.program.without_orders_above(_JUMPING)
     # Fewer intervals with several redundant joints: a step of the active-set method takes seconds then.
-    own = phase.intervals
-    fine = own * max(2, intervals // (own * max(1, phase.joint_map.r)))
-    meshes = [(3, count) for count in sorted({own, min(2 * own, fine), fine})]
+    r = own.phases[0].joint_map.r
+    finest = max(2, intervals // (own.intervals * max(1, r)))
+    meshes = [(3, times) for times in sorted({1, 2, finest})]
     best: Reference | None = None
+    fastest = refined
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
-        for degree, count in (*meshes, (_PARABOLAS, fine)):
+        for degree, times in (*meshes, (_PARABOLAS, finest)):
             if best is not None and time.perf_counter() > deadline:
                 break
-            fine_phase = _on_mesh(phase, degree, count)
-            answer = _plan_on_mesh(fine_phase, motion, tolerance, deadline)
-            if answer is None or answer.t_end >= motion.t_end:
+            program = _on_mesh(own, degree, times)
+            answer = _plan_on_mesh(program, fastest, tolerance, deadline)
+            if answer is None or answer.t_end >= fastest.t_end:
                 continue
             violation = _violation(answer)
             if violation > tolerance:
                 continue
-            (motion,) = answer.program.motions(answer.x)
-            distance = refined.t_end / motion.t_end - 1.0
+            fastest = answer
+            distance = refined.t_end / answer.t_end - 1.0
+            count = answer.program.intervals
             best = Reference(
-                motion.t_end, distance, degree, count, violation, 0.0, answer
+                answer.t_end, distance, degree, count, violation, 0.0, answer
             )
     elapsed = time.perf_counter() - began
     return best and dataclasses.replace(best, wall_time=elapsed)
 
 
-def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
-    """Return the phase on a uniform mesh, with rest in velocity alone."""
-    t_norm = np.linspace(0.0, 1.0, 3 * intervals + 1)
-    if degree == _PARABOLAS:  # their accelerations jump at knots: look before them, too
-        t_norm = np.union1d(t_norm, np.arange(1, intervals) / intervals - 1e-6)
-    grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, t_norm)
-    return phase.with_grid(grid, dataclasses.replace(phase.boundary, derivatives=1))
+def _on_mesh(program: Program, degree: int, times: int) -> Program:
+    """Return the program on uniform meshes so many times finer, on which only velocities vanish or continue."""
+    phases = []
+    for phase in program.phases:
+        intervals = times * phase.intervals
+        t_norm = np.linspace(0.0, 1.0, 3 * intervals + 1)
+        if degree == _PARABOLAS:  # accelerations jump at knots: look before them, too
+            t_norm = np.union1d(t_norm, np.arange(1, intervals) / intervals - 1e-6)
+        grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, t_norm)
+        phases.append(phase.with_grid(grid, phase.boundary.up_to_velocity()))
+    links = []
+    for link in program.links:
+        orders = tuple(order for order in link.orders if order < _JUMPING)
+        links.append(dataclasses.replace(link, orders=orders))
+    return Program(phases, links)
 
 
 def _plan_on_mesh(
-    phase: Phase, motion: Motion, tolerance: float, deadline: float
+    program: Program, fastest: SolvedProgram, tolerance: float, deadline: float
 ) -> SolvedProgram | None:
     """Solve from a motion and refine, with one backend after the other, until one gives a motion within the rows.
 
     It need not be an optimum: any motion within the limits is as good a reference as it is fast.
     """
-    program = Program([phase])
-    t_norm = np.linspace(0.0, 1.0, 4 * len(phase.knots))
+    motions = fastest.program.motions(fastest.x)
+    parts = []
     try:
-        x = fit_curves(phase, motion.t_end, t_norm, motion.at(t_norm * motion.t_end)[0])
+        for phase, motion in zip(program.phases, motions, strict=True):
+            t_norm = np.linspace(0.0, 1.0, 4 * len(phase.knots))
+            wanted = motion.at(t_norm * motion.t_end)[0]
+            parts.append(fit_curves(phase, motion.t_end, t_norm, wanted))
+        x = np.concatenate(parts)
         if worst_time_scaling_ratio(program, x) > 1.001:  # solvers mend less themselves
             x = shortest_time(program, x)
     except UnreachableError:
@@ -177,13 +189,14 @@ def _plan_on_mesh(
         return backend.solve(program, x, options, None)
 
     backends = solvers_for("auto")[:2]
-    for backend in reversed(backends) if phase.degree == _PARABOLAS else backends:
+    is_rough = program.phases[0].degree == _PARABOLAS
+    for backend in reversed(backends) if is_rough else backends:
         solve = partial(solve_with, backend)
         try:
             first = solve(program, x)
         except ImportError:
             continue
-        is_faster = first.feasible and first.objective < motion.t_end
+        is_faster = first.feasible and program.end_time(first.x) < fastest.t_end
         if is_faster and not first.status.usable:
             first = dataclasses.replace(first, status=SolveStatus.ACCEPTABLE)
         if first.status.usable:
@@ -195,14 +208,17 @@ def _plan_on_mesh(
 
 def _violation(answer: SolvedProgram) -> float:
     """Largest violation of a limit on a dense grid and on both sides of every knot; infinite if out of reach."""
-    ((phase, x),) = answer.program.split(answer.x)
-    breaks = phase.breaks
-    grid = np.linspace(0.0, 1.0, 30 * phase.intervals + 1)
-    places = [grid, breaks, breaks[1:] - 1e-9, breaks[:-1] + 1e-9]
-    try:
-        return float(phase.violation_at(x, np.unique(np.concatenate(places))).max())
-    except UnreachableError:
-        return np.inf
+    violations = [answer.program.violation_of_means(answer.x)]
+    for phase, x in answer.program.split(answer.x):
+        breaks = phase.breaks
+        grid = np.linspace(0.0, 1.0, 30 * phase.intervals + 1)
+        places = [grid, breaks, breaks[1:] - 1e-9, breaks[:-1] + 1e-9]
+        try:
+            found = phase.violation_at(x, np.unique(np.concatenate(places)))
+        except UnreachableError:
+            return np.inf
+        violations.append(float(found.max()))
+    return max(violations)
 
 
 @dataclass(frozen=True)
@@ -247,17 +263,43 @@ def knot_cost(
     Returns
     -------
     KnotCost or None
-        None if it cannot be compared: a limit bounds the jerk or the rate of the torque, or the motion in the phase
-        plane exceeds a limit that the phase plane leaves out.
+        None if it cannot be compared: a limit bounds the jerk, the rate of the torque, or the mean over several phases,
+        or the motion in the phase plane exceeds a limit that the phase plane leaves out.
     """
-    if any(limit.order > _JUMPING for limit in limits):
+    phases = trajectory.phases
+    has_means = any(limit.guarantee.is_mean for limit in limits)
+    if any(limit.order > _JUMPING for limit in limits) or (
+        has_means and len(phases) > 1
+    ):
         return None
-    s = np.linspace(0.0, 1.0, 1001)
-    motion = Motion(
-        trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points
-    )
-    q = trajectory.position(motion.times_of(s))
-    first, last = np.abs(trajectory.path_spline.derivative()([0.0, trajectory.t_end]))
+    least = 0.0
+    intervals = 0
+    for phase, spline in zip(phases, trajectory.phase_splines, strict=True):
+        duration = phase.duration
+        if phase.kind == "move":
+            found = _fastest_time(trajectory, phase, spline, limits)
+            if found is None:
+                return None
+            duration = found
+            intervals += len(spline.breaks) - 1
+        least += duration
+    given = trajectory.task.spline.intervals != "auto"
+    return KnotCost(intervals, given, least, 1.0 - least / t_end)
+
+
+def _fastest_time(
+    trajectory: Trajectory,
+    phase: MotionPhase,
+    spline: PhaseSpline,
+    limits: Sequence[Limit],
+) -> float | None:
+    """Return the time, s, of the fastest motion along the joint path of a phase, between its velocities at the ends.
+
+    None if the motion in the phase plane exceeds a limit.
+    """
+    s = np.linspace(phase.s_begin, phase.s_end, 1001)
+    q = trajectory.position(phase.begin + spline.times_of(s))
+    first, last = np.abs(spline.at(np.array([0.0, spline.t_end]))[1][:, 0])
     rate = PhasePlane(limits, s, q).fastest((first, last))
     if rate is None:
         return None
@@ -266,10 +308,7 @@ def knot_cost(
     # Derivatives are differences here, and rough at the stations next to rest.
     if steps[largest > 1.02].sum() > 0.01 * steps.sum():
         return None
-    least = float(steps.sum())
-    intervals = len(np.unique(trajectory.knots)) - 1
-    given = trajectory.task.spline.intervals != "auto"
-    return KnotCost(intervals, given, least, 1.0 - least / t_end)
+    return float(steps.sum())
 
 
 def _largest_ratios(

@@ -28,8 +28,11 @@ from brachis.apps.bottleneck.reference import (
 )
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
+    SHORTEST_SHARE,
     THRESHOLD,
+    PhaseLimits,
     Saturation,
+    limits_by_phase,
     saturations,
 )
 from brachis.apps.bottleneck.sensitivities import (
@@ -47,6 +50,7 @@ from brachis.errors import (
     write_count,
 )
 from brachis.kinematics import (
+    ChartMap,
     ChartRows,
     JointMap,
     JointSpaceMap,
@@ -54,17 +58,19 @@ from brachis.kinematics import (
 )
 from brachis.limits import Role
 from brachis.optimise.backends import solvers_for
+from brachis.optimise.bspline import spread
+from brachis.optimise.grid import FixedGrid
 from brachis.optimise.improve import SolvedProgram, SolverSession
-from brachis.optimise.phase import Motion
+from brachis.optimise.motion import Motion
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.optimise.transcription import program_of
+from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
 from brachis.robot.joints import shown_unit
 from brachis.robot.task_map import JOINTS
 from brachis.search.candidates import MARGINS
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Trajectory, phase_rows
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
@@ -99,13 +105,20 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
     ends = []
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         program, x = _problem(trajectory)
-        joint_map = program.phases[0].joint_map
+        first = program.phases[0].joint_map
+        has_law = any(phase.time_law is not None for phase in program.phases)
+        is_flat = isinstance(first, ChartMap) or (has_law and first.r > 0)
         curved = any(limit.guarantee.is_mean for limit in program.limits)
         for backend in solvers_for(task.solver.name, curved=curved):
             if deadline.passed:
                 break
             solve = SolverSession.for_task(
-                backend, task.solver, joint_map, deadline, lambda _text: None
+                backend,
+                task.solver,
+                first.r,
+                deadline,
+                lambda _text: None,
+                is_flat=is_flat,
             )
             try:
                 refined = refine(program, solve(program, x), solve, options)
@@ -127,31 +140,39 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
 
 def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     """Build the problem over the saved knots; the motion is its point x."""
+    task = trajectory.task
     joint_map: JointMap
     if len(trajectory.chart_rows):
-        problem = Problem.of(trajectory.robot, trajectory.task)
+        problem = Problem.of(trajectory.robot, task)
         rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
         s = trajectory.path_coordinate(trajectory.times)
         path = problem.path
         joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
-    elif trajectory.task.task_space == JOINTS:
-        problem = Problem.of(trajectory.robot, trajectory.task)
+    elif task.task_space == JOINTS:
+        problem = Problem.of(trajectory.robot, task)
         joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
         names = tuple(
             name for name in trajectory.redundant_joints if name != ROLL_JOINT
         )
-        task = trajectory.task.model_copy(
+        own = task.model_copy(
             update={"redundant_joints": names, "branch": trajectory.branch}
         )
-        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, task))
+        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, own))
         problem = decomposition.problem
         joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
-    program = program_of(problem, joint_map, np.unique(trajectory.knots))
-    motion = Motion(
-        trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points
-    )
-    x = program.variables_from([motion])
+    parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)
+    moving = [(phase, spline) for phase, spline in parts if not phase.is_dwell]
+    starts = trajectory.position([phase.begin for phase, _ in moving])
+    grids = []
+    motions = []
+    for (_, spline), law in zip(moving, problem.time_laws, strict=True):
+        t_norm = spread(np.unique(spline.knots), task.spline.points_per_interval)
+        grids.append(FixedGrid(spline.knots, spline.degree, t_norm))
+        points = spline.control_points[0 if law is None else 1 :]
+        motions.append(Motion(spline.t_end, spline.knots, spline.degree, points, law))
+    program = program_over(problem, maps_by_leg(problem, joint_map, starts), grids)
+    x = program.variables_from(motions)
     for margin in MARGINS:
         program = program.with_margin(margin)
         # Solvers and interpolation are not exact.
@@ -172,6 +193,8 @@ class BottleneckReport:
         What every limit costs; None for a motion that was not planned.
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
+    phases : tuple of PhaseLimits
+        Which limits are active in each phase.
     knots : KnotCost or None
         What the knots cost; None if that is not known.
     check : SensitivityCheck or None
@@ -192,6 +215,7 @@ class BottleneckReport:
     t_end: float
     sensitivities: Sensitivities | None
     saturations: tuple[Saturation, ...]
+    phases: tuple[PhaseLimits, ...]
     knots: KnotCost | None = None
     check: SensitivityCheck | None = None
     reference: Reference | None = None
@@ -211,6 +235,8 @@ class BottleneckReport:
         if self.check is not None:
             lines += _check_lines(self.check)
         lines += write_active(self.saturations)
+        if len(self.phases) > 1:
+            lines += write_phases(self.phases)
         if self.reference is not None:
             lines.append(_reference(self.reference, self.t_end))
         elif self.reference_sought:
@@ -233,6 +259,7 @@ class BottleneckReport:
             "sensitivities": self.sensitivities and self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
+            "phases": [each.to_dict() for each in self.phases],
             "knots": self.knots and self.knots.to_dict(),
             "check": self.check and self.check.to_dict(),
             "reference": self.reference and self.reference.to_dict(),
@@ -287,7 +314,9 @@ def report(
                     where=trajectory.recovered.source,
                     hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
                 )
-            return BottleneckReport(trajectory.t_end, None, saturations(trajectory))
+            active = saturations(trajectory)
+            phases = limits_by_phase(trajectory, active)
+            return BottleneckReport(trajectory.t_end, None, active, phases)
         refined = solve_again(trajectory)
     else:
         trajectory = motion.trajectory
@@ -303,10 +332,12 @@ def report(
     limits = [
         limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD
     ]
+    active = saturations(trajectory, limits)
     return BottleneckReport(
         t_end=trajectory.t_end,
         sensitivities=found,
-        saturations=saturations(trajectory, limits),
+        saturations=active,
+        phases=limits_by_phase(trajectory, active),
         knots=knot_cost(trajectory, limits, refined.t_end),
         check=check_sensitivities(refined, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
@@ -436,7 +467,7 @@ def write_active(found: tuple[Saturation, ...]) -> list[str]:
     """Say which limits are active for some time."""
     lines = []
     for entry in found:
-        if entry.share < 5e-4:
+        if entry.share < SHORTEST_SHARE:
             continue
         label = entry.label
         count = len(entry.active)
@@ -446,6 +477,15 @@ def write_active(found: tuple[Saturation, ...]) -> list[str]:
     return [
         *(lines or ["nothing stays at a limit"]),
         f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
+    ]
+
+
+def write_phases(phases: tuple[PhaseLimits, ...]) -> list[str]:
+    """Say of each phase how long it takes and which limits are active in it."""
+    rows = phase_rows([each.phase for each in phases])
+    return [
+        f"phase {name}, s = {s}, {time}, {speed}; active limits: {each}"
+        for (name, s, time, speed), each in zip(rows, phases, strict=True)
     ]
 
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.robot import bind
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import MotionPhase, Samples, Trajectory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,7 +92,8 @@ def limit_ratios(
     )
     jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
     if trajectory.degree <= max((limit.order for limit in limits), default=0):
-        jumps[:-1] |= np.isin(nodes[:-1], knot_times(trajectory))
+        gaps = np.abs(nodes[:-1, None] - knot_times(trajectory)).min(axis=1)
+        jumps[:-1] |= gaps <= tolerances.TIME * trajectory.t_end
     t, *motion = (
         np.concatenate([first[jumps], then])
         for first, then in zip(before, behind, strict=True)
@@ -106,6 +108,8 @@ def limit_ratios(
 
 THRESHOLD = 0.99
 """A limit is active from the time at which the motion uses this part of it."""
+SHORTEST_SHARE = 5e-4
+"""Limits that are active for a smaller part of the time are not named."""
 RIPPLE = 0.95
 """A limit stays active until the motion uses less than this part of it: splines ripple between their knots."""
 
@@ -205,6 +209,57 @@ def saturations(
         peak = float(np.abs(column).max())
         found.append(Saturation(label, share, peak, tuple(active)))
     return tuple(sorted(found, key=lambda entry: (-entry.share, -entry.peak)))
+
+
+@dataclass(frozen=True)
+class PhaseLimits:
+    """What holds one phase back.
+
+    Attributes
+    ----------
+    phase : MotionPhase
+    shares : tuple of (Label, float)
+        Limits that are active in it, and for which part of its time; those active longest first.
+    """
+
+    phase: MotionPhase
+    shares: tuple[tuple[Label, float], ...]
+
+    def __str__(self) -> str:
+        """Name the limits that are active longest, three of them."""
+        shares = self.shares[:3]
+        texts = [
+            f"{label} ({100.0 * share:.0f} % of the time)" for label, share in shares
+        ]
+        return ", ".join(texts) or "none"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        limits = [
+            {"subject": label.subject, "kind": label.kind, "share": share}
+            for label, share in self.shares
+        ]
+        return {**self.phase.to_dict(), "limits": limits}
+
+
+def limits_by_phase(
+    trajectory: Trajectory, found: Sequence[Saturation]
+) -> tuple[PhaseLimits, ...]:
+    """Find which of a motion's limits are active in each of its phases."""
+    phases = []
+    for phase in trajectory.phases:
+        shares = []
+        for entry in found:
+            overlaps = [
+                min(each.end, phase.end) - max(each.begin, phase.begin)
+                for each in entry.active
+            ]
+            share = sum(max(0.0, overlap) for overlap in overlaps) / phase.duration
+            if share >= SHORTEST_SHARE:
+                shares.append((entry.label, share))
+        shares.sort(key=lambda pair: -pair[1])
+        phases.append(PhaseLimits(phase, tuple(shares)))
+    return tuple(phases)
 
 
 def _find_active(

@@ -64,11 +64,14 @@ class ActiveSet(Summary):
         Rows to which the first a slopes belong.
     signs : (a,) ndarray
         1 at a lower bound, -1 at an upper one.
+    equalities : int
+        Number of rows and variables that are at both bounds, each with two slopes.
     """
 
     slopes: np.ndarray
     rows: np.ndarray
     signs: np.ndarray
+    equalities: int = 0
 
     @classmethod
     def at(cls, program: Program, x: np.ndarray, near: float) -> ActiveSet:
@@ -89,13 +92,18 @@ class ActiveSet(Summary):
         slopes = signs[:, None] * jacobian[rows].toarray()
         kept = slopes.any(axis=1)
         unit = np.eye(len(x))
-        bounds = (unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near])
-        return cls(np.vstack([slopes[kept], *bounds]), rows[kept], signs[kept])
+        at_lower = x <= program.x_lower + near
+        at_upper = x >= program.x_upper - near
+        slopes = np.vstack([slopes[kept], unit[at_lower], -unit[at_upper]])
+        rows = rows[kept]
+        twice = len(rows) - len(np.unique(rows)) + int((at_lower & at_upper).sum())
+        return cls(slopes, rows, signs[kept], twice)
 
     @property
     def dependent(self) -> bool:
-        """Whether several sets of multipliers may balance a gradient."""
-        return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < len(self.slopes))
+        """Whether several sets of multipliers may balance a gradient; those of equalities have either sign."""
+        count = len(self.slopes) - self.equalities
+        return bool(np.linalg.matrix_rank(self.slopes, tol=1e-9) < count)
 
     def weights_of(
         self, gradient: np.ndarray, multipliers: np.ndarray | None

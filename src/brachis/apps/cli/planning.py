@@ -115,6 +115,7 @@ def _plan_task(
 def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
     from brachis.optimise.candidate import coordinates
+    from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
     trajectory = result.trajectory
@@ -144,6 +145,9 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
             f"{100.0 * (candidate.time_scaled - 1.0):.2g} % to meet the limits between collocation points"
         )
     print_table("plan", ("", ""), rows.items())
+    if len(trajectory.phases) > 1:
+        phases = phase_rows(trajectory.phases)
+        print_table("phases", PHASE_COLUMNS, phases)
     print_lines(*(f"path from {fit}" for fit in result.fits))
     if len(data["candidates"]) > 1:
         _print_candidates(data["candidates"])
@@ -270,6 +274,7 @@ def _verify_again(trajectory: Trajectory) -> dict[str, Any]:
         "t_end": trajectory.t_end,
         "redundant_joints": list(trajectory.redundant_joints),
         "branch": trajectory.branch,
+        "phases": [phase.to_dict() for phase in trajectory.phases],
         "joint_names": list(trajectory.joint_names),
         "verified": verification.passed,
         "worst_ratio": verification.worst_ratio,

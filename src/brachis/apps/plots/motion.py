@@ -194,9 +194,10 @@ def draw_panels(
 ) -> list[Axes]:
     """Draw panels into cells one below the other, over one time axis."""
     axes = [figure.add_subplot(cell) for cell in cells]
-    for ax, panel in zip(axes, found, strict=True):
+    for number, (ax, panel) in enumerate(zip(axes, found, strict=True)):
         _draw_panel(ax, panel)
         dress(ax, trajectory, panel.label)
+        style.mark_phases(ax, trajectory.phases, labels=number == 0)
     for ax in axes[:-1]:
         ax.sharex(axes[-1])
         ax.tick_params(labelbottom=False)
@@ -290,6 +291,7 @@ def plot_timeline(
             spans, (edges[0], thick), facecolor=orange, edgecolor=orange, linewidth=0.8
         )
     dress(ax, trajectory, "")
+    style.mark_phases(ax, trajectory.phases, labels=False)
     ax.set_ylim(max(len(shown), 1) - 0.5, -0.5)
     names = [f"{style.plain(label.subject)} {label.kind}" for label in labels]
     ax.set_yticks(range(len(shown)), names)

@@ -17,6 +17,7 @@ import numpy as np
 
 from brachis.common.files import atomic_write
 from brachis.errors import InputError, NotInstalledError
+from brachis.trajectory import MotionPhase
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -206,6 +207,21 @@ def dress_time(ax: Axes, t_end: float, knots: np.ndarray) -> None:
     ax.set_xlim(0.0, t_end)
     ax.set_xticks(knots[(knots > 0.0) & (knots < t_end)], minor=True)
     ax.tick_params(axis="x", which="minor", length=2.0, color="#A0A0A0", width=0.5)
+
+
+def mark_phases(ax: Axes, phases: Sequence[MotionPhase], *, labels: bool) -> None:
+    """Draw a line where phases meet; with `labels`, write what they are, if there is room."""
+    for phase in phases[:-1]:
+        ax.axvline(phase.end, color=GREY, linewidth=0.6, linestyle=":", zorder=0.6)
+    if not labels or len(phases) == 1:
+        return
+    for number, phase in enumerate(phases, start=1):
+        if phase.duration < 0.06 * phases[-1].end:
+            continue
+        speed = f"{phase.speed} m/s"
+        text = {"move": str(number), "given speed": speed}.get(phase.kind, phase.kind)
+        place = 0.5 * (phase.begin + phase.end) / phases[-1].end
+        write(ax, place, 0.98, text, ha="center", va="top", color=GREY)
 
 
 def write(ax: Axes, x: float, y: float, text: str, **look: Any) -> None:

@@ -21,6 +21,7 @@ from brachis.apps.plots.panels import (
 from brachis.apps.plots.postures import plane_of, skeleton
 from brachis.apps.report.motion import ReportedMotion
 from brachis.apps.report.tables import NEAR
+from brachis.trajectory import Trajectory
 
 Figure = dict[str, Any]
 """``data`` and ``layout`` of Plotly."""
@@ -48,7 +49,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     panels += panels_of(trajectory, samples, "tool speed")
     heights = [210 if len(panel.curves) > 2 else 130 for panel in panels]
     ends = 1.0 - np.cumsum([0, *heights]) / sum(heights)
-    layout = _layout(trajectory.t_end, sum(heights))
+    layout = _layout(trajectory, sum(heights))
     data = []
     named: set[str] = set()
     for row, panel in enumerate(panels):
@@ -142,7 +143,7 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     top = 1.1
     active_from = THRESHOLD / top
     beyond = (1.0 + tolerance) / top
-    layout = _layout(motion.trajectory.t_end, 26 * max(len(entries), 1))
+    layout = _layout(motion.trajectory, 26 * max(len(entries), 1))
     layout["yaxis"] = {"automargin": True, "fixedrange": True, "ticks": ""}
     layout["hovermode"] = "closest"
     heat = {
@@ -173,14 +174,30 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     return {"data": [heat] if entries else [], "layout": layout}
 
 
-def _layout(t_end: float, height: int) -> dict[str, Any]:
-    """Layout with one time axis and panels of this height together, pixels; the page sets colours."""
+def _layout(trajectory: Trajectory, height: int) -> dict[str, Any]:
+    """Layout with one time axis and panels of this height together, pixels; the page sets colours.
+
+    Dotted lines are where phases meet.
+    """
+    lines = [
+        {
+            "type": "line",
+            "x0": phase.end,
+            "x1": phase.end,
+            "yref": "paper",
+            "y0": 0.0,
+            "y1": 1.0,
+            "line": {"color": style.GREY, "width": 1, "dash": "dot"},
+        }
+        for phase in trajectory.phases[:-1]
+    ]
     return {
+        "shapes": lines,
         "height": height + 110,
         "margin": {"l": 70, "r": 20, "t": 40, "b": 50},
         "hovermode": "x unified",
         "xaxis": {
-            "range": [0.0, t_end],
+            "range": [0.0, trajectory.t_end],
             "hoverformat": ".4f",
             "title": {"text": "t (s)"},
         },

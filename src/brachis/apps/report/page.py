@@ -20,7 +20,7 @@ from brachis.apps.report import tables
 from brachis.apps.report.figures import motion_figure, scene, timeline_figure
 from brachis.apps.report.motion import ReportedMotion, reported_motion
 from brachis.common.files import atomic_write, check_suffix
-from brachis.trajectory import Trajectory
+from brachis.trajectory import PHASE_COLUMNS, Trajectory
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
@@ -117,6 +117,8 @@ def make_report(
         figures=tables.figures_of_merit(reported),
         what_limits=tables.what_limits(reported),
         joints=tables.joint_rows(reported),
+        phase_columns=(*PHASE_COLUMNS, "active limits"),
+        phases=tables.phases_with_limits(reported),
         held_back=reported.held_back,
         remarks=reported.remarks,
         not_completed=reported.not_completed,

@@ -14,12 +14,13 @@ import numpy as np
 import yaml
 
 import brachis
-from brachis.apps.bottleneck import THRESHOLD
+from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
 from brachis.apps.plots.panels import Curve, Panel, curves_of, joint_rows_of, panels_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.optimise.candidate import coordinates
 from brachis.robot.from_task import in_use
 from brachis.task import Task
+from brachis.trajectory import phase_rows
 from brachis.verify import Check
 
 NEAR = 0.9
@@ -188,6 +189,15 @@ def what_limits(motion: ReportedMotion) -> str:
     if not shares:
         return "No limit is active."
     return f"At its limits longest: {', '.join(shares)}."
+
+
+def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
+    """List the phases, each with the limits that hold it back; none if there is but one."""
+    phases = limits_by_phase(motion.trajectory, motion.saturations)
+    rows = phase_rows(motion.trajectory.phases)
+    if len(rows) == 1:
+        return []
+    return [(*row, str(each)) for row, each in zip(rows, phases, strict=True)]
 
 
 def joint_rows(motion: ReportedMotion) -> list[JointRow]:

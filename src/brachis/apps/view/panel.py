@@ -274,6 +274,7 @@ class Controls:
         fastest = float(scene.samples.tool_speed.max())
         self._gui.add_html(tables.speed_legend(stops, fastest))
         self._state = self._gui.add_html("")
+        self._gui.add_html(tables.phases_table(trajectory))
         self._add_switches()
         self._charts = self._add_plots(candidates)
         self.update()
@@ -298,7 +299,8 @@ class Controls:
         t_end = self._playback.t_end
         step = float(10.0 ** np.floor(np.log10(t_end / 200)))
         self._digits = max(0, round(-np.log10(step)))
-        ends = ((0.0, "0"), (t_end, f"{t_end:.4g}"))
+        inner = [(float(t), "") for t in self._trajectory.phase_ends[:-1]]
+        ends = ((0.0, "0"), *inner, (t_end, f"{t_end:.4g}"))
         self._slider = self._gui.add_slider(
             "time (s)", 0.0, t_end, step, initial_value=0.0, marks=ends
         )

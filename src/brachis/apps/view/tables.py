@@ -6,9 +6,11 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from brachis.apps.plots.panels import curves_of, panels_of
 from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import PHASE_COLUMNS, Samples, Trajectory, phase_rows
 
 _MANY = 60
 """Candidates that are listed."""
@@ -30,10 +32,15 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
         Whether angles are in degrees.
     """
     place = ", ".join(f"{value:.4f}" for value in now.tool_position[0])
-    head = _paragraph(
+    lines = [
         f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
         f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
-    )
+    ]
+    phases = trajectory.phases
+    if len(phases) > 1:
+        number = int(np.searchsorted(trajectory.phase_ends[:-1], now.t[0], "right"))
+        lines.append(f"phase {number + 1} of {len(phases)}: {phases[number].kind}")
+    head = _paragraph(*lines)
     panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
     rows = []
     for name in trajectory.joint_names:
@@ -44,6 +51,12 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
         ]
         rows.append([name, *cells])
     return head + _table(("joint", "position", "velocity", "torque, force"), rows)
+
+
+def phases_table(trajectory: Trajectory) -> str:
+    """List the phases of the motion; empty if there is but one."""
+    rows = phase_rows(trajectory.phases)
+    return _table(PHASE_COLUMNS, rows) if len(rows) > 1 else ""
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:

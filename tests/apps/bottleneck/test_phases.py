@@ -1,0 +1,88 @@
+"""What holds a motion of several phases back: each phase by itself, and the multipliers of all of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import brachis
+from brachis.apps.bottleneck import limits_by_phase, saturations
+from brachis.apps.bottleneck.sensitivities import ActiveSet
+from support.effort import QUICK
+from support.gantry import gantry_motion
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def stopping() -> brachis.Result:
+    """A planned motion that waits at a corner."""
+    task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
+    task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
+    task["path"] = [
+        {"line": {"by": [0.2, 0.0]}, "dwell": 0.3},
+        {"line": {"by": [0.0, 0.2]}},
+    ]
+    task["redundant_joints"] = ["j1"]
+    result = brachis.plan(task, **QUICK)
+    assert result.verified
+    return result
+
+
+def test_limits_of_phases_add_up_to_those_of_the_motion(stopping):
+    trajectory = stopping.trajectory
+    found = saturations(trajectory)
+    phases = limits_by_phase(trajectory, found)
+    assert [each.phase.kind for each in phases] == ["move", "dwell", "move"]
+    assert phases[1].shares == ()
+    for entry in found:
+        times = [
+            dict(each.shares).get(entry.label, 0.0) * each.phase.duration
+            for each in phases
+        ]
+        expected = entry.share * trajectory.t_end
+        assert sum(times) == pytest.approx(expected, abs=1e-3 * trajectory.t_end)
+    assert sum(len(each.shares) for each in phases) > 1
+
+
+def test_costs_are_those_of_all_phases(stopping):
+    found = brachis.bottleneck.report(stopping, check=True)
+    assert found.sensitivities.reliable
+    assert found.check.larger()
+    assert found.check.worst_deviation() < 0.02
+    assert found.knots.saved > 0.0
+    assert found.knots.t_end > 0.3
+    assert "phase 2 dwell, s = 0.5, 0.3000 s" in str(found)
+    assert found.to_dict()["phases"][1]["limits"] == []
+
+
+def test_a_saved_motion_is_solved_again_by_phase(stopping):
+    again = brachis.bottleneck.report(stopping.trajectory, reference=True)
+    now = brachis.bottleneck.report(stopping)
+    for entry in now.sensitivities.limits:
+        other = again.sensitivities.of(entry.label.subject, entry.label.kind)
+        same = pytest.approx(entry.derivative, rel=0.01, abs=1e-5)
+        assert other.derivative == same
+    assert 0.5 * now.t_end < again.reference.t_end < now.t_end
+
+
+def test_phases_are_named_for_a_motion_that_was_not_planned():
+    motion = gantry_motion()
+    found = saturations(motion, threshold=0.29, ripple=0.2)
+    phases = limits_by_phase(motion, found)
+    (label, share) = phases[0].shares[0]
+    assert (label.subject, label.kind) == ("j2", "velocity")
+    assert 0.0 < share < 0.5
+    assert str(phases[1]) == "none"
+
+
+@pytest.mark.parametrize(("equalities", "dependent"), [(1, False), (0, True)])
+def test_an_equality_has_one_multiplier_of_either_sign(equalities, dependent):
+    slopes = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    rows = np.array([0, 1, 1])
+    signs = np.array([1.0, 1.0, -1.0])
+    found = ActiveSet(slopes, rows, signs, equalities)
+    assert found.dependent is dependent
