@@ -162,7 +162,11 @@ PATH = """
 A path is a list of segments. Each segment is a mapping with one kind (`line`, `arc`, `circle`, `helix`, `spline`,
 `bspline`, `csv` or `turn`) and, optionally, the keys of the table below. A segment starts at the end of the one
 before. The first one starts at `path_start`, at the tool's place in the start posture, or at its first waypoint. The
-path must be smooth up to its third derivative; a corner between two segments needs a `blend`.
+path must be smooth up to its third derivative; a corner between two segments needs a `blend` or a stop.
+
+With `stop: true` the tool stops at the end of a segment, with `dwell: 0.5` it also waits there for 0.5 s. All joints are
+at rest at a stop; the posture is free. The motions before and after it are planned together. Where the path ends, the
+motion ends at rest anyway (`boundary.end_speed: 0`).
 
 Points have all task coordinates: m, and rad for yaw. For poses (`pose`, `pose_free_roll`) these are x, y, z, and
 `orientation` says how the tool turns.
@@ -282,7 +286,8 @@ rounded or noisy are refused if the curvature of a curve through them is only no
 within the tolerance of all others (100,000 and more). Repeated points are left out and reported. Spikes and changes of
 unit are refused, with their line. If the distance between two points is more than five times the usual one, the path
 between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within `tolerance.corner`.
-The smaller this tolerance, the slower the robot passes them. A formula that the fit does not use measures the distance
+The smaller this tolerance, the slower the robot passes them. With `corner: stop` the tool stops at them instead, with or
+without a tolerance; corners are changes of direction of more than 12 degrees at one place. A formula that the fit does not use measures the distance
 of every point from the curve. `brachis inspect TASK` and `brachis plan` print the findings; they are also in
 `result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
 
@@ -305,7 +310,7 @@ compensation and rotary axes are refused.
 Feed rates are largest speeds of the tool, linear between the first and the last point that has one. They hold in
 addition to those of `tool_limits`.
 
-The file is read with the task and becomes one `spline`, or one `bspline` for each section between corners; a saved
+The file is read with the task and becomes one `spline` or `bspline`, or one for each section between corners; a saved
 task does not need it. For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments of a path, including
 the first point. Points may be positions, 4x4 matrices, SE3 objects, or positions with SciPy's rotations.
 """

@@ -280,7 +280,8 @@ def transcribe(
     robot, asked = _read(robot_or_task, task, keywords)
     problem = Problem.of(robot, asked, own_limits)
     joint_maps, family = first_maps(problem, decompositions_of(problem, families))
-    return program_of(problem, joint_maps, breaks_of(problem)), family
+    breaks = [breaks_of(problem)] * len(joint_maps)
+    return program_of(problem, joint_maps, breaks), family
 
 
 Outcome = Result | BrachisError

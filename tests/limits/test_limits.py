@@ -38,15 +38,10 @@ ROBOT = planar_robot(
         torque_speed=FALLING,
     ),
 )
-PARTS = [
-    {"speed": 0.3, "s": [0.1, 0.3]},
-    {"speed": 0.8, "s": [0.6, 0.9], "tolerance": "20 %"},
-]
 TOOL = ToolLimits(
     speed=SpeedTable(s=[0.0, 0.5, 0.5, 1.0], speed=[0.7, 1.0, 0.9, 1.1]),
     acceleration=2.0,
     angular_speed=1.5,
-    process_speed=PARTS,
 )
 TASK = SimpleNamespace(tool_limits=TOOL, custom_limits={})
 RNG = np.random.default_rng(3)
@@ -169,22 +164,6 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     )
     if limit.kind == "tool_acceleration":  # components of it
         found = np.linalg.norm(found, axis=1)[:, None]
-    elif (
-        "process_speed" in limit.kind
-    ):  # within the parts alone, from 1 at the tolerance
-        side = 1.0 if limit.kind == "process_speed" else -1.0
-        inside = np.array(
-            [
-                [True, False],
-                [True, False],
-                [False, False],
-                [False, True],
-                [False, False],
-            ]
-        )
-        tolerance = np.array([0.01, 0.2])
-        values = np.where(inside, (1.0 + values) / (1.0 + side * tolerance), 0.0)
-        found = np.where(inside & (side < 0.0), 2.0 - found, found)
     expected = values**2 if lines.u is None else values
     np.testing.assert_allclose(found, expected, atol=1e-9)
 

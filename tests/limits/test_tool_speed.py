@@ -12,6 +12,7 @@ import pytest
 import brachis
 from brachis.apps.plots import plot_timeline
 from brachis.errors import TaskError
+from brachis.limits.tool import SpeedTable
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
 
@@ -135,3 +136,21 @@ def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
     result = brachis.plan(task)
     assert result.verified
     assert speeds(result.trajectory).max() <= 0.4 * (1.0 + 1e-4)
+
+
+def test_steps_become_ramps_on_their_faster_side():
+    table = SpeedTable(
+        [0.0, 0.4, 0.4, 0.401, 0.401, 1.0], [1.0, 1.0, 3.0, 3.0, 2.0, 2.0]
+    )
+    s = np.linspace(0.0, 1.0, 100_001)
+    given = np.where(s <= 0.4, 1.0, np.where(s < 0.401, 3.0, 2.0))
+    found, slope = table.at(s)
+    assert np.all(found <= given + 1e-12)
+    assert np.mean(found < given - 1e-12) < 0.01
+    inside = np.abs(s[:, None] - table.places).min(axis=1) > 2e-5
+    np.testing.assert_allclose(
+        slope[inside], np.gradient(found, s)[inside], atol=1e-6 * np.abs(slope).max()
+    )
+    assert table.at(np.array([np.nan]))[0][0] == np.inf
+    flat = SpeedTable(np.linspace(0.0, 1.0, 10_001), np.full(10_001, 0.7))
+    assert len(flat.places) == 2

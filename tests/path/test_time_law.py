@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.errors import PathError
 from brachis.path import Leg, Path, TimeLaw, path_of, time_law_of
 from brachis.robot import TaskMap, bind, task_map_of
 from brachis.task import load_task
@@ -118,6 +119,29 @@ def test_derivatives_equal_differences_and_continue(case: Any) -> None:
     tiny = 1e-12 * law.duration
     jump = np.abs(law.at(knots + tiny) - law.at(knots - tiny)).max(axis=1)
     assert np.all(jump < 1e-6 * np.abs(now).max(axis=1))
+
+
+def turning_back(width: float) -> tuple[TaskMap, Path]:
+    """A spline that turns back within a few widths, m."""
+    through = [[0.1, 0.0, 0.0], [0.0, width, 0.0], [0.1, 2.0 * width, 0.0]]
+    return path_and_map([{"spline": {"through": through, "relative": True}}])
+
+
+def test_a_narrow_turn_is_passed_to_the_rounding_of_times() -> None:
+    task_map, path = turning_back(1e-4)
+    law = law_of(Leg(0.1, 0.9, speed=0.1), task_map, path)
+    s, rate, *_ = law.at(np.linspace(0.0, law.duration, 20_001))
+    off = np.abs(speeds(task_map, path, s, rate) / 0.1 - 1.0)
+    assert off.max() < 1e-7
+    assert np.quantile(off, 0.9) < 1e-9
+
+
+def test_a_cusp_has_no_constant_speed() -> None:
+    task_map, path = turning_back(0.0)
+    with pytest.raises(PathError, match="bends too abruptly") as caught:
+        time_law_of(Leg(0.1, 0.9, speed=0.1), task_map, path)
+    assert caught.value.s_interval is not None
+    assert min(abs(caught.value.s_interval[0] - at) for at in (0.264, 0.736)) < 1e-2
 
 
 def test_its_ends_are_exact(case: Any) -> None:

@@ -251,6 +251,18 @@ def test_limits_of_the_tool_in_mm_and_degrees(limits, remark):
     )  # written for "no limit"
 
 
+def test_a_dwell_in_ms():
+    line = {"line": {"by": [0.1, 0.0]}}
+
+    def with_dwell(dwell):
+        path = [{**line, "dwell": dwell}, line]
+        return of_task(brachis.load_task(task(path=path)))
+
+    (found,) = with_dwell(500.0)
+    assert str(found).startswith("path[0].dwell: the time looks like ms; found 500 s")
+    assert with_dwell(60.0) == ()
+
+
 def test_the_least_end_time():
     assert of_end_time(1e-4, 1e-4) != ()
     assert of_end_time(1e-3, 1e-4) == ()

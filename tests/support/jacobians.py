@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 SIZES = ("tool_speed", "tool_acceleration", "tool_angular_speed")
-PROCESS = ("process_speed", "least_process_speed")
 
 
 def dense(phase, x) -> np.ndarray:
@@ -30,9 +29,6 @@ def told(phase, limit, x) -> np.ndarray:
     near = np.abs(state.s[:, None] - limit.breaks).min(axis=1, initial=np.inf) > 1e-3
     if kind in SIZES:
         near &= limit.values(state)[:, 0] > 0.05
-    if kind in PROCESS:
-        (speed,) = (each for each in phase.limits if each.kind == "tool_speed")
-        near &= speed.values(state)[:, 0] > 0.05
     return (
         np.repeat(near, len(limit.lower))
         if not limit.guarantee.is_mean

@@ -17,7 +17,6 @@ TOOL_LIMITS = {
     "speed": {"s": [0.0, 0.5, 1.0], "speed": [2.0, 1.5, 1.8]},
     "acceleration": 5.0,
     "angular_speed": 2.0,
-    "process_speed": {"speed": 0.2, "s": [0.35, 0.65], "tolerance": 0.3},
 }
 CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
     "r0": ("RR", ["x", "z"], [0.4, 1.2], []),

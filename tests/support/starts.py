@@ -15,7 +15,7 @@ def starting_points(program: Program) -> Iterator[np.ndarray]:
     """Points x of a program of one phase along a path, the most natural first."""
     (phase,) = program.phases
     found = (
-        starting_point(program, [joint_path])
+        starting_point(program, [joint_path], [None])
         for joint_path in differential_ik_paths(phase.joint_map)
     )
     return (x for x in found if x is not None)

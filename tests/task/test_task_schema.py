@@ -151,6 +151,7 @@ def test_the_schema_tells_an_editor_what_keys_mean() -> None:
         ("path.1.arc.angle_deg", "deg"),
         ("robot.mounting.xyz.0", "m"),
         ("boundary.start_speed", "m/s"),
+        ("path.2.dwell", "s"),
         ("robot.gravity.2", "m/s^2"),
         ("search.time_limit", "s"),
         ("spline.intervals", ""),

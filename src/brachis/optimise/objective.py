@@ -10,8 +10,11 @@ import numpy as np
 from brachis.limits import Partials
 from brachis.optimise.phase import Phase
 
-_CALM = 1e-5
-"""Weight of the redundant joints' accelerations where the time is given, s; it decides only what nothing else does."""
+_CALM = 1e-6
+"""Weight of the redundant joints' accelerations where the time is given, s per (rad/s^2)^2 or (m/s^2)^2.
+
+It decides only what nothing else does.
+"""
 
 
 class Objective(Protocol):
@@ -39,9 +42,8 @@ class Objective(Protocol):
 class EndTime:
     """The end time t_E, s: the sum of the durations.
 
-    Where the duration of a phase is given, the mean square of the redundant joints' accelerations is added, per
-    duration squared, with a weight so small that no end time notices it. Many motions are as fast there, and solvers
-    need one that is best.
+    Where the duration of a phase is given, the mean square of the redundant joints' accelerations is added, with a
+    weight so small that no end time notices it. Many motions are as fast there, and solvers need one that is best.
     """
 
     longest: float = np.inf
@@ -51,8 +53,8 @@ class EndTime:
         duration = float(x[0]) + phase.pause
         if phase.time_law is None:
             return duration
-        bends = phase.state(x).yddot[:, 1:] * x[0] ** 2
-        return duration + _CALM * float(_shares(phase) @ (bends**2).sum(axis=1))
+        squares = phase.state(x).yddot[:, 1:] ** 2
+        return duration + _CALM * float(_shares(phase) @ squares.sum(axis=1))
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Gradient of the value, (v,)."""
@@ -60,9 +62,8 @@ class EndTime:
             unit = np.zeros(len(x))
             unit[0] = 1.0
             return unit
-        bends = phase.state(x).yddot * x[0] ** 4
-        bends[:, 0] = 0.0
-        slopes = 2.0 * _CALM * _shares(phase)[:, None] * bends
+        slopes = 2.0 * _CALM * _shares(phase)[:, None] * phase.state(x).yddot
+        slopes[:, 0] = 0.0
         zero = np.zeros_like(slopes)[:, None]
         gradient = phase.gradient_by_curves((zero, zero, slopes[:, None]), x)
         gradient[0] = 1.0  # the duration does not change

@@ -23,7 +23,7 @@ from brachis.problem.problem import Problem
 
 
 def program_of(
-    problem: Problem, joint_maps: Sequence[JointMap], breaks: np.ndarray
+    problem: Problem, joint_maps: Sequence[JointMap], breaks: Sequence[np.ndarray]
 ) -> Program:
     """Write the NLP of a decomposition down.
 
@@ -32,7 +32,7 @@ def program_of(
     problem : Problem
     joint_maps : sequence of JointMap
         One for each leg, beginning at, or near, the posture there.
-    breaks : (N + 1,) ndarray
+    breaks : sequence of (N + 1,) ndarray
         Ends of the knot intervals of every phase, in normalised time.
 
     Returns
@@ -40,10 +40,12 @@ def program_of(
     Program
     """
     spline = problem.task.spline
-    knots = clamped_knots(spline.degree, breaks)
-    t_norm = spread(breaks, spline.points_per_interval)
-    grid = FixedGrid(knots, spline.degree, t_norm)
-    return program_over(problem, joint_maps, [grid] * len(joint_maps))
+    grids = []
+    for own in breaks:
+        knots = clamped_knots(spline.degree, own)
+        t_norm = spread(own, spline.points_per_interval)
+        grids.append(FixedGrid(knots, spline.degree, t_norm))
+    return program_over(problem, joint_maps, grids)
 
 
 def program_over(

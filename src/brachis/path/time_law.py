@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 DEGREE = 5
 """Degree of the spline where the law is not linear."""
 _ACCURACY = 2e-10
-"""Largest relative deviation from the speed."""
+"""Largest relative deviation from the speed, but for the rounding of times."""
+_LEAST_ACCURACY = 1e-7
+"""The same with rounding, which counts where the path turns within micrometres."""
 _MOST_INTERVALS = 20_000
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -92,21 +94,25 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
         line = BSpline(np.array(times), np.array([leg.begin, leg.end]), 1)
         return TimeLaw(duration, line, ends)
     breaks = knots
-    while len(breaks) <= _MOST_INTERVALS:
+    while True:
         spline = _interpolate(tool, breaks, np.isin(breaks, knots), ends)
+        duration = float(spline.t[-1])
         deviation = _deviations(tool, spline)
-        is_off = deviation > _ACCURACY
+        rounding = 16.0 * np.finfo(float).eps * duration / np.diff(np.unique(spline.t))
+        is_off = deviation > np.minimum(_ACCURACY + rounding, _LEAST_ACCURACY)
         if not is_off.any():
-            return TimeLaw(float(spline.t[-1]), spline, ends)
+            return TimeLaw(duration, spline, ends)
         middles = 0.5 * (breaks[:-1] + breaks[1:])
+        if len(breaks) > _MOST_INTERVALS:
+            break
         breaks = np.sort(np.concatenate([breaks, middles[is_off]]))
-    worst = float(breaks[int(np.argmax(deviation))])
+    worst = float(middles[int(np.argmax(deviation))])
     raise PathError(
         "the path bends too abruptly for a constant speed of the tool",
         s_interval=(worst, worst),
         where="tool_limits.process_speed",
         found=f"a speed that is {deviation.max():.2g} off with {len(breaks) - 1} intervals, at s = {worst:.4g}",
-        allowed=f"{_ACCURACY:g} (relative)",
+        allowed=f"{_LEAST_ACCURACY:g} (relative)",
         hint="Make the path smoother there",
     )
 

@@ -50,6 +50,7 @@ USUAL = {
     ),
     "path_start": ("yaw looks like degrees", TURN, "rad", ""),
     "path": ("the turn of yaw looks like degrees", 2.0 * TURN, "rad", ""),
+    "path.dwell": ("the time looks like ms", 100.0, "s", ""),
     "link": ("the distance from the joint before looks like mm", 20.0, "m", ""),
     # Times the arm's length.
     "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
@@ -180,7 +181,7 @@ def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
 
 
 def _tool(task: Task) -> Iterator[Check]:
-    """Look at the largest of every kind of limit; feed rates have units of their own."""
+    """Look at the largest of every kind of limit, and at dwells; feed rates have units of their own."""
     limits = task.tool_limits
     speed = limits.speed
     values = {
@@ -196,6 +197,9 @@ def _tool(task: Task) -> Iterator[Check]:
     for key in ("start_speed", "end_speed"):
         value = _largest([getattr(task.boundary, key)])
         yield Check(f"boundary.{key}", message, value, 50.0, task.speed_unit)
+
+    for i, segment in enumerate(task.path):
+        yield _figure("path.dwell", segment.dwell, where=f"path[{i}].dwell")
 
 
 def _largest(values: Iterable[float | None]) -> float:

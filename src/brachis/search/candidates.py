@@ -54,13 +54,12 @@ from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.transcription import (
-    breaks_of,
     maps_by_leg,
     program_of,
     program_over,
 )
 from brachis.problem.problem import Problem
-from brachis.search.phase_plane import initial_guess
+from brachis.search.phase_plane import initial_breaks, initial_guess
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn."""
@@ -92,7 +91,7 @@ def solve_candidate(
     """
     problem = start.problem
     try:
-        target = program_of(problem, start.maps_by_leg(), breaks_of(problem))
+        target = program_of(problem, start.maps_by_leg(), initial_breaks(start))
     except UnreachableError as error:
         return Candidate.of(start, str(error))
     # With more variables a cold solve takes seconds: it is first solved over some of its knots.

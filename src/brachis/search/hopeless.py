@@ -12,6 +12,8 @@ friction a part near the path's end may be passed faster.
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,10 +39,10 @@ _EXACT = 0.97
 """Share of a speed below which it is impossible according to the phase plane, where that is exact."""
 _UNLIKELY = 0.5
 """Share of a speed below which no other joint path of a redundant robot makes up for what is missing."""
-_FIRST = 0.96
-"""Part of the largest speed in the phase plane that is tried first: splines fall a little short of it."""
-_HELD = 0.99
-"""Part of the largest speed in the phase plane that is said to be possible, so that rounded it is."""
+_REACHED = 0.92
+"""Part of the largest speed to which a leg leads in the phase plane: splines over the first mesh fall short of it."""
+_LEAST = 1e-4
+"""Share of a speed that is possible wherever the arm can hold its postures."""
 _S = np.linspace(0.0, 1.0, 101)
 """Path coordinates at which the arm is held at rest."""
 
@@ -286,17 +288,19 @@ class _SpeedCheck:
         assert rate is not None
         return self._planes[leg].active_limit(rate)
 
-    def lower_one(self, number: int) -> float | None:
-        """Largest share of one speed that is possible with the others as they are; None without any."""
+    def lower_one(self, number: int, least: float) -> float | None:
+        """Find the largest share of a speed, above `least`, that is possible beside the others; None without any."""
         shares = np.ones(len(self.speeds))
 
         def is_possible(share: float) -> bool:
             shares[number] = share
             return self.is_possible(shares)
 
-        for share in np.linspace(0.95, 0.05, 19).tolist():
+        # Too low a speed may be as impossible beside the others as too high a one.
+        tried = np.geomspace(1.0, least, 20).tolist()
+        for above, share in itertools.pairwise(tried):
             if is_possible(share):
-                return _largest_share(is_possible, share, share + 0.05)
+                return _largest_share(is_possible, share, above)
         return None
 
     def allows(self, share: float) -> bool:
@@ -308,19 +312,24 @@ def _largest_share(
     is_possible: Callable[[float], bool], low: float, high: float
 ) -> float:
     """Find the largest share between one that is possible and one that is not."""
-    while high - low > 1e-3:
+    while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_possible(middle) else (low, middle)
     return low
 
 
-def explain_speeds(starts: Sequence[InitialGuess]) -> Failure | None:
+def explain_speeds(
+    starts: Sequence[InitialGuess], *, are_tried: bool = False
+) -> Failure | None:
     """Tell which speeds of the task are out of reach along the joint paths of all guesses; None if they may not be.
 
     Parameters
     ----------
     starts : sequence of InitialGuess
         At least one.
+    are_tried : bool, optional
+        Whether plans from these failed, so that too high a speed is the most likely reason; otherwise it has to be far
+        out of reach.
     """
     problem = starts[0].problem
     speeds = speeds_of(problem)
@@ -330,7 +339,7 @@ def explain_speeds(starts: Sequence[InitialGuess]) -> Failure | None:
     driven = np.isfinite(problem.robot.limits.torque_upper)
     has_friction = bool((_has_friction(problem) & driven).any())
     best = None
-    share = 0.0
+    share = _LEAST
     for start in starts:
         q = postures_along(start, s)
         if q is None:
@@ -339,7 +348,8 @@ def explain_speeds(starts: Sequence[InitialGuess]) -> Failure | None:
         # The phase plane is exact without other joint paths, and without friction that helps to brake.
         is_exact = not check.is_redundant and not has_friction
         enough = _EXACT if is_exact else _UNLIKELY
-        if not check.allows(0.0) or check.allows(enough):
+        enough = 1.0 if are_tried else enough
+        if not check.allows(_LEAST) or check.allows(enough):
             return None
         if best is None or check.allows(share):
             share = _largest_share(check.allows, share, enough)
@@ -358,9 +368,9 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
     why = f"for the {label} limit at s = {place:.3g}"
     if shares[number] > share + 0.01:
         # A leg is too short. One speed alone may be to blame.
-        alone = ((number, check.lower_one(number)) for number in numbers)
-        shares = {number: own for number, own in alone if own is not None}
-        shares = shares or dict.fromkeys(numbers, share)
+        alone = ((each, check.lower_one(each, 0.9 * share)) for each in numbers)
+        shares = {each: _REACHED * own for each, own in alone if own is not None}
+        shares = shares or dict.fromkeys(numbers, _REACHED * share)
         leg = next(leg for leg in check.free_legs if check.pass_leg(leg, every) is None)
         ends = [check.speed_at(leg, side) for side in (0, -1)]
         number = max(shares, key=lambda number: (number in ends, shares[number]))
@@ -372,18 +382,27 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
             f"for the {check.limit_on(leg, share * every)} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
             f"is too short to get from {first} to {last}"
         )
+    possible = {
+        each: _round_down(own * check.speeds[each].figure)
+        for each, own in shares.items()
+        if own < 1.0
+    }
     speed = check.speeds[number]
-    most = f"{_HELD * shares[number] * speed.figure:.3g} {speed.unit}"
     along = " along the best joint path that was found" if check.is_redundant else ""
     return Failure(
         f"the {speed.name} is too high {why}",
         where=speed.key,
         found=str(speed),
-        needed=f"no more than {most}{along} (estimate)",
+        needed=f"no more than {possible[number]:g} {speed.unit}{along} (estimate)",
         hint="Raise the limits that hold the motion back",
         remedies=[
-            Remedy(speed.key, speed.figure, _FIRST * own * speed.figure, speed.unit)
-            for speed, own in ((check.speeds[i], own) for i, own in shares.items())
-            if own < 1.0
+            Remedy(each.key, each.figure, most, each.unit)
+            for each, most in ((check.speeds[i], most) for i, most in possible.items())
         ],
     )
+
+
+def _round_down(value: float) -> float:
+    """Round a positive number down to three digits."""
+    digits = 2 - math.floor(math.log10(value))
+    return math.floor(value * (1.0 + 1e-9) * 10.0**digits) / 10.0**digits

@@ -30,6 +30,7 @@ from brachis.limits import HasPhasePlaneRows, Limit
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
 from brachis.optimise.program import Program
+from brachis.optimise.transcription import breaks_of
 from brachis.path.legs import Leg
 from brachis.path.time_law import TimeLaw
 from brachis.problem.problem import Problem
@@ -337,6 +338,59 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     return None
 
 
+def initial_breaks(start: InitialGuess) -> list[np.ndarray]:
+    """Choose the ends of the knot intervals of every phase, (N + 1,), in normalised time.
+
+    They are even. Only where the speed is given, and redundant joints go on from other phases in motion, intervals
+    begin as short as those next to them, and grow towards the middle.
+    """
+    problem = start.problem
+    even = breaks_of(problem)
+    breaks = [even] * len(problem.legs)
+    if not start.joint_map.r or not any(problem.time_laws):
+        return breaks
+    s = spread_stations(problem)
+    q = postures_along(start, s)
+    found = [] if q is None else fastest_times(problem, s, q)
+    times = [np.inf if part is None else float(part[1][-1]) for part in found]
+    for number, law in enumerate(problem.time_laws if found else ()):
+        if law is None:
+            continue
+        beside = [np.inf, *times, np.inf][number : number + 3 : 2]
+        first, last = (0.5 * even[1] * time / law.duration for time in beside)
+        breaks[number] = grade_breaks(2 * (len(even) // 2), first, last)
+    return breaks
+
+
+def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
+    """Ends, (count + 1,), of intervals over [0, 1] that grow by the same factor from either end to the middle.
+
+    Parameters
+    ----------
+    count : int
+        Even.
+    first, last : float
+        Lengths of the first and the last interval; if they are too long the intervals are even.
+    """
+    half = count // 2
+    sides = []
+    for length in (first, last):
+        ratio = min(length * count, 1.0)
+        # Intervals e^(g k) long: g such that the first one has its share of the half.
+        growth = 0.0
+        if ratio < 1.0:
+            low = 0.0
+            high = 20.0
+            for _ in range(60):
+                growth = 0.5 * (low + high)
+                share = half * np.expm1(growth) / np.expm1(growth * half)
+                low, high = (growth, high) if share > ratio else (low, growth)
+        k = np.arange(half + 1.0)
+        sides.append(np.expm1(growth * k) / np.expm1(growth * half) if growth else k / half)
+    before, behind = sides
+    return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
+
+
 def _given_guess(start: InitialGuess, leg: int) -> _Part | None:
     """Curves, (S, c), at even times, and the duration, s, on a leg whose speed is given; else None."""
     law = start.problem.time_laws[leg]
@@ -359,10 +413,12 @@ def _moving_ends_guess(start: InitialGuess, leg: int) -> _Part | None:
     times = None if q is None else PhasePlane(problem.limits, s, q).times((first, last))
     if times is None or not np.isfinite(times[-1]):
         return None
-    rate = np.sqrt(first**2 + (last**2 - first**2) * (s - begin) / (end - begin))
+    part = (s - begin) / (end - begin)
+    rate = np.sqrt(first**2 * (1.0 - part) + last**2 * part)
     with np.errstate(invalid="ignore"):  # 0 / 0 for a motion that starts from rest
         even = np.nan_to_num(2.0 * (s - begin) / (first + rate))
-    times = 0.5 * (times + even)
+    # To and from a slow speed a constant acceleration would take very long.
+    times = 0.5 * (times + np.minimum(even, 2.0 * times))
     t = np.linspace(0.0, times[-1], 8 * _STATIONS)
     return _curves_along(start, np.interp(t, times, s)), float(times[-1])
 

@@ -37,7 +37,7 @@ from brachis.search.failure import (
     explain_time_limit,
 )
 from brachis.search.given_motion import GIVEN, given_guess
-from brachis.search.hopeless import explain_holding
+from brachis.search.hopeless import explain_holding, explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.search.schedule import Batch, batches
@@ -242,6 +242,8 @@ class Search:
         """Tell why no motion was found."""
         starts = [each.start for each in self.candidates if each.start is not None]
         failure = explain_holding(starts)
+        if failure is None and starts:
+            failure = explain_speeds(starts, are_tried=True)
         if failure is None and (self.interrupted or self._is_cut_short()):
             self.interrupted = True
             failure = explain_time_limit(self._problem.task, self.not_completed())

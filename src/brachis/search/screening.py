@@ -100,7 +100,7 @@ def _solve_quickly(
     session = SolverSession(backend, options, deadline, acceptable=1e-2)
     try:
         maps = start.maps_by_leg()
-        program = program_of(problem, maps, np.linspace(0.0, 1.0, 13))
+        program = program_of(problem, maps, [np.linspace(0.0, 1.0, 13)] * len(maps))
         x = initial_guess(program, start)
         if x is None:
             return hopeless
@@ -110,9 +110,7 @@ def _solve_quickly(
         motions = solved.program.motions(solved.report.x)
         chart = solved.program.phases[0].joint_map
         assert isinstance(chart, ChartMap)
-        even = [
-            motion.at(np.linspace(0.0, motion.t_end, 97))[0] for motion in motions
-        ]
+        even = [motion.at(np.linspace(0.0, motion.t_end, 97))[0] for motion in motions]
         return dataclasses.replace(
             start,
             joint_map=chart.along(problem.path, chart.start),

@@ -32,6 +32,7 @@ _UNITS = {
     "start.joints": "rad (m)",
     "end.joints": "rad (m)",
     "path_start.position": "m",
+    "path.dwell": "s",
     "path_start.rotation_vector": "rad",
     "to.rotation_vector": "rad",
     "line.to": "m",

@@ -1,0 +1,122 @@
+"""A given speed of the tool over parts of the path: known optima of a gantry, with the speed met exactly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import InputError
+from support.effort import QUICK
+
+ROOT = Path(__file__).parents[1]
+SPEED, BEGIN, END, LENGTH = 1.0, 0.25, 0.75, 1.2
+ACCELERATION = 200.0 / 25.0
+"""Of the gantry's bridge and tool."""
+
+
+def task(part=None, boundary=None, **spline):
+    return {
+        "brachis": 1,
+        "robot": {
+            "urdf": str(ROOT / "robots/gantry2/robot.urdf"),
+            "limits": {"velocity": None},
+        },
+        "start": {"joints": [-0.6, 0.0]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"by": [LENGTH, 0.0]}}],
+        "tool_limits": {"process_speed": part or []},
+        "boundary": boundary or {},
+        "spline": {"intervals": 20, "rest": "velocity", **spline},
+        "search": QUICK,
+    }
+
+
+PART = {"speed": SPEED, "s": [BEGIN, END]}
+
+
+def leg(way: float, speed: float) -> float:
+    """Least time between rest and a speed over a way, by full force either way."""
+    top = np.sqrt(ACCELERATION * way + 0.5 * speed**2)
+    return float((2.0 * top - speed) / ACCELERATION)
+
+
+def fastest(speed: float) -> float:
+    """Least time with the speed on the part in the middle."""
+    ways = leg(BEGIN * LENGTH, speed) + leg((1.0 - END) * LENGTH, speed)
+    return ways + (END - BEGIN) * LENGTH / speed
+
+
+def sampled(trajectory):
+    """s and the tool's speed by differences, at 20,000 times."""
+    t = np.linspace(0.0, trajectory.t_end, 20_001)
+    motion = trajectory.at(t)
+    positions, _ = trajectory.robot.tool_placements(motion.q)
+    return motion.s, np.linalg.norm(np.gradient(positions, t, axis=0), axis=1)
+
+
+def test_the_speed_is_met_and_reached_and_left_fast():
+    free = brachis.plan(task())
+    s, speed = sampled(free.trajectory)
+    assert speed[(s > BEGIN) & (s < END)].min() > 2.0 * SPEED, (
+        "without it the tool is much faster"
+    )
+    result = brachis.plan(task(PART))
+    assert result.verified
+    assert result.t_end > 1.2 * free.t_end
+    s, speed = sampled(result.trajectory)
+    inside = (s > BEGIN + 1e-3) & (s < END - 1e-3)
+    np.testing.assert_allclose(speed[inside], SPEED, rtol=1e-8)
+    assert speed[s < 0.9 * BEGIN].max() > 1.4 * SPEED, (
+        "on the way to it the tool is as fast as it can"
+    )
+    assert fastest(SPEED) <= result.t_end < 1.05 * fastest(SPEED)
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.3, 0.1])
+def test_with_enough_knots_it_is_the_optimum(speed):
+    part = {**PART, "speed": speed}
+    result = brachis.plan(task(part, intervals="auto", tolerance=5e-4))
+    assert result.verified
+    assert result.t_end == pytest.approx(fastest(speed), rel=1e-3)
+
+
+def test_a_part_may_begin_and_end_with_a_path_that_is_passed_at_its_speed():
+    whole = {"speed": 0.3, "s": [0.0, 1.0]}
+    for given, key, found in (
+        ({}, "s[0]", "0 m/s"),
+        ({"start_speed": 0.3}, "s[1]", "0 m/s"),
+        ({"start_speed": 0.3, "end_speed": 0.301}, "s[1]", "0.301 m/s"),
+    ):
+        with pytest.raises(InputError) as caught:
+            brachis.plan(task(whole, given))
+        assert f"tool_limits.process_speed[0].{key}" in str(caught.value)
+        assert found in str(caught.value)
+    result = brachis.plan(task(whole, {"start_speed": 0.3, "end_speed": 0.3}))
+    assert result.verified
+    assert result.t_end == pytest.approx(LENGTH / 0.3, rel=1e-9)
+    begun = task({"speed": 0.3, "s": [0.0, 0.5]}, {"start_speed": 0.3})
+    result = brachis.plan(begun)
+    assert result.verified
+    least = 0.5 * LENGTH / 0.3 + leg(0.5 * LENGTH, 0.3)
+    assert result.t_end == pytest.approx(least, rel=0.02)
+
+
+def test_a_part_soon_after_the_start():
+    result = brachis.plan(task({"speed": 0.3, "s": [0.02, 0.5]}))
+    assert result.verified
+    ways = leg(0.02 * LENGTH, 0.3) + leg(0.5 * LENGTH, 0.3)
+    assert result.t_end == pytest.approx(ways + 0.48 * LENGTH / 0.3, rel=0.02)
+
+
+def test_two_parts():
+    parts = [{"speed": 0.5, "s": [0.2, 0.35]}, {"speed": 0.8, "s": [0.6, 0.8]}]
+    result = brachis.plan(task(parts))
+    assert result.verified
+    s, speed = sampled(result.trajectory)
+    for part in parts:
+        begin, end = part["s"]
+        inside = (s > begin + 1e-3) & (s < end - 1e-3)
+        np.testing.assert_allclose(speed[inside], part["speed"], rtol=1e-8)
