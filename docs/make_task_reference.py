@@ -164,9 +164,9 @@ A path is a list of segments. Each segment is a mapping with one kind (`line`, `
 before. The first one starts at `path_start`, at the tool's place in the start posture, or at its first waypoint. The
 path must be smooth up to its third derivative; a corner between two segments needs a `blend` or a stop.
 
-With `stop: true` the tool stops at the end of a segment, with `dwell: 0.5` it also waits there for 0.5 s. All joints are
-at rest at a stop; the posture is free. The motions before and after it are planned together. Where the path ends, the
-motion ends at rest anyway (`boundary.end_speed: 0`).
+With `stop: true` the tool stops at the end of a segment, with `dwell: 0.5` it also waits there for 0.5 s. All joints
+are at rest at a stop; the posture is free. The motions before and after it are planned together. Where the path ends,
+the motion ends at rest anyway (`boundary.end_speed: 0`).
 
 Points have all task coordinates: m, and rad for yaw. For poses (`pose`, `pose_free_roll`) these are x, y, z, and
 `orientation` says how the tool turns.
@@ -286,10 +286,10 @@ rounded or noisy are refused if the curvature of a curve through them is only no
 within the tolerance of all others (100,000 and more). Repeated points are left out and reported. Spikes and changes of
 unit are refused, with their line. If the distance between two points is more than five times the usual one, the path
 between them is straight, as CAM systems mean it. Corners are listed, and rounded by blends within `tolerance.corner`.
-The smaller this tolerance, the slower the robot passes them. With `corner: stop` the tool stops at them instead, with or
-without a tolerance; corners are changes of direction of more than 12 degrees at one place. A formula that the fit does not use measures the distance
-of every point from the curve. `brachis inspect TASK` and `brachis plan` print the findings; they are also in
-`result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
+The smaller this tolerance, the slower the robot passes them. With `corner: stop` the tool stops at them instead, with
+or without a tolerance; corners are changes of direction of more than 12 degrees at one place. A formula that the fit
+does not use measures the distance of every point from the curve. `brachis inspect TASK` and `brachis plan` print the
+findings; they are also in `result.fits` and the JSON. `brachis plot --kind fit` draws the errors.
 
 ```yaml
 start: free

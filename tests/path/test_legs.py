@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -125,6 +126,29 @@ def test_the_whole_position_must_be_prescribed() -> None:
             space=["x"],
             robot=planar_robot("RRR", "xz"),
         )
+
+
+def test_the_speed_at_the_start_of_a_path_of_joints_is_advised() -> None:
+    """It is the norm of joint velocities there, and the advice has digits enough to be taken."""
+    joints = {"joints": [0.0, 0.5, 0.0, -1.0, 0.0, 0.5, 0.0]}
+    through = [[0.3, 0.7, 0.1, -1.2, 0.2, 0.7, 0.1], [0.6, 0.6, 0.3, -1.0, 0.4, 0.5, 0]]
+    task = {
+        "brachis": 1,
+        "start": joints,
+        "task_space": "joints",
+        "path": [{"spline": {"through": through}}],
+        "tool_limits": {"process_speed": part(0.1, 0.0, 0.5)},
+    }
+    robot = brachis.robots.iiwa14
+    with pytest.raises(PathError) as caught:
+        Problem.of(robot, load_task(task))
+    advice = re.search(r"boundary.start_speed to (\S+),", str(caught.value))
+    assert advice
+    boundary = {"start_speed": float(advice[1])}
+    given = Problem.of(robot, load_task({**task, "boundary": boundary}))
+    first = given.path.sample([0.0]).xi[0]
+    rate = float(advice[1]) / np.linalg.norm(first)
+    assert given.leg_rates[0][0] == pytest.approx(rate, rel=1e-6)
 
 
 CIRCLE = {"circle": {"center": [0.5, 0.0, 0.5], "normal": [0, 0, 1]}}

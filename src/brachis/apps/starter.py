@@ -225,7 +225,7 @@ task_space: {space}    # what the path prescribes; {degree}
 
 path:    # segments from the start posture's tool on, in the world frame
   - line: {{by: {by}}}    # m
-  # A second segment needs a rounded corner: put "blend: 0.01" (m) below the line before it.
+  # For a second segment put "blend: 0.01" (m, to round the corner) or "stop: true" below the line before it.
   # Others: arc, circle, spline, csv, ...: docs/task_files.md
 
 redundant_joints: auto    # or a list of joints; brachis inspect shows which have a closed form

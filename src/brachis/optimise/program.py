@@ -186,7 +186,9 @@ class Program(Summary):
         ]
         count = heights[len(self.phases)]
         every = np.arange(first[-1])
-        patterns.append((np.repeat(np.arange(count), first[-1]), np.tile(every, count)))
+        patterns.append(
+            (np.repeat(np.arange(count), first[-1]), np.tile(every, count))
+        )
         patterns += [link.pattern(self.phases, first) for link in self.links]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
         pairs = zip(patterns, self._first_rows, strict=True)

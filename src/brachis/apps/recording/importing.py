@@ -1,7 +1,7 @@
 """From a file of joint positions over time to a trajectory like those that are planned.
 
 The path that a motion follows is found by forward kinematics: dense samples, and a smooth curve within a tolerance. The
-path coordinate over time is a B-spline that does not decrease.
+path coordinate over time is a B-spline that does not decrease. Where the motion waits, the path stops and may turn off.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import os
 import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 from brachis import ik
 from brachis.apps.recording.nodes import Nodes, nodes_of
 from brachis.apps.recording.recording import Recording, check_units, read_recording
+from brachis.apps.recording.rests import find_rests, split_at_rests, with_rests
 from brachis.common.arguments import check_keywords, file_name, numbers
 from brachis.common.arrays import with_like_signs
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
@@ -37,7 +39,7 @@ from brachis.task import (
 )
 from brachis.task.fitted import segments_along
 from brachis.task.points.points import Points
-from brachis.trajectory import Recovered, Trajectory
+from brachis.trajectory import PhaseSpline, Recovered, Trajectory, join_splines
 from brachis.trajectory.recovered import LARGEST, check_tolerance
 
 _SURE = 3.0
@@ -132,6 +134,8 @@ def import_motion(
     rolling = ((0, 0), (0, bound.n - given_robot.n))  # the virtual joint stands still
     q, qdot, qddot = (np.pad(x, rolling) for x in (nodes.q, nodes.qdot, nodes.qddot))
     nodes = Nodes(nodes.t, q, qdot, qddot, nodes.notes)
+    rests = find_rests(nodes)
+    nodes = with_rests(nodes, rests)
     if tolerance is None:
         slopes = np.abs(task_map.jacobian(task_map.twists(nodes.q)))
         moved = slopes[:, :, : len(deviation)] @ deviation
@@ -152,9 +156,19 @@ def import_motion(
         np.column_stack([recording.t, np.pad(recording.q, rolling)]),
         np.pad(error, rolling[1]),
     )
-    knots, control_points = fit_coordinate(
-        followed.t, followed.s, at_rest=nodes.at_rest[0]
-    )
+    at_rest = nodes.at_rest[0]
+    splines = [
+        fit_coordinate(
+            t, s, at_rest=(at_rest and s[0] == 0.0, at_rest and s[-1] == 1.0)
+        )
+        for t, s in followed.parts
+    ]
+    for number, (first, end) in enumerate(rests):
+        splines.insert(
+            2 * number + 1, _wait(nodes.t[[first, end]], splines[2 * number])
+        )
+    knots, control_points = join_splines(splines)
+    ends = [number for rest in rests for number in rest]
     return Trajectory(
         task=_task_of(settings, bound, task_map, nodes, followed.segments, space),
         urdf=bound.urdf,
@@ -168,8 +182,8 @@ def import_motion(
         qddot_before=nodes.qddot,
         knots=knots,
         degree=DEGREE,
-        control_points=control_points[None],
-        phase_ends=nodes.t[-1:],
+        control_points=control_points,
+        phase_ends=nodes.t[[*ends, -1]],
         chart_rows=np.empty((0, 0, 0)),
         chart_knots=np.empty(0),
         recovered=recovered,
@@ -198,26 +212,71 @@ class RecoveredPath:
     ----------
     segments : tuple of Segment
         For a task.
-    t, s : (K,) ndarray
-        Dense times, s, and path coordinates.
+    parts : tuple of ((K,) ndarray, (K,) ndarray)
+        Dense times, s, and path coordinates between the waits.
     miss : float
         Largest distance of the motion's tool from the path, m or rad.
     """
 
     segments: tuple[Segment, ...]
-    t: np.ndarray
-    s: np.ndarray
+    parts: tuple[tuple[np.ndarray, np.ndarray], ...]
     miss: float
 
 
 def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> RecoveredPath:
-    """Recover the path that a motion prescribes in a task space, within a tolerance, m and rad.
+    """Recover the path that a motion prescribes in a task space, within a tolerance, m and rad; it stops at waits.
 
     Raises
     ------
     PathError
-        The tool does not move, or follows no smooth path within the tolerance: it stops and turns off, for example.
+        The tool does not move, or follows no smooth path within the tolerance: it turns off without a wait, for
+        example.
     """
+    rests = find_rests(nodes)
+    parts = [
+        _follow(task_map, part, tolerance) for part in split_at_rests(nodes, rests)
+    ]
+    segments = list(parts[0].segments)
+    for (first, end), part in zip(rests, parts[1:], strict=True):
+        dwell = float(nodes.t[end] - nodes.t[first])
+        waits = segments[-1].model_copy(update={"stop": True, "dwell": dwell})
+        segments = [*segments[:-1], waits, *part.segments]
+    path = build_path(segments, parts[0].values[0], task_map.rows)
+    places = [0.0, *path.stops.tolist(), 1.0]
+    found = []
+    misses = []
+    for part, ends in zip(parts, pairwise(places), strict=True):
+        own = path.between(*ends)
+        s = _nearest(task_map, own, part.values, part.share, ends)
+        miss = task_map.difference(part.values, own.sample(s).target)
+        misses.append(np.max(task_map.norms(miss)))
+        found.append((part.t, s))
+    return RecoveredPath(tuple(segments), tuple(found), float(max(misses)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Followed:
+    """A part of a path between waits.
+
+    Attributes
+    ----------
+    segments : tuple of Segment
+    t : (K,) ndarray
+        Dense times, s.
+    values : (K, c) ndarray
+        Task coordinates.
+    share : (K,) ndarray
+        Way from the part's beginning, of all of its way.
+    """
+
+    segments: tuple[Segment, ...]
+    t: np.ndarray
+    values: np.ndarray
+    share: np.ndarray
+
+
+def _follow(task_map: TaskMap, nodes: Nodes, tolerance: float) -> _Followed:
+    """Fit segments to a part of a motion; see `recover_path`."""
     from scipy.interpolate import BPoly
 
     parts = np.arange(4) / 4
@@ -256,13 +315,10 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
             found=str(error),
             allowed=f"{tolerance:g} m and rad",
             where="path",
-            hint="If the tool stops and changes its direction, split the file there. If the positions are measured, "
-            "set their noise, or raise the tolerance",
+            hint="If the tool stops for less than five rows and changes its direction, split the file there. If the "
+            "positions are measured, set their noise, or raise the tolerance",
         ) from error
-    path = build_path(segments, values[0], task_map.rows)
-    s = _nearest(task_map, path, values, length / length[-1])
-    miss = np.max(task_map.norms(task_map.difference(values, path.sample(s).target)))
-    return RecoveredPath(tuple(segments), t, s, float(miss))
+    return _Followed(tuple(segments), t, values, length / length[-1])
 
 
 def _tool_speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
@@ -296,17 +352,22 @@ def _points(task_map: TaskMap, values: np.ndarray, rows: np.ndarray) -> Points:
 
 
 def _nearest(
-    task_map: TaskMap, path: Path, values: np.ndarray, s: np.ndarray
+    task_map: TaskMap,
+    path: Path,
+    values: np.ndarray,
+    share: np.ndarray,
+    ends: tuple[float, float],
 ) -> np.ndarray:
-    """Return the path coordinates nearest to task coordinates, (K, c), from first guesses on; ascending."""
-    s = s.copy()
+    """Return the path coordinates nearest to task coordinates, (K, c), between two ends, from shares on; ascending."""
+    begin, end = ends
+    s = begin + (end - begin) * share
     for _ in range(4):
         sample = path.sample(s)
         miss = task_map.difference(values, sample.target)
         s += np.sum(miss * sample.xi, axis=1) / np.sum(sample.xi**2, axis=1)
-        np.clip(s, 0.0, 1.0, out=s)
-    s[0] = 0.0
-    s[-1] = 1.0
+        np.clip(s, begin, end, out=s)
+    s[0] = begin
+    s[-1] = end
     return np.asarray(np.maximum.accumulate(s))
 
 
@@ -315,28 +376,41 @@ DEGREE = 3
 
 
 def fit_coordinate(
-    t: np.ndarray, s: np.ndarray, *, at_rest: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return knots over [0, 1] and control points of s over normalised time.
+    t: np.ndarray, s: np.ndarray, *, at_rest: tuple[bool, bool]
+) -> PhaseSpline:
+    """Return s over time as the spline of a phase.
 
     The knots lie where s bends. The control points do not decrease, and so the spline does not either.
 
     Parameters
     ----------
     t, s : (K,) ndarray
-        Ascending; s from 0 to 1.
-    at_rest : bool
-        Whether ds/dt vanishes at both ends.
+        Ascending.
+    at_rest : (bool, bool)
+        Whether ds/dt vanishes at the beginning, and at the end; at waits, which begin between rows, it nearly does.
     """
     from scipy.interpolate import splrep
 
-    rms = 2e-8  # of what the spline may differ from s
-    knots, control_points, _ = splrep(t / t[-1], s, k=DEGREE, s=len(s) * rms**2)
-    control_points = control_points[: len(knots) - DEGREE - 1].clip(0.0, 1.0)
-    equal = 2 if at_rest else 1
-    control_points[:equal] = 0.0
-    control_points[-equal:] = 1.0
-    return knots, np.maximum.accumulate(control_points)
+    duration = t[-1] - t[0]
+    t_norm = (t - t[0]) / duration
+    first, last = (2 if rests else 1 for rests in at_rest)
+    for rms in (2e-8, 1e-9, 2e-10):  # of what the spline may differ from s
+        knots, points, _ = splrep(t_norm, s, k=DEGREE, s=len(s) * rms**2)
+        points = points[: len(knots) - DEGREE - 1].clip(s[0], s[-1])
+        points[:first] = s[0]
+        points[-last:] = s[-1]
+        points = np.maximum.accumulate(points)[None]
+        spline = PhaseSpline(duration, knots, DEGREE, points)
+        if np.abs(spline.at(t - t[0])[0][:, 0] - s).max() <= 2e-7:
+            break
+    return spline
+
+
+def _wait(times: np.ndarray, before: PhaseSpline) -> PhaseSpline:
+    """Return the spline of a wait between two times, (2,), s, where a phase ends."""
+    knots = np.repeat([0.0, 1.0], DEGREE + 1)
+    points = np.full((1, DEGREE + 1), before.control_points[0, -1])
+    return PhaseSpline(times[1] - times[0], knots, DEGREE, points)
 
 
 def _is_task(given: object) -> bool:

@@ -53,6 +53,11 @@ class Nodes:
     notes: tuple[str, ...] = ()
 
     @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """Times, positions, velocities and accelerations."""
+        return self.t, self.q, self.qdot, self.qddot
+
+    @property
     def at_rest(self) -> tuple[bool, bool]:
         """Whether both ends are at rest, and whether their accelerations vanish too."""
         ends = [0, -1]

@@ -1,0 +1,107 @@
+"""Stops and dwells, planned: known optima of a gantry; a tool that turns on the spot; corners of a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from support.effort import QUICK
+
+ROOT = Path(__file__).parents[1]
+ACCELERATION = 200.0 / 25.0
+"""Of the gantry's bridge and tool, m/s^2."""
+DWELL = 0.5
+
+
+def right(way, **keys):
+    return {"line": {"by": [way, 0.0]}, **keys}
+
+
+def task(path, **keys):
+    return {
+        "brachis": 1,
+        "robot": {
+            "urdf": str(ROOT / "robots/gantry2/robot.urdf"),
+            "limits": {"velocity": None},
+        },
+        "start": {"joints": [-0.6, 0.0]},
+        "task_space": ["x", "y"],
+        "path": path,
+        "spline": {"intervals": 20, "rest": "velocity"},
+        "search": QUICK,
+        **keys,
+    }
+
+
+def from_rest(way: float) -> float:
+    """Least time from rest to rest over a way in x, by full force either way."""
+    return float(2.0 * np.sqrt(way / ACCELERATION))
+
+
+def test_legs_between_stops_take_the_least_time():
+    path = [right(0.5, stop=True), right(0.2, dwell=DWELL), right(0.5)]
+    result = brachis.plan(task(path))
+    assert result.verified
+    ways = [from_rest(0.5), from_rest(0.2), DWELL, from_rest(0.5)]
+    np.testing.assert_allclose(
+        np.diff(result.trajectory.phase_ends, prepend=0.0), ways, rtol=2e-3
+    )
+    states = result.trajectory.at(result.trajectory.phase_ends)
+    np.testing.assert_allclose(states.s, [5 / 12, 7 / 12, 7 / 12, 1.0], atol=1e-12)
+    assert np.abs(states.qdot).max() < 1e-9
+    at_once = brachis.plan(task([right(1.2)]))
+    assert at_once.t_end < 0.7 * (result.t_end - DWELL)
+
+
+def test_the_tool_passes_a_corner_exactly():
+    up = {"line": {"by": [0.0, 0.3]}}
+    result = brachis.plan(task([right(0.5, stop=True), up]))
+    assert result.verified
+    trajectory = result.trajectory
+    t = np.linspace(0.0, trajectory.t_end, 4001)
+    positions, _ = trajectory.robot.tool_placements(trajectory.at(t).q)
+    x, y = (positions - positions[0])[:, :2].T
+    assert np.minimum(np.abs(x - 0.5), np.abs(y)).max() < 1e-9
+    assert x.max() == pytest.approx(0.5, abs=1e-9)
+
+
+def test_a_periodic_motion_may_stop():
+    """It starts in motion: half of the side before the first stop is left for the end."""
+    up = {"line": {"by": [0.0, 0.2]}, "stop": True}
+    down = {"line": {"by": [0.0, -0.2]}, "stop": True}
+    path = [right(0.2, stop=True), up, right(-0.4, stop=True), down, right(0.2)]
+    result = brachis.plan(task(path, boundary={"periodic": True}))
+    assert result.verified
+    first, *_, last = np.diff(result.trajectory.phase_ends, prepend=0.0)
+    assert first + last == pytest.approx(from_rest(0.4), rel=2e-3)
+
+
+def test_a_file_with_corners(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    first = np.linspace([0.0, 0.0], [500.0, 0.0], 41)
+    rows = np.concatenate([first, first[-1] + np.linspace([0, 5], [0, 300], 30)])
+    np.savetxt("seam.csv", rows, header="x_mm,y_mm", delimiter=",", comments="")
+    csv = {"file": "seam.csv", "corner": "stop", "relative": True}
+    result = brachis.plan(task([{"csv": csv}]))
+    assert result.verified
+    assert result.trajectory.phase_ends[0] == pytest.approx(from_rest(0.5), rel=2e-3)
+
+
+def test_a_tool_turns_on_the_spot_between_lines():
+    given = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
+    line = {"line": {"by": [0.0, 0.4, 0.0]}}
+    turn = {"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 60}}, "dwell": 0.2}
+    path = [{**line, "stop": True}, turn, line]
+    result = brachis.plan({**given, "path": path, "search": QUICK})
+    assert result.verified
+    before, turned, waited, _ = result.trajectory.phase_ends
+    assert waited - turned == pytest.approx(0.2, abs=1e-12)
+    positions, rotations = result.trajectory.robot.tool_placements(
+        result.trajectory.at(np.array([before, turned])).q
+    )
+    np.testing.assert_allclose(positions[0], positions[1], atol=1e-9)
+    cosine = 0.5 * (np.trace(rotations[0].T @ rotations[1]) - 1.0)
+    assert np.degrees(np.arccos(cosine)) == pytest.approx(60.0, abs=1e-6)
