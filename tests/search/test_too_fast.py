@@ -258,3 +258,17 @@ def test_a_speed_that_is_slightly_too_high_is_named_after_plans_failed(monkeypat
     ) as caught:
         brachis.plan(content)
     assert caught.value.allowed == "no more than 0.3 m/s (estimate)"
+
+
+@pytest.mark.parametrize("speed", [0.299, 0.305])
+def test_nothing_is_free_where_the_whole_path_has_a_given_speed(speed, monkeypatch):
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    ends = {"start_speed": speed, "end_speed": speed}
+    content = slide(speed, (0.0, 1.0), limits={"velocity": 0.3}, boundary=ends)
+    if speed < 0.3:
+        result = brachis.plan(content)
+        assert result.verified
+        assert result.t_end == pytest.approx(LENGTH / speed, rel=1e-9)
+        return
+    with pytest.raises(brachis.PlanningError, match="too high for the x_axis velocity"):
+        brachis.plan(content)
