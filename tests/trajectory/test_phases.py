@@ -59,15 +59,6 @@ def test_derivatives_of_a_phase_are_per_second():
         np.testing.assert_allclose(slope, orders[order + 1], rtol=1e-5, atol=1e-3)
 
 
-def test_more_knots_leave_the_curves_as_they_are():
-    (spline, *_) = random_splines(3)
-    knots = np.sort(np.append(spline.knots, [0.1, 0.6, 0.9]))
-    finer = spline.with_knots(knots)
-    t = np.linspace(0.0, spline.t_end, 50)
-    np.testing.assert_allclose(finer.at(t), spline.at(t), rtol=1e-9, atol=1e-9)
-    assert finer.control_points.shape == (3, len(knots) - 4)
-
-
 def test_times_of_path_coordinates():
     times = SPLINES[3].times_of(np.array([0.55, 0.7, 0.85]))
     np.testing.assert_allclose(times, [0.0, 0.5, 1.0], atol=1e-12)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.common import tolerances
 from brachis.common.summary import Summary
 from brachis.task import ProcessSpeed
 
@@ -54,17 +53,6 @@ class PhaseSpline(Summary):
         spline = BSpline(self.knots, self.control_points.T, self.degree)
         t_norm = np.clip(t / self.t_end, 0.0, 1.0)
         return tuple(spline(t_norm, nu=order) / self.t_end**order for order in range(4))
-
-    def with_knots(self, knots: np.ndarray) -> PhaseSpline:
-        """Return the same curves over a clamped knot vector that contains the present one, to rounding."""
-        from scipy.interpolate import BSpline, insert
-
-        spline = BSpline(self.knots, self.control_points.T, self.degree)
-        for knot in np.unique(knots):
-            if np.abs(self.knots - knot).min() > tolerances.TIME:
-                spline = insert(knot, spline)
-        points = spline.c[: len(knots) - self.degree - 1].T  # without what SciPy pads
-        return PhaseSpline(self.t_end, knots, self.degree, points)
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""

@@ -52,10 +52,10 @@ class Nodes:
     qddot: np.ndarray
     notes: tuple[str, ...] = ()
 
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """Times, positions, velocities and accelerations."""
-        return self.t, self.q, self.qdot, self.qddot
+    def part(self, first: int, last: int) -> Nodes:
+        """Return the motion from one node to another."""
+        kept = slice(first, last + 1)
+        return Nodes(self.t[kept], self.q[kept], self.qdot[kept], self.qddot[kept])
 
     @property
     def at_rest(self) -> tuple[bool, bool]:

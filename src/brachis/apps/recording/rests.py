@@ -48,7 +48,4 @@ def with_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> Nodes:
 def split_at_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> list[Nodes]:
     """Return the parts between waits in which the motion moves."""
     edges = [0, *(number for rest in rests for number in rest), len(nodes.t) - 1]
-    return [
-        Nodes(*(part[first : end + 1] for part in nodes.arrays))
-        for first, end in list(pairwise(edges))[::2]
-    ]
+    return [nodes.part(*ends) for ends in list(pairwise(edges))[::2]]

@@ -1,0 +1,50 @@
+"""A plan of several phases prints them and has them in its JSON; one of a single phase says nothing of phases."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from .conftest import quick_task
+
+
+@pytest.fixture
+def stopping() -> dict:
+    """A task that waits at a corner."""
+    path = [
+        {"line": {"by": [0.2, 0.0]}, "dwell": 0.3},
+        {"line": {"by": [0.0, 0.2]}},
+    ]
+    return {**quick_task(), "path": path}
+
+
+def test_a_plan_prints_its_phases(run, write, stopping):
+    outcome = run("plan", write(stopping))
+    assert outcome.code == 0
+    table = outcome.out.split("phases")[1]
+    rows = [line for line in table.splitlines() if " dwell " in line]
+    assert len(rows) == 1
+    assert "at rest" in rows[0]
+    assert "0.3000 s" in rows[0]
+    assert "1 move" in table
+    assert "3 move" in table
+
+
+def test_json_has_the_phases(run, write, stopping):
+    data = json.loads(run("plan", write(stopping), "--json").out)
+    phases = data["phases"]
+    assert [phase["kind"] for phase in phases] == ["move", "dwell", "move"]
+    assert phases[1]["s"] == [0.5, 0.5]
+    assert phases[1]["end"] - phases[1]["begin"] == pytest.approx(0.3)
+    assert phases[-1]["end"] == data["t_end"]
+
+
+def test_one_phase_is_not_listed(run, write):
+    assert "phases" not in run("plan", write(quick_task())).out
+
+
+def test_the_bottleneck_report_has_the_phases(run, write, stopping):
+    outcome = run("bottleneck", write(stopping))
+    assert outcome.code == 0
+    assert "phase 2 dwell, s = 0.5" in outcome.out
