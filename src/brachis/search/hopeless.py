@@ -249,6 +249,8 @@ class _SpeedCheck:
     def speed_at(self, leg: int, side: int) -> int | None:
         """Return the number of the speed that is given at an end of a leg; None at rest."""
         beside = leg - 1 if side == 0 else leg + 1
+        if self.problem.task.boundary.periodic:
+            beside %= len(self.problem.legs)
         for number, speed in enumerate(self.speeds):
             if (speed.leg, speed.side) in ((leg, side), (beside, None)):
                 return number if self.problem.leg_rates[leg][side] else None
@@ -366,12 +368,13 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
     number = min(numbers, key=lambda number: shares[number])
     _, place, label = check.caps[number]
     why = f"for the {label} limit at s = {place:.3g}"
-    if shares[number] > share + 0.01:
-        # A leg is too short. One speed alone may be to blame.
+    short = [leg for leg in check.free_legs if check.pass_leg(leg, every) is None]
+    if short and shares[number] > share + 0.01:
+        # One speed alone may be to blame.
         alone = ((each, check.lower_one(each, 0.9 * share)) for each in numbers)
         shares = {each: _REACHED * own for each, own in alone if own is not None}
         shares = shares or dict.fromkeys(numbers, _REACHED * share)
-        leg = next(leg for leg in check.free_legs if check.pass_leg(leg, every) is None)
+        leg = short[0]
         ends = [check.speed_at(leg, side) for side in (0, -1)]
         number = max(shares, key=lambda number: (number in ends, shares[number]))
         first, last = (
