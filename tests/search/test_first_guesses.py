@@ -1,64 +1,89 @@
-"""First guesses, and knots where a motion with a least speed changes its speed, and evenly where it does not."""
+"""First guesses of motions with stops, given speeds and moving ends, on a slide."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brachis.search import phase_plane
-from brachis.task import load_task
+import brachis
+from brachis.optimise.program import Program
+from brachis.optimise.transcription import program_of
+from brachis.problem.problem import Problem
+from brachis.search.phase_plane import grade_breaks, initial_breaks, initial_guess
+from brachis.search.starts import FAMILY, joint_space_start
 
-TASK = {
-    "brachis": 1,
-    "task_space": ["x", "y"],
-    "start": {"joints": [0.0, 0.0]},
-    "path": [{"line": {"by": [0.5, 0.0]}}],
-    "spline": {"intervals": 20},
+GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
+
+
+def guess(content: dict, *, is_timed: bool) -> tuple[Problem, Program, np.ndarray]:
+    robot = brachis.Robot.from_urdf(
+        GANTRY,
+        gravity=[0, 0, 0],
+        limits=brachis.LimitSpec(torque=None, velocity=None, acceleration=1.0),
+    )
+    task = brachis.load_task(
+        {
+            "brachis": 1,
+            "task_space": "joints",
+            "start": {"joints": [0.0, 0.0]},
+            "path": [
+                {"line": {"by": [0.2, 0.0]}, "stop": True},
+                {"line": {"by": [0.3, 0.0]}},
+            ],
+            "spline": {"intervals": 40},
+            **content,
+        }
+    )
+    problem = Problem.of(robot, task)
+    start = joint_space_start(problem)
+    if not is_timed:
+        even = np.linspace(0.0, 1.0, 101)[:, None]
+        start = type(start)(problem, start.joint_map, even, np.inf, "", FAMILY)
+    program = program_of(problem, start.maps_by_leg(), initial_breaks(start))
+    x = initial_guess(program, start)
+    assert x is not None
+    return problem, program, x
+
+
+WITH_SPEED = {
+    "tool_limits": {"process_speed": {"speed": 0.2, "s": [0.6, 0.8]}},
 }
 
 
-def breaks(times: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
-    start = SimpleNamespace(problem=SimpleNamespace(task=load_task(TASK)))
-    monkeypatch.setattr(
-        phase_plane,
-        "_least_speed_guess",
-        lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times),
+@pytest.mark.parametrize("is_timed", [True, False])
+@pytest.mark.parametrize("content", [{}, WITH_SPEED])
+def test_every_leg_is_passed_from_its_begin_to_its_end(content, is_timed):
+    problem, program, x = guess(content, is_timed=is_timed)
+    motions = program.motions(x)
+    assert len(motions) == len(problem.legs) == (4 if content else 2)
+    for motion, leg, rates in zip(
+        motions, problem.legs, problem.leg_rates, strict=True
+    ):
+        s, s_dt = motion.at(np.array([0.0, motion.t_end]))[:2]
+        np.testing.assert_allclose(s[:, 0], [leg.begin, leg.end], atol=1e-9)
+        np.testing.assert_allclose(s_dt[:, 0], rates, atol=1e-9)
+
+
+@pytest.mark.parametrize("is_timed", [True, False])
+def test_a_leg_with_a_given_speed_has_its_duration(is_timed):
+    problem, program, x = guess(WITH_SPEED, is_timed=is_timed)
+    (given,) = (
+        motion
+        for motion, law in zip(program.motions(x), problem.time_laws, strict=True)
+        if law is not None
     )
-    return phase_plane.initial_knots(start)
+    assert given.t_end == pytest.approx(0.2 * 0.5 / 0.2, rel=1e-9)
 
 
-def test_a_constant_speed_has_even_knots(monkeypatch):
-    found = breaks(np.linspace(0.0, 4.0, 401), monkeypatch)
-    np.testing.assert_allclose(np.diff(found), 0.05, rtol=1e-12)
-
-
-def test_knots_are_closer_where_the_speed_changes(monkeypatch):
-    s = np.linspace(0.0, 1.0, 401)
-    found = breaks(np.where(s < 0.5, s, 0.5 + 4.0 * (s - 0.5)), monkeypatch)
-    lengths, place = np.diff(found), 0.2  # at s = 0.5 in normalised time
-    near = np.abs(0.5 * (found[1:] + found[:-1]) - place) < 0.02
-    assert np.abs(found - place).min() < 0.01
-    assert lengths[near].max() < 0.1 * lengths.max()
-    assert np.abs(np.diff(np.log(lengths[1:-1]))).max() < np.log(5.0), (
-        "and not too different from their neighbours"
-    )
-    assert found[0] == 0.0
-    assert found[-1] == 1.0
-
-
-def test_intervals_grow_by_half_with_their_distance_from_a_switch():
-    found = phase_plane.grade_knots(np.array([0.0, 0.3, 1.0]), 24)
-    lengths, middle = np.diff(found), 0.5 * (found[1:] + found[:-1])
-    away = np.abs(middle[:, None] - [0.0, 0.3, 1.0]).min(axis=1)
-    assert len(lengths) == 24
-    assert (lengths > 0.0).all()
-    grown = np.polyfit(away, lengths, 1)[0]
-    assert grown == pytest.approx(0.5, rel=0.1)
-
-
-def test_more_intervals_than_switches_need_are_spread_over_the_whole_time():
-    lengths = np.diff(phase_plane.grade_knots(np.array([0.0, 0.3, 1.0]), 400))
-    assert lengths.min() > 1e-6
-    assert lengths.max() < 0.04
+@pytest.mark.parametrize("steps", [(0.01, 0.01), (0.03, 0.01), (1.0, 1.0)])
+def test_graded_intervals_begin_as_long_as_asked(steps):
+    breaks = grade_breaks(20, *steps)
+    lengths = np.diff(breaks)
+    assert len(lengths) == 20
+    assert (breaks[0], breaks[-1]) == (0.0, pytest.approx(1.0))
+    expected = np.minimum(steps, 0.05)
+    np.testing.assert_allclose(lengths[[0, -1]], expected, rtol=1e-6)
+    growth = lengths[1:10] / lengths[:9]
+    np.testing.assert_allclose(growth, growth[0], rtol=1e-6)

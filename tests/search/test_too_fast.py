@@ -33,7 +33,7 @@ def slide(speed: float, part: tuple[float, float], **changes: object) -> dict:
         "search": {"time_limit": 600.0},
         "tool_limits": {
             "process_speed": [
-                {"speed": speed, "s": part, "tolerance": 0.02},
+                {"speed": speed, "s": part},
                 *changes.pop("parts", []),
             ]
         },
@@ -56,25 +56,57 @@ def advised(error: brachis.BrachisError, key: str) -> float:
     return float(found[1])
 
 
+def allowed(error: brachis.BrachisError) -> float:
+    """Return the largest speed that an error names."""
+    return float(re.match(r"no more than ([\d.]+) m/s", error.allowed)[1])
+
+
 @pytest.mark.usefixtures("no_hurry")
-def test_a_run_up_that_is_too_short_is_told_with_what_would_do(monkeypatch):
+def test_a_run_up_that_is_too_short_is_refused_with_what_would_do(monkeypatch):
     """Over the way d the acceleration a leads to sqrt(2 a d)."""
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
-    with pytest.raises(
-        brachis.PlanningError,
-        match=r"the path before s = 0\.1 is too short to reach it",
-    ) as caught:
+    reason = (
+        r"the process speed is too high for the x_axis acceleration limit: the path from s = 0 to 0\.1 is too short to "
+        r"get from rest to 0\.5 m/s; found 0\.5 m/s"
+    )
+    with pytest.raises(brachis.PlanningError, match=reason) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
     possible = np.sqrt(2.0 * 0.1 * LENGTH)
-    least = re.search(
-        r"([\d.]+) to [\d.]+ m/s on that part, the least at s = 0.1", caught.value.found
-    )
-    assert float(least[1]) == pytest.approx(possible, rel=0.02)
-    assert caught.value.allowed == "at least 0.49 m/s"
-    assert caught.value.where == "tool_limits.process_speed[0].speed (tool)"
-    speed = advised(caught.value, "tool_limits.process_speed[0].speed")
-    assert 0.9 * possible < speed < 1.05 * possible
-    assert brachis.plan(slide(speed, (0.1, 0.6))).verified
+    most = allowed(caught.value)
+    assert 0.9 * possible < most <= possible
+    assert caught.value.where == "tool_limits.process_speed[0].speed"
+    assert advised(caught.value, "tool_limits.process_speed[0].speed") == most
+    assert brachis.plan(slide(most, (0.1, 0.6))).verified
+
+
+def test_the_run_out_counts_too(monkeypatch):
+    """Over 0.05 m from 0.3 m/s to a stop an acceleration of 0.9 m/s^2 is enough, and over 0.025 m it is not."""
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    stop = [
+        {"line": {"by": [0.3, 0.0]}, "stop": True},
+        {"line": {"by": [0.2, 0.0]}},
+    ]
+    for end, is_possible in ((0.5, True), (0.55, False)):
+        content = slide(0.3, (0.2, end), path=stop)
+        if is_possible:
+            assert brachis.plan(content).verified
+            continue
+        reason = r"s = 0\.55 to 0\.6 is too short to get from 0\.3 m/s to rest"
+        with pytest.raises(brachis.PlanningError, match=reason) as caught:
+            brachis.plan(content)
+        assert 0.2 < allowed(caught.value) < np.sqrt(2.0 * 0.05 * LENGTH)
+
+
+def test_two_speeds_too_near_to_each_other(monkeypatch):
+    """Between 0.1 m/s and v are 0.05 m: v^2 = 0.01 + 0.1."""
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    with pytest.raises(
+        brachis.PlanningError,
+        match=r"s = 0\.4 to 0\.5 is too short to get from 0\.1 m/s to 0\.45 m/s",
+    ) as caught:
+        brachis.plan(slide(0.1, (0.1, 0.4), parts=[{"speed": 0.45, "s": [0.5, 0.6]}]))
+    assert caught.value.where == "tool_limits.process_speed[1].speed"
+    assert 0.9 * np.sqrt(0.11) < allowed(caught.value) < np.sqrt(0.11)
 
 
 def test_no_number_is_advised_where_the_time_is_up(monkeypatch):
@@ -97,70 +129,63 @@ def test_a_number_that_was_not_verified_is_not_advised(monkeypatch):
     with pytest.raises(brachis.PlanningError) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
     assert 0.15 < advised(caught.value, "tool_limits.process_speed[0].speed") < 0.16
-    assert "s[0] to" not in caught.value.hint
 
 
 class TriedError(Exception):
     """A plan was tried."""
 
 
+def refuse(*_):
+    raise TriedError
+
+
 def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
     """25 N brake 25 kg from 0.32 m/s in 0.05 m, and with 10 N of friction from 0.37 m/s."""
 
-    def solved(*_):
-        raise TriedError
-
-    monkeypatch.setattr("brachis.search.candidates.solve_candidate", solved)
+    monkeypatch.setattr("brachis.search.candidates.solve_candidate", refuse)
     limits = {"acceleration": None, "torque": 25.0}
     with pytest.raises(TriedError):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits, friction={"coulomb": 10.0}))
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path after s = 0\.9 is too short to reach it",
+        match=r"s = 0\.9 to 1 is too short to get from 0\.36 m/s to rest",
     ):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits))
 
 
-@pytest.mark.usefixtures("no_hurry")
-def test_of_several_parts_the_one_is_told_that_is_too_fast(monkeypatch):
-    monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
+def test_of_several_parts_the_one_is_named_that_is_too_fast(monkeypatch):
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the path after s = 0\.9 is too short to reach it",
+        match=r"s = 0\.9 to 1 is too short to get from 0\.5 m/s to rest",
     ) as caught:
-        brachis.plan(
-            slide(
-                0.2,
-                (0.1, 0.3),
-                parts=[{"speed": 0.5, "s": [0.6, 0.9], "tolerance": 0.02}],
-            )
-        )
-    assert advised(caught.value, "tool_limits.process_speed[1].s[1]") == pytest.approx(
-        0.75, abs=0.011
-    )
-    assert (
-        caught.value.where
-        == "tool_limits.process_speed[1].speed (tool, s = 0.6 to 0.9)"
-    )
+        brachis.plan(slide(0.2, (0.1, 0.3), parts=[{"speed": 0.5, "s": [0.6, 0.9]}]))
+    assert caught.value.where == "tool_limits.process_speed[1].speed"
+    assert caught.value.hint.startswith("Lower tool_limits.process_speed[1].speed (how")
 
 
-def test_a_speed_that_joint_velocities_forbid():
+def test_a_speed_that_joint_velocities_forbid(monkeypatch):
+    """The limit itself can be asked for."""
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    limits = {"velocity": 0.3}
     with pytest.raises(
         brachis.PlanningError,
-        match=r"the x_axis velocity limit lets the tool keep no more than 0\.3 m/s",
-    ):
-        brachis.plan(slide(0.5, (0.3, 0.6), limits={"velocity": 0.3}))
+        match=r"too high for the x_axis velocity limit at s = 0\.3;",
+    ) as caught:
+        brachis.plan(slide(0.5, (0.3, 0.6), limits=limits))
+    assert allowed(caught.value) == 0.3
+    assert brachis.plan(slide(0.3, (0.3, 0.6), limits=limits)).verified
 
 
 def test_a_jerk_that_leaves_too_short_a_run_up(monkeypatch):
-    """The phase plane knows no jerk; the plan without the process speed does: sqrt(j d^2) ** (2 / 3) and less."""
+    """The phase plane knows no jerk, so that plans are tried: j t^3 / 6 takes 0.1 m to (j d^2)^(1/3) and less."""
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     with pytest.raises(
-        brachis.PlanningError, match="in the fastest motion without it"
-    ) as caught:
+        brachis.PlanningError,
+        match=r"no motion within the limits was found.*Lower tool_limits.process_speed\[0\].speed",
+    ):
         brachis.plan(slide(0.4, (0.2, 0.6), limits={"jerk": 2.0}))
-    assert "the path before s = 0.2" in str(caught.value)
 
 
 def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is_tried(
@@ -180,7 +205,7 @@ def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is
     }
     with pytest.raises(
         brachis.PlanningError,
-        match=r"rail velocity limit .* along the best joint path that was found",
+        match=r"the process speed is too high for the .* along the best joint path that was found",
     ):
         brachis.plan(
             {
@@ -190,7 +215,7 @@ def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is
         )
     with pytest.raises(
         brachis.PlanningError,
-        match=r"boundary.start_speed: .* this speed at the path's start",
+        match=r"boundary.start_speed: the start speed is too high for the",
     ):
         brachis.plan({**content, "boundary": {"start_speed": 20.0}})
 
@@ -200,7 +225,7 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError,
-        match=r"found 0.9 m/s; along one joint path about 0.3 m/s is possible",
+        match=r"the end speed is too high for the x_axis velocity limit at s = 1; found 0.9 m/s",
     ) as caught:
         brachis.plan(
             slide(
@@ -208,22 +233,42 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids(monkeypatch):
             )
         )
     assert caught.value.where == "boundary.end_speed"
-    assert 0.27 < advised(caught.value, "boundary.end_speed") <= 0.3
+    assert advised(caught.value, "boundary.end_speed") == allowed(caught.value) == 0.3
 
 
-def test_an_end_speed_that_another_one_at_the_start_makes_possible(monkeypatch):
-    """The velocity limit allows 0.3 m/s at both ends; from rest the way is long enough for 0.1 m/s alone."""
+def test_two_speeds_that_are_too_high_are_both_named(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     both = {"start_speed": 0.9, "end_speed": 0.9}
-    lower = r"Lower boundary\.start_speed and lower boundary\.end_speed"
+    lower = r"Lower boundary\.start_speed and lower boundary\.end_speed \(how"
+    with pytest.raises(brachis.PlanningError, match=lower) as caught:
+        brachis.plan(slide(0.3, (0.3, 0.6), limits={"velocity": 0.3}, boundary=both))
+    assert allowed(caught.value) == 0.3
+
+
+def test_a_speed_that_is_slightly_too_high_is_named_after_plans_failed(monkeypatch):
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    limits = {"velocity": 0.3}
+    content = slide(0.305, (0.3, 0.6), limits=limits)
+    with monkeypatch.context() as patch:
+        patch.setattr("brachis.search.candidates.solve_candidate", refuse)
+        with pytest.raises(TriedError):
+            brachis.plan(content)
     with pytest.raises(
-        brachis.PlanningError, match=rf"joint path about 0\.3\d* m/s.*{lower}"
-    ):
-        brachis.plan(
-            slide(
-                0.3,
-                (0.3, 0.6),
-                limits={"velocity": 0.3, "acceleration": 0.01},
-                boundary=both,
-            )
-        )
+        brachis.PlanningError, match=r"too high for the x_axis velocity limit"
+    ) as caught:
+        brachis.plan(content)
+    assert caught.value.allowed == "no more than 0.3 m/s (estimate)"
+
+
+@pytest.mark.parametrize("speed", [0.299, 0.305])
+def test_nothing_is_free_where_the_whole_path_has_a_given_speed(speed, monkeypatch):
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    ends = {"start_speed": speed, "end_speed": speed}
+    content = slide(speed, (0.0, 1.0), limits={"velocity": 0.3}, boundary=ends)
+    if speed < 0.3:
+        result = brachis.plan(content)
+        assert result.verified
+        assert result.t_end == pytest.approx(LENGTH / speed, rel=1e-9)
+        return
+    with pytest.raises(brachis.PlanningError, match="too high for the x_axis velocity"):
+        brachis.plan(content)

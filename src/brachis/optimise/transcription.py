@@ -160,4 +160,7 @@ def breaks_of(problem: Problem) -> np.ndarray:
     """Return the ends of a phase's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
     intervals = problem.task.spline.intervals
     count = COARSE_INTERVALS if intervals == "auto" else intervals
+    if intervals == "auto" and any(problem.time_laws):
+        # The way to a given speed may be short: over few intervals no motion reaches it.
+        count *= 2
     return np.linspace(0.0, 1.0, count + 1)

@@ -385,15 +385,17 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
     possible = {
         each: _round_down(own * check.speeds[each].figure)
         for each, own in shares.items()
-        if own < 1.0
+        if own < _EXACT or each == number
     }
     speed = check.speeds[number]
-    along = " along the best joint path that was found" if check.is_redundant else ""
+    most = f"{possible[number]:g} {speed.unit}"
     return Failure(
         f"the {speed.name} is too high {why}",
         where=speed.key,
         found=str(speed),
-        needed=f"no more than {possible[number]:g} {speed.unit}{along} (estimate)",
+        needed=f"about {most} along the best joint path that was found"
+        if check.is_redundant
+        else f"no more than {most} (estimate)",
         hint="Raise the limits that hold the motion back",
         remedies=[
             Remedy(each.key, each.figure, most, each.unit)

@@ -363,7 +363,7 @@ def initial_breaks(start: InitialGuess) -> list[np.ndarray]:
 
 
 def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
-    """Ends, (count + 1,), of intervals over [0, 1] that grow by the same factor from either end to the middle.
+    """Find ends, (count + 1,), of intervals over [0, 1] that grow by the same factor from either end to the middle.
 
     Parameters
     ----------
@@ -386,7 +386,9 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
                 share = half * np.expm1(growth) / np.expm1(growth * half)
                 low, high = (growth, high) if share > ratio else (low, growth)
         k = np.arange(half + 1.0)
-        sides.append(np.expm1(growth * k) / np.expm1(growth * half) if growth else k / half)
+        sides.append(
+            np.expm1(growth * k) / np.expm1(growth * half) if growth else k / half
+        )
     before, behind = sides
     return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
 

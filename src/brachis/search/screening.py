@@ -110,9 +110,7 @@ def _solve_quickly(
         motions = solved.program.motions(solved.report.x)
         chart = solved.program.phases[0].joint_map
         assert isinstance(chart, ChartMap)
-        even = [
-            motion.at(np.linspace(0.0, motion.t_end, 97))[0] for motion in motions
-        ]
+        even = [motion.at(np.linspace(0.0, motion.t_end, 97))[0] for motion in motions]
         return dataclasses.replace(
             start,
             joint_map=chart.along(problem.path, chart.start),

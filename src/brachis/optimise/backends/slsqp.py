@@ -79,7 +79,10 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         # Where the time is up, the report says so.
         status = SolveStatus.EVALUATION_ERROR
         return monitor.report(NAME, status, last, None, "stopped")
-    status = _STATUS.get(int(result.status), SolveStatus.FAILED)
+    # SciPy gives no status where no variable is free.
+    status = _STATUS.get(
+        result.get("status", 0 if result.success else 4), SolveStatus.FAILED
+    )
     answer = np.array(result.x)
     if status is SolveStatus.OPTIMAL and not _is_stationary(problem, answer):
         status = SolveStatus.ACCEPTABLE
