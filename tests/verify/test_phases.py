@@ -152,3 +152,23 @@ def test_holding_torque_in_a_dwell_counts():
     assert value_of(motion, "rms torque ratio") == pytest.approx(
         mean.max() / 50.0, rel=1e-4
     )
+
+
+def test_a_part_with_a_given_speed_is_checked_to_its_ends():
+    """The ends of the phases are rounded."""
+    limits = {"process_speed": {"speed": 1.5 * SPEED, "s": [0.55, 0.85]}}
+    motion = gantry_motion(tool_limits=limits)
+    for rounding in (1.0 - 1e-15, 1.0 + 1e-15):
+        ends = motion.phase_ends * rounding
+        ends[-1] = motion.t_end
+        moved = replace(motion, phase_ends=ends)
+        assert value_of(moved, "process speed") == pytest.approx(1.0 / 3.0)
+        assert "velocity at stops" not in failed(moved)
+
+
+def test_a_stop_between_nodes_is_looked_at_where_it_is_said_to_be():
+    """The phase ends 0.1 s late: s is where it should be, and the arm is in motion."""
+    motion = gantry_motion()
+    ends = motion.phase_ends.copy()
+    ends[1] += 0.1
+    assert "velocity at stops" in failed(replace(motion, phase_ends=ends))

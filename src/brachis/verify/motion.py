@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import InputError
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of
@@ -260,8 +261,14 @@ class Given:
         return legs_of(self.task, self.task_map, self.path)
 
     def during(self, begin: float, end: float) -> Given:
-        """Return the same with only the states of the pieces between the times of two nodes, s."""
-        first, last = np.searchsorted(self.pieces.times, [begin, end])
+        """Return the same with only the states of the pieces between the times of two nodes, s.
+
+        Of times that are no nodes the pieces around them count as well.
+        """
+        times = self.pieces.times
+        rounding = tolerances.TIME * times[-1]
+        first = np.searchsorted(times, begin + rounding, side="right") - 1
+        last = np.searchsorted(times, end - rounding)
         inside = (self.states.piece >= first) & (self.states.piece < last)
         return replace(self, states=self.states.only(inside))
 

@@ -38,9 +38,9 @@ def check_stops(given: Given) -> list[Check]:
         _check_worst("duration of dwells", off, _DWELL, "s", places),
     ]
     pieces = given.pieces
-    nodes = np.flatnonzero(np.isin(pieces.times, times_of_stops(given)))
-    inner = nodes[(nodes > 0) & (nodes < len(pieces.lengths))]
-    sides = (np.append(inner - 1, inner), np.repeat([1.0, 0.0], len(inner)))
+    piece, u = pieces.place(times_of_stops(given))
+    before = piece[(u == 0.0) & (piece > 0)] - 1
+    sides = (np.append(before, piece), np.append(np.ones(len(before)), u))
     states = MotionStates.at(pieces, *sides)
     jerks = np.abs(pieces.jerk).max(initial=0.0)
     derivatives = (
