@@ -31,10 +31,16 @@ def differences_of(function, x, h) -> np.ndarray:
 
 def told(phase, limit, x) -> np.ndarray:
     """Rows whose differences tell: the direction of a tool that hardly moves turns within a step, and kinks bend."""
-    state, kind = phase.state(x), limit.kind
+    state = phase.state(x)
+    kind = limit.kind
     near = np.abs(state.s[:, None] - limit.breaks).min(axis=1, initial=np.inf) > 1e-3
     if kind in SIZES:
         near &= limit.values(state)[:, 0] > 0.05
+    if kind == "torque_speed":
+        for joint, curve in enumerate(phase.joint_map.robot.limits.torque_speed):
+            bends = np.array(curve or np.empty((0, 2)))[:, 0]
+            gaps = np.abs(np.abs(state.qdot[:, joint, None]) - bends[bends > 0.0])
+            near &= gaps.min(axis=1, initial=np.inf) > 3e-3
     if limit.guarantee.is_mean:
         return np.ones(len(limit.lower), dtype=bool)
     return np.repeat(near, len(limit.lower))
