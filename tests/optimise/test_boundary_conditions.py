@@ -152,14 +152,13 @@ def test_monotone_control_points_make_progress_monotone():
 )
 def test_boundary_splines(degree, extra, derivatives, start, end, seed):
     knots = clamped_uniform_knots(degree, 4 + extra)
-    ends = (
-        EndCondition(value, 0.0, min(derivatives, degree - 1)) for value in (start, end)
-    )
+    still = min(derivatives, degree - 1)
+    ends = (EndCondition(value, np.zeros(still)) for value in (start, end))
     spline = BoundarySpline.between(knots, degree, *ends)
     free = np.random.default_rng(seed).normal(size=spline.free)
     points = spline.control_points(free, 1.0)
     curve = BSpline(knots, points, degree)
-    for order in range(1, min(derivatives, degree - 1) + 1):
+    for order in range(1, still + 1):
         np.testing.assert_allclose(
             curve(np.array([0.0, 1.0]), nu=order),
             0.0,
@@ -170,7 +169,6 @@ def test_boundary_splines(degree, extra, derivatives, start, end, seed):
             assert float(curve(time)) == pytest.approx(wanted, abs=1e-12)
     np.testing.assert_allclose(spline.free_from(points, 1.0), free, atol=1e-12)
     # Nothing more is tied than the boundary conditions ask for.
-    still = min(derivatives, degree - 1)
     assert spline.free == len(points) - 2 * still - np.isfinite(start) - np.isfinite(
         end
     )

@@ -1,4 +1,4 @@
-"""The whole Jacobian of a phase with every kind of limit, against central differences, and its sparsity pattern."""
+"""The whole Jacobian of a program with every kind of limit, against central differences, and its sparsity pattern."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from brachis import limits
+from brachis.optimise.program import Program
 from support.jacobians import dense, differences, told
 from support.phases import CASES, phase_of, reachable_points
 
@@ -13,16 +14,15 @@ KINDS = [*limits.TABLE, "branch_margin"]
 UNTIMED = ("position", "branch_margin")
 
 
-def blocks(phase) -> dict[str, slice]:
-    """Rows of every kind of limit, in the documented order."""
-    result, first = {}, 0
-    for limit in phase.limits:
-        size = len(limit.lower) * (1 if limit.guarantee.is_mean else len(phase.t_norm))
-        result[limit.kind] = slice(first, first + size)
-        first += size
-    result["progress"] = slice(first, first + phase.splines[0].free - 1)
+def blocks(program) -> dict[str, np.ndarray]:
+    """Rows of every kind of limit in a program of one phase; means come last."""
+    (phase,) = program.phases
+    result = {limit.kind: program.rows_of(limit).ravel() for limit in phase.limits}
+    progress = sum(rows.size for rows in map(phase.rows_of, phase.limits))
+    lengths = progress + phase.splines[0].free - 1
+    result["progress"] = np.arange(progress, lengths)
     if len(phase.grid.total):
-        result["lengths"] = slice(result["progress"].stop, len(phase.lower))
+        result["lengths"] = np.arange(lengths, len(phase.lower))
     return result
 
 
@@ -33,20 +33,23 @@ FREE = [
 
 
 @pytest.fixture(params=[*UNIFORM, *FREE], ids=str, scope="module")
-def phase(request):
+def program(request):
     case, degree, knots = request.param
     fixed = phase_of(case, degree=degree, rest="velocity" if degree == 2 else "full")
-    return fixed if knots == "uniform" else fixed.with_free_knots(0.1)
+    return Program([fixed if knots == "uniform" else fixed.with_free_knots(0.1)])
 
 
 @pytest.fixture(scope="module")
-def differentiated(phase):
+def differentiated(program):
     """Some points, and the Jacobian there by differences."""
-    return [(x, differences(phase, x)) for x in reachable_points(phase, 2)]
+    return [
+        (x, differences(program, x)) for x in reachable_points(program.phases[0], 2)
+    ]
 
 
-def test_jacobian_equals_differences(phase, differentiated):
-    parts = blocks(phase)
+def test_jacobian_equals_differences(program, differentiated):
+    (phase,) = program.phases
+    parts = blocks(program)
     kinds = [
         kind
         for kind in KINDS
@@ -57,9 +60,11 @@ def test_jacobian_equals_differences(phase, differentiated):
         "progress",
         *(["lengths"] if len(phase.grid.total) else []),
     ]
-    assert list(parts.values())[-1].stop == len(phase.lower)
+    assert sorted(np.concatenate(list(parts.values()))) == list(
+        range(len(program.lower))
+    )
     for x, expected in differentiated:
-        exact = dense(phase, x)
+        exact = dense(program, x)
         kept = {limit.kind: told(phase, limit, x) for limit in phase.limits}
         for kind, rows in parts.items():
             assert np.count_nonzero(exact[rows]) > 0, f"{kind} has no entries"
@@ -75,40 +80,36 @@ def test_jacobian_equals_differences(phase, differentiated):
             assert bool(np.abs(exact[rows, 0]).max() > 1e-3) == timed
 
 
-def test_pattern_is_fixed_has_no_place_twice_and_covers_all(phase, differentiated):
-    places = phase.jacobian_rows * phase.variables + phase.jacobian_columns
+def test_pattern_is_fixed_has_no_place_twice_and_covers_all(program, differentiated):
+    (phase,) = program.phases
+    places = program.jacobian_rows * program.variables + program.jacobian_columns
     assert len(np.unique(places)) == len(places)
-    assert phase.jacobian_rows.max() < len(phase.lower)
-    assert phase.jacobian_columns.max() < phase.variables
-    pattern = np.zeros((len(phase.lower), phase.variables), dtype=bool)
-    pattern[phase.jacobian_rows, phase.jacobian_columns] = True
+    assert program.jacobian_rows.max() < len(program.lower)
+    assert program.jacobian_columns.max() < program.variables
+    pattern = np.zeros((len(program.lower), program.variables), dtype=bool)
+    pattern[program.jacobian_rows, program.jacobian_columns] = True
     for x, expected in differentiated:
-        assert len(phase.jacobian(x)) == len(places)
+        assert len(program.jacobian(x)) == len(places)
         wrong = np.abs(expected) > 1e-7
         assert not np.any(wrong & ~pattern)
-    # Each row touches the end time, at most degree + 1 control points of every curve, and free lengths nearby; a mean
-    # touches all, and the very last row of free knots is the sum of them.
-    lengths = len(phase.grid.lower)
-    means = np.concatenate(
-        [
-            phase.rows_of(limit).ravel()
-            for limit in phase.limits
-            if limit.guarantee.is_mean
-        ]
-    )
-    assert np.all(np.bincount(phase.jacobian_rows)[means] == phase.variables)
-    widest = np.delete(
-        np.bincount(phase.jacobian_rows)[: len(phase.lower) - len(phase.grid.total)],
-        means,
-    ).max()
-    nearby = min(lengths, 2 * phase.degree - 1)
+    # Each row touches the end time, at most degree + 1 control points of every curve, and free lengths nearby; the
+    # last row of free knots is the sum of them, and a mean touches all.
+    own = len(phase.lower)
+    sizes = np.bincount(program.jacobian_rows)
+    assert len(sizes) > own
+    assert np.all(sizes[own:] == program.variables)
+    widest = sizes[: own - len(phase.grid.total)].max()
+    nearby = min(len(phase.grid.lower), 2 * phase.degree - 1)
     assert widest <= 1 + (phase.degree + 1) * (1 + phase.joint_map.r) + nearby
 
 
-def test_rows_are_ratios_to_the_limits(phase):
+def test_rows_are_ratios_to_the_limits(program):
+    (phase,) = program.phases
     x = reachable_points(phase, 1)[0]
-    robot, state, parts = phase.joint_map.robot, phase.state(x), blocks(phase)
-    values = phase.rows(x)
+    robot = phase.joint_map.robot
+    state = phase.state(x)
+    parts = blocks(program)
+    values = program.rows(x)
     n = robot.n
     np.testing.assert_allclose(
         values[parts["velocity"]].reshape(-1, n), state.qdot / robot.limits.velocity
@@ -148,7 +149,7 @@ def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
     )
     assert limit.lower[0] == -np.inf
     assert limit.upper[1] == np.inf
-    rows = blocks(phase)["position"]
+    rows = phase.rows_of(limit).ravel()
     np.testing.assert_allclose(
         dense(phase, x)[rows], differences(phase, x)[rows], atol=1e-9
     )

@@ -1,4 +1,4 @@
-"""Jacobians of phases as matrices, exact and by differences."""
+"""Jacobians of phases and programs as matrices, exact and by differences."""
 
 from __future__ import annotations
 
@@ -7,30 +7,40 @@ import numpy as np
 SIZES = ("tool_speed", "tool_acceleration", "tool_angular_speed")
 
 
-def dense(phase, x) -> np.ndarray:
-    matrix = np.zeros((len(phase.lower), phase.variables))
-    np.add.at(matrix, (phase.jacobian_rows, phase.jacobian_columns), phase.jacobian(x))
+def dense(program, x) -> np.ndarray:
+    matrix = np.zeros((len(program.lower), program.variables))
+    places = (program.jacobian_rows, program.jacobian_columns)
+    np.add.at(matrix, places, program.jacobian(x))
     return matrix
 
 
-def differences(phase, x, h=1e-4) -> np.ndarray:
-    """Central differences of fourth order, column by column."""
+def differences(program, x, h=1e-4) -> np.ndarray:
+    """Central differences of fourth order of the rows, column by column."""
+    return differences_of(program.rows, x, h)
+
+
+def differences_of(function, x, h) -> np.ndarray:
+    """Central differences of fourth order of any function of x, along the last axis."""
     columns = []
     for unit in np.eye(len(x)):
-        near = phase.rows(x + h * unit) - phase.rows(x - h * unit)
-        far = phase.rows(x + 2.0 * h * unit) - phase.rows(x - 2.0 * h * unit)
+        near = function(x + h * unit) - function(x - h * unit)
+        far = function(x + 2.0 * h * unit) - function(x - 2.0 * h * unit)
         columns.append((8.0 * near - far) / (12.0 * h))
-    return np.stack(columns, axis=1)
+    return np.stack(columns, axis=-1)
 
 
 def told(phase, limit, x) -> np.ndarray:
     """Rows whose differences tell: the direction of a tool that hardly moves turns within a step, and kinks bend."""
-    state, kind = phase.state(x), limit.kind
+    state = phase.state(x)
+    kind = limit.kind
     near = np.abs(state.s[:, None] - limit.breaks).min(axis=1, initial=np.inf) > 1e-3
     if kind in SIZES:
         near &= limit.values(state)[:, 0] > 0.05
-    return (
-        np.repeat(near, len(limit.lower))
-        if not limit.guarantee.is_mean
-        else np.ones(len(limit.lower), dtype=bool)
-    )
+    if kind == "torque_speed":
+        for joint, curve in enumerate(phase.joint_map.robot.limits.torque_speed):
+            bends = np.array(curve or np.empty((0, 2)))[:, 0]
+            gaps = np.abs(np.abs(state.qdot[:, joint, None]) - bends[bends > 0.0])
+            near &= gaps.min(axis=1, initial=np.inf) > 3e-3
+    if limit.guarantee.is_mean:
+        return np.ones(len(limit.lower), dtype=bool)
+    return np.repeat(near, len(limit.lower))
