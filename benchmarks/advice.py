@@ -111,11 +111,7 @@ def joints(limits: dict[str, Any], payload: float = 0.0, **more: Any) -> dict[st
 
 def process(speed: float, *part: float) -> dict[str, Any]:
     """Ask for a process speed on a part of the path."""
-    return {
-        "process_speed": [
-            {"speed": round(speed, 3), "s": list(part), "tolerance": 0.02}
-        ]
-    }
+    return {"process_speed": [{"speed": round(speed, 3), "s": list(part)}]}
 
 
 SLOW = {"acceleration": 1.0, "velocity": None}

@@ -19,7 +19,8 @@ from brachis.kinematics import DirectJointMap, JointState
 from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern
 from brachis.optimise.bspline import clamped_knots, spread
 from brachis.optimise.grid import FixedGrid
-from brachis.optimise.phase import Motion, Phase
+from brachis.optimise.motion import Motion
+from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import breaks_of
 from brachis.path import Path
@@ -77,14 +78,15 @@ class FullSpace:
 
     def __init__(self, problem: Problem, points: int) -> None:
         spline, robot = problem.task.spline, problem.robot
-        joint_map, breaks = AllJointsMap(problem), breaks_of(problem.task)
+        joint_map = AllJointsMap(problem)
+        breaks = breaks_of(problem)
         free = np.full(robot.n, np.nan)
         ends = [
             free if posture is None else posture
             for posture in (problem.start, problem.end)
         ]
         order = spline.vanishing
-        boundary = Boundary(
+        boundary = Boundary.at_rest(
             joint_map.coordinates(0.0, ends[0]),
             joint_map.coordinates(1.0, ends[1]),
             order,

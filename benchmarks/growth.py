@@ -21,9 +21,8 @@ INTERVALS = (10, 20, 50, 100, 200)
 
 def first_point(program):
     """Start from the first joint path of numeric inverse kinematics."""
-    return starting_point(
-        program, [next(differential_ik_paths(program.phases[0].joint_map))]
-    )
+    joint_path = next(differential_ik_paths(program.phases[0].joint_map))
+    return starting_point(program, [joint_path], [None])
 
 
 def main() -> None:

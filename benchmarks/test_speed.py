@@ -17,9 +17,8 @@ from brachis.search.differential_ik import differential_ik_paths
 
 def first_point(program):
     """Start from the first joint path of numeric inverse kinematics."""
-    return starting_point(
-        program, [next(differential_ik_paths(program.phases[0].joint_map))]
-    )
+    joint_path = next(differential_ik_paths(program.phases[0].joint_map))
+    return starting_point(program, [joint_path], [None])
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])

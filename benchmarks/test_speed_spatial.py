@@ -24,9 +24,8 @@ POSES = 2000
 
 def first_point(program):
     """Start from the first joint path of numeric inverse kinematics."""
-    return starting_point(
-        program, [next(differential_ik_paths(program.phases[0].joint_map))]
-    )
+    joint_path = next(differential_ik_paths(program.phases[0].joint_map))
+    return starting_point(program, [joint_path], [None])
 
 
 @pytest.fixture(scope="module")

@@ -45,7 +45,7 @@ def task(speed: float, intervals: str) -> dict[str, object]:
         "task_space": ["x", "y"],
         "path": [{"line": {"by": [LENGTH, 0.0]}}],
         "tool_limits": {
-            "process_speed": {"speed": speed, "s": [BEGIN, END]},
+            "process_speed": [{"speed": speed, "s": [BEGIN, END]}],
         },
         "spline": {"rest": "velocity", **mesh},
         "search": {"effort": "single", "least_motion": False},

@@ -43,11 +43,8 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
         program = program_of(problem, [joint_map], [np.linspace(0.0, 1.0, 21)])
         found = []
         for _ in range(4000):
-            x = starting_point(
-                program,
-                [random_joint_path(rng, problem.start[decomposition.redundant[0]])],
-                [None],
-            )
+            begin = problem.start[decomposition.redundant[0]]
+            x = starting_point(program, [random_joint_path(rng, begin)], [None])
             if x is None:
                 continue
             solved = solve_by_margin_continuation(program, x, solve, MARGINS)
