@@ -51,14 +51,15 @@ def join_nodes(parts: Sequence[Nodes]) -> Nodes:
     times = parts[0].times
     for part in parts[1:]:
         times = np.concatenate([times[:-1], times[-1] + part.times])
-    arrays = []
-    for name in ("q", "qdot", "qddot"):
+
+    def join(name: str) -> np.ndarray:
         own = [getattr(part, name) for part in parts]
-        arrays.append(np.concatenate([*(each[:-1] for each in own[:-1]), own[-1]]))
-    before = [part.qddot_before[1:] for part in parts]
-    before = np.concatenate([parts[0].qddot_before[:1], *before])
+        return np.concatenate([*(each[:-1] for each in own[:-1]), own[-1]])
+
+    later = [part.qddot_before[1:] for part in parts]
+    before = np.concatenate([parts[0].qddot_before[:1], *later])
     error = max(part.position_error for part in parts)
-    return Nodes(times, *arrays, before, error)
+    return Nodes(times, join("q"), join("qdot"), join("qddot"), before, error)
 
 
 def interpolate(

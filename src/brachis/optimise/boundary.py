@@ -232,7 +232,9 @@ class Boundary:
         """Build the conditions into splines."""
         if self.periodic:
             jumps = zip(self.start, self.ahead, strict=True)
-            return tuple(periodic(knots, degree, own.value, jump) for own, jump in jumps)
+            return tuple(
+                periodic(knots, degree, own.value, jump) for own, jump in jumps
+            )
         given = 0 if self.time_law is None else 1
         pairs = zip(self.start[given:], self.end[given:], strict=True)
         return tuple(BoundarySpline.between(knots, degree, *pair) for pair in pairs)

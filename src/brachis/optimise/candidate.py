@@ -104,7 +104,7 @@ class InitialGuess(Summary):
         q = self.joint_map.postures(np.concatenate(parts))
         begins = np.cumsum([0, *(len(part) for part in parts[:-1])])
         if not np.isfinite(q).all():
-            raise UnreachableError(self.joint_map.no_posture)
+            raise UnreachableError("the joint path leaves the branch, or the chart")
         return maps_by_leg(self.problem, self.joint_map, q[begins])
 
     @property

@@ -145,7 +145,9 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    return np.concatenate([_scale_time(phase, part) for phase, part in program.split(x)])
+    return np.concatenate(
+        [_scale_time(phase, part) for phase, part in program.split(x)]
+    )
 
 
 def _scale_time(phase: Phase, x: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ the control points and have no rows. Where the knots are free, the interval leng
 
 Rows: for each limit that holds at every instant, in the order of the list, its c values at collocation point 0, then at
 point 1, and so on; along a path then differences of successive control points of s, which are >= 0 so that ds/dt >= 0
-holds at all times (see `Progress`); where the knots are free, last the sum of h, which is 1. All rows are dimensionless.
-Means over time are rows of the program.
+holds at all times (see `Progress`); where the knots are free, last the sum of h, which is 1. All rows are
+dimensionless. Means over time are rows of the program.
 
 Entries of the Jacobian: of all limits that hold at every point, those by T, by the variables of each curve and by h,
 all columns of a point together; then those of the differences; last 1 for each of h.
@@ -61,9 +61,9 @@ class Progress:
         """Take the differences of a spline whose free variables follow the duration, variable 0."""
         given = np.diff(spline.given, axis=1)
         matrix = np.diff(spline.matrix, axis=0)
-        depends = given[1:].any(axis=0)
+        depends = np.any(given[1:] != 0.0, axis=0)
         several = np.count_nonzero(matrix, axis=1) + depends > 1
-        several |= given[2:].any(axis=0)
+        several |= np.any(given[2:] != 0.0, axis=0)
         weights = np.column_stack([np.zeros(several.sum()), matrix[several]])
         is_entry = weights != 0.0
         is_entry[:, 0] = depends[several]

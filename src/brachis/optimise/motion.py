@@ -134,9 +134,7 @@ class Motion(Summary):
             What is given is too sharp for splines.
         """
         if self.time_law is None:
-            return PhaseSpline(
-                self.t_end, self.knots, self.degree, self.control_points
-            )
+            return PhaseSpline(self.t_end, self.knots, self.degree, self.control_points)
         own = self.time_law.spline.t / self.t_end
         breaks = np.union1d(np.unique(self.knots), np.clip(own, 0.0, 1.0))
         breaks = breaks[np.append(np.diff(breaks) > tolerances.PATH, True)]

@@ -60,7 +60,9 @@ class Link:
     def rows(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
         """Values of the rows, by order and curve; `parts` are all phases, with their variables."""
         last, first = (
-            _curves_at(*parts[number], point)[np.ix_(self.orders, self.curves)]
+            _curves_at(*parts[number], point)[
+                np.ix_(list(self.orders), list(self.curves))
+            ]
             for number, point in ((self.before, -1), (self.after, 0))
         )
         return np.asarray((self._scales(*parts[self.before]) * (last - first)).ravel())
@@ -89,7 +91,7 @@ class Link:
     def jacobian(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,)."""
         orders = np.array(self.orders)
-        chosen = np.ix_(orders, self.curves)
+        chosen = np.ix_(list(self.orders), list(self.curves))
         phase, x = parts[self.before]
         after, x_after = parts[self.after]
         scales = self._scales(phase, x)
@@ -186,9 +188,7 @@ class Program(Summary):
         ]
         count = heights[len(self.phases)]
         every = np.arange(first[-1])
-        patterns.append(
-            (np.repeat(np.arange(count), first[-1]), np.tile(every, count))
-        )
+        patterns.append((np.repeat(np.arange(count), first[-1]), np.tile(every, count)))
         patterns += [link.pattern(self.phases, first) for link in self.links]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
         pairs = zip(patterns, self._first_rows, strict=True)

@@ -121,7 +121,9 @@ def violations(
         violation = max(violation, of_means)
         if of_means > goal:  # too few points everywhere
             pairs = zip(dense.phases, missing, strict=True)
-            missing = [np.union1d(own, phase.t_norm[_EVERYWHERE]) for phase, own in pairs]
+            missing = [
+                np.union1d(own, phase.t_norm[_EVERYWHERE]) for phase, own in pairs
+            ]
     return violation, missing
 
 

@@ -339,9 +339,10 @@ def _place_jump(
     places = np.linspace(1.5 * _NARROWEST, 1.0 - 1.5 * _NARROWEST, 401)
     place = float(places[int(np.argmin((gap(places, 1) ** 2).sum(axis=1)))])
     jump = gap(place, 2)
-    place -= float(gap(place, 1) @ jump / (jump @ jump)) / h
+    size = max(float(jump @ jump), np.finfo(float).tiny)
+    place -= float(gap(place, 1) @ jump / size) / h
     place = float(np.clip(place, places[0], places[-1]))
-    square = 24.0 * float(gap(place, 0) @ jump / (jump @ jump))
+    square = 24.0 * float(gap(place, 0) @ jump / size)
     widest = 2.0 * min(place, 1.0 - place) - _NARROWEST
     share = np.clip(np.sqrt(max(square, 0.0)) / h, 2.0 * _NARROWEST, widest)
     width = h * float(share)
