@@ -93,7 +93,7 @@ class BoundarySpline:
         return greville(self.knots, self.degree)
 
     def given_points(self, duration: float, *, slope: bool = False) -> np.ndarray:
-        """What the control points (N + d,) have besides the free variables; or its slope by the duration, s."""
+        """Return what the control points (N + d,) have besides the free variables; or its slope by the duration, s."""
         powers = np.arange(len(self.given))
         if slope:
             factors = powers[1:] * duration ** powers[:-1]
