@@ -169,6 +169,13 @@ def today() -> Planned:
     return {"planned": found.result}
 
 
+def weld_seams() -> Planned:
+    """Draw two seams with a spot between them."""
+    result = planned("13_weld_seams")
+    save(plot_overview(result.trajectory), "weld_seams")
+    return {"rail": result}
+
+
 def crane() -> Planned:
     """Draw the motion with a plug-in's closed form."""
     family = load("examples/ik_plugin/src/brachis_polar/__init__.py").polar
@@ -201,6 +208,7 @@ EXAMPLES: dict[str, Callable[[], Planned]] = {
     "10": periodic,
     "11": joint_path,
     "12": today,
+    "13": weld_seams,
     "ik_plugin": crane,
     "limit_plugin": coupled,
 }

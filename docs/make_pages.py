@@ -23,6 +23,7 @@ PICTURES = {
     "10": "periodic_circle.gif",
     "11": "joint_path.png",
     "12": "today.png",
+    "13": "weld_seams.png",
     "ik_plugin": "crane.png",
     "limit_plugin": "coupled.png",
 }

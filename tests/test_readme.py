@@ -306,6 +306,16 @@ def test_example_12(tmp_path):
     assert (tmp_path / "today.png").stat().st_size > 1000
 
 
+def test_example_13():
+    result = brachis.plan(ROOT / "examples/13_weld_seams.yaml")
+    assert result.verified
+    phases = result.trajectory.phases
+    kinds = ["move", "given speed", "move", "dwell", "move", "given speed", "move"]
+    assert [phase.kind for phase in phases] == kinds
+    assert [phase.speed for phase in phases if phase.speed] == [0.2, 0.1]
+    assert phases[3].duration == pytest.approx(0.5, abs=1e-12)
+
+
 def test_published_figure_lies_between_16_and_17_intervals():
     benchmark = load(ROOT / "studies/published_figure.py")
     assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)
