@@ -164,11 +164,7 @@ class Compared:
     @property
     def kind(self) -> str:
         label = self.at_step.sensitivity.label
-        tool = (
-            "tool "
-            if label.subject.startswith("tool") and "process" not in label.kind
-            else ""
-        )
+        tool = "tool " if label.subject.startswith("tool") else ""
         return tool + label.kind.replace("force", "torque")
 
     @property
