@@ -141,15 +141,22 @@ def test_gradient_of_the_end_time_with_a_given_speed(case, law):
     np.testing.assert_array_equal(slower, x)
 
 
-def in_two_phases(knots: str, *, points: int | None = None) -> Program:
-    """Two phases, the first at a given speed, and a pause in between."""
+def in_two_phases(
+    knots: str, *, orders: tuple[int, ...] = (0,), points: int | None = None
+) -> Program:
+    """Two phases, the first at a given speed, and a pause in between; the redundant joint is linked there."""
     moves = phase_of("r1")
     given = at_given_speed("r1", "bent")
+    free = EndCondition(np.nan, np.empty(0))
+    start = (moves.boundary.start[0], free)
+    moves = moves.with_grid(moves.grid, replace(moves.boundary, start=start))
+    end = (given.boundary.end[0], free)
+    boundary = replace(given.boundary, end=end)
     first = Phase(
         given.joint_map,
         given.limits,
         given.grid,
-        given.boundary,
+        boundary,
         margin=None,
         pause=PAUSE,
     )
@@ -158,7 +165,7 @@ def in_two_phases(knots: str, *, points: int | None = None) -> Program:
         phases = [own.with_points(np.linspace(0.0, 1.0, points)) for own in phases]
     if knots == "free":
         phases = [own.with_free_knots(0.1) for own in phases]
-    return Program(phases, [Link(0, 1, (1,), (0,))])
+    return Program(phases, [Link(0, 1, (1,), orders)])
 
 
 def point_in_two_phases(program: Program) -> np.ndarray:
@@ -167,9 +174,10 @@ def point_in_two_phases(program: Program) -> np.ndarray:
     return np.concatenate([x, reachable_points(second, 1)[0]])
 
 
+@pytest.mark.parametrize("orders", [(0,), (0, 1, 2)])
 @pytest.mark.parametrize("knots", ["uniform", "free"])
-def test_jacobian_of_phases_with_a_pause(knots):
-    program = in_two_phases(knots)
+def test_jacobian_of_phases_with_a_pause(knots, orders):
+    program = in_two_phases(knots, orders=orders)
     x = point_in_two_phases(program)
     assert program.end_time(x) == pytest.approx(
         DURATION + PAUSE + x[program.phases[0].variables], rel=1e-14
@@ -181,8 +189,21 @@ def test_jacobian_of_phases_with_a_pause(knots):
     size = np.abs(expected[own]).max()
     assert np.count_nonzero(exact[own]) > 0.9 * exact[own].size
     np.testing.assert_allclose(exact[own], expected[own], atol=1e-6 * size)
-    np.testing.assert_allclose(exact[-1], expected[-1], atol=1e-9)
-    assert own[-1] == len(exact) - 2
+    linked = np.arange(own[-1] + 1, len(exact))
+    assert len(linked) == len(orders)
+    assert not exact[linked, 0].any(), "the given duration is no variable of links"
+    expected[linked, 0] = 0.0
+    assert np.count_nonzero(expected[linked], axis=1).min() >= 2
+    size = np.abs(expected[linked]).max()
+    np.testing.assert_allclose(exact[linked], expected[linked], atol=1e-8 * size)
+    # A row is the difference of a derivative, in units of the last interval.
+    first, second = (
+        phase.motion(part).at(np.array([place * part[0]]))
+        for (phase, part), place in zip(program.split(x), (1.0, 0.0), strict=True)
+    )
+    interval = DURATION * np.diff(program.phases[0].breaks)[-1]
+    gaps = [interval**k * (first[k][0, 1] - second[k][0, 1]) for k in orders]
+    np.testing.assert_allclose(program.rows(x)[linked], gaps, rtol=1e-9)
     for phase, free in zip(program.phases, (False, knots == "free"), strict=True):
         assert (len(phase.grid.lower) > 0) == free, "a given s(t) keeps its knots"
     places = program.jacobian_rows * program.variables + program.jacobian_columns
