@@ -149,7 +149,13 @@ class Phase:
         return self.with_grid(FixedGrid(knots, self.degree, t_norm))
 
     def with_free_knots(self, shortest: float) -> Phase:
-        """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals."""
+        """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals.
+
+        Where s(t) is given the knots stay: s at a collocation point would depend on all lengths before, and no time
+        would be gained.
+        """
+        if self.time_law is not None:
+            return self
         shortest = shortest / self.intervals
         return self.with_grid(FreeGrid(self.knots, self.degree, self.t_norm, shortest))
 
