@@ -165,6 +165,8 @@ def _scale_time(phase: Phase, x: np.ndarray) -> np.ndarray:
     least = np.inf
     while x[0] < 200.0:
         worst = _worst_ratio(phase, x)
+        if _goes_back(phase, x):
+            return best
         if worst <= 1.0:
             break
         if worst >= least:
@@ -182,6 +184,12 @@ def _scale_time(phase: Phase, x: np.ndarray) -> np.ndarray:
             break
         x = shorter
     return x
+
+
+def _goes_back(phase: Phase, x: np.ndarray) -> bool:
+    """Tell whether a motion goes backwards along the path, as a long one between moving ends must."""
+    is_along_path = phase.joint_map.path is not None
+    return is_along_path and bool(phase.state(x).ydot[:, 0].min() < 0.0)
 
 
 def worst_time_scaling_ratio(program: Program, x: np.ndarray) -> float:

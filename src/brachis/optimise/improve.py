@@ -15,6 +15,7 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
+from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.backends import (
     Progress,
     Solver,
@@ -203,6 +204,10 @@ _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
 
+_PROGRESS = 1e-4
+"""Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
+
+
 @dataclass(frozen=True)
 class SolverSession:
     """A backend that solves programs one after the other; call the session to solve.
@@ -231,13 +236,13 @@ class SolverSession:
         cls,
         backend: Solver,
         settings: SolverSettings,
-        r: int,
+        joint_map: JointMap,
         deadline: Deadline,
         listener: Listener,
         *,
-        is_flat: bool,
+        has_time_law: bool,
     ) -> SolverSession:
-        """Take the bounds from the task's ``solver`` part, for a map with `r` redundant joints.
+        """Take the bounds from the task's ``solver`` part.
 
         Where many motions are equally fast, in charts and where the time is given, a solve ends after fewer iterates
         without gain.
@@ -245,10 +250,12 @@ class SolverSession:
         iterations = settings.max_iterations
         default = SolverSettings.model_fields["max_iterations"].default
         if settings.name == "auto" and iterations == default:
-            iterations = _ITERATIONS * max(r, 1)
+            iterations = _ITERATIONS * max(joint_map.r, 1)
         options = SolverOptions(settings.tolerance, iterations, settings.time_limit)
-        if is_flat:
+        if isinstance(joint_map, ChartMap):
             options = dataclasses.replace(options, progress=1e-5, patience=10)
+        if has_time_law and joint_map.r:
+            options = dataclasses.replace(options, progress=_PROGRESS, patience=5)
 
         def progress(iteration: int, objective: float) -> None:
             text = f"{backend.name}: iteration {iteration}, t_E = {objective:.4f} s"
@@ -259,7 +266,12 @@ class SolverSession:
     def __call__(self, program: Program, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,)."""
         left = self.deadline.within(self.options.time_limit).left
-        options = dataclasses.replace(self.options, time_limit=left)
+        # Only the time that is not given can get shorter.
+        share = program.free_time(x) / program.end_time(x) or 1.0
+        progress = share * self.options.progress
+        options = dataclasses.replace(
+            self.options, time_limit=left, progress=progress
+        )
         report = self.backend.solve(program, x, options, self.progress)
         if report.status.usable or report.violation > self.acceptable:
             return report

@@ -42,7 +42,7 @@ _KEPT_BACK = 0.1 * tolerances.END_TIME
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
 _FOR_MANY = "ipopt"
-"""With more than 150 variables active sets take seconds an iteration; a few iterations of an interior point do."""
+"""With more than 150 variables a phase active sets take seconds an iteration; a few iterations of an interior point do."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,7 +121,8 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
-    name = _FOR_MANY if program.variables > 150 else start.solver
+    most = max(phase.variables for phase in program.phases)
+    name = _FOR_MANY if most > 150 else start.solver
     solve = _session(name, soon, listener, patience=5)
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)

@@ -149,7 +149,13 @@ class Phase:
         return self.with_grid(FixedGrid(knots, self.degree, t_norm))
 
     def with_free_knots(self, shortest: float) -> Phase:
-        """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals."""
+        """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals.
+
+        Where s(t) is given the knots stay: s at a collocation point would depend on all lengths before, and no time
+        would be gained.
+        """
+        if self.time_law is not None:
+            return self
         shortest = shortest / self.intervals
         return self.with_grid(FreeGrid(self.knots, self.degree, self.t_norm, shortest))
 
@@ -353,15 +359,21 @@ class Phase:
 
     def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
         """Slopes of the curves and their time derivatives at an end, (4, c, z); see `end_pattern`."""
+        number = range(len(self.t_norm))[point]
+        layout = self._layout
         curves = len(self.boundary.start)
-        unit = np.zeros((len(self.t_norm), curves, curves))
-        unit[point] = np.eye(curves)
-        zero = np.zeros_like(unit)
-        slopes = []
-        for order in range(ORDERS):
-            by = [unit if own == order else zero for own in range(ORDERS)]
-            slopes.append(self._chain_rule(by, x)[self._at_end(point)].T)
-        return np.array(slopes)
+        first = curves - len(self.splines)
+        slopes = np.zeros((ORDERS, curves, len(layout.point)))
+        slopes[:, :, number] = [own[number] for own in self._by_duration(x)]
+        begin = len(self.t_norm)
+        pairs = zip(layout.patterns, self._bases(x), strict=True)
+        for j, (pattern, basis) in enumerate(pairs, first):
+            end = begin + len(pattern.point)
+            slopes[:, j, begin:end] = per_second(basis, x[0])
+            begin = end
+        by_h = self.grid.slopes(self._h(x), self._control_points(x))
+        slopes[:, first:, begin:] = np.swapaxes(per_second(by_h, x[0]), 1, 2)
+        return slopes[:, :, self._at_end(point)]
 
     def _at_end(self, point: int) -> np.ndarray:
         """Numbers of the entries at the first or last collocation point; not that by a duration that is given."""

@@ -220,6 +220,12 @@ class Program(Summary):
         pauses = sum(phase.pause for phase in self.phases)
         return float(sum(x[first] for first in self._durations) + pauses)
 
+    def free_time(self, x: np.ndarray) -> float:
+        """Sum of the durations that are not given, s."""
+        return float(
+            sum(part[0] for phase, part in self.split(x) if phase.time_law is None)
+        )
+
     def with_time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
         """Return the same motion, every phase longer by a factor whose duration is not given."""
         x = x.copy()

@@ -142,6 +142,12 @@ class Problem(Summary):
         rates = [first, *joints, last]
         return tuple(pairwise(rates))
 
+    @cached_property
+    def given_time(self) -> float:
+        """Time that passes at given speeds and in dwells, s."""
+        laws = [law.duration for law in self.time_laws if law is not None]
+        return sum(laws) + sum(leg.dwell for leg in self.legs)
+
     def _rate_between(self, before: int, after: int) -> float:
         """Return ds/dt where a leg ends and another one begins, 1/s."""
         if self.legs[before].stops:

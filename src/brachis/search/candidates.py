@@ -181,15 +181,13 @@ def _open_session(
     """Open a session of the guess's solver under the task's bounds."""
     (backend,) = solvers_for(start.solver)
     problem = start.problem
-    r = start.joint_map.r
-    has_time_law = any(law is not None for law in problem.time_laws)
     return SolverSession.for_task(
         backend,
         problem.task.solver,
-        r,
+        start.joint_map,
         deadline,
         listener,
-        is_flat=start.in_chart or (has_time_law and r > 0),
+        has_time_law=any(problem.time_laws),
     )
 
 

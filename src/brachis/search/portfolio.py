@@ -349,11 +349,21 @@ class Search:
         best = self.best
         if best is None or not self.is_satisfied:
             return True
+        if self._has_same_time(candidate, best):
+            return False
         both = candidate, best
         if all(each.keeps_knots and each.in_chart for each in both):
             # What else they gain, both gain.
             return candidate.coarse < (1.0 - tolerances.GAIN) * best.coarse
         return candidate.coarse * self._gain < (1.0 - tolerances.GAIN) * best.t_end
+
+    def _has_same_time(self, first: Candidate, second: Candidate) -> bool:
+        """Tell whether candidates in the same joints have the same coarse end time; so have mirror images."""
+        if first.in_chart or first.redundant_joints != second.redundant_joints:
+            return False
+        given = self._problem.given_time
+        gap = abs(first.coarse - second.coarse)
+        return gap <= tolerances.END_TIME * (second.coarse - given)
 
     def _finish(self, number: int, candidate: Candidate) -> None:
         """Put down what became of a candidate, and keep the best one."""

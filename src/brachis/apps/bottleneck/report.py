@@ -50,7 +50,6 @@ from brachis.errors import (
     write_count,
 )
 from brachis.kinematics import (
-    ChartMap,
     ChartRows,
     JointMap,
     JointSpaceMap,
@@ -107,7 +106,6 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
         program, x = _problem(trajectory)
         first = program.phases[0].joint_map
         has_law = any(phase.time_law is not None for phase in program.phases)
-        is_flat = isinstance(first, ChartMap) or (has_law and first.r > 0)
         curved = any(limit.guarantee.is_mean for limit in program.limits)
         for backend in solvers_for(task.solver.name, curved=curved):
             if deadline.passed:
@@ -115,10 +113,10 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
             solve = SolverSession.for_task(
                 backend,
                 task.solver,
-                first.r,
+                first,
                 deadline,
                 lambda _text: None,
-                is_flat=is_flat,
+                has_time_law=has_law,
             )
             try:
                 refined = refine(program, solve(program, x), solve, options)

@@ -1,0 +1,262 @@
+"""Phases with a given s(t), pauses between phases, and ends with any given derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import simpson
+from scipy.interpolate import BSpline, make_interp_spline
+
+from brachis.optimise.boundary import BoundarySpline, EndCondition
+from brachis.optimise.bspline import clamped_knots
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Link, Program
+from brachis.path.time_law import TimeLaw
+from brachis.robot.dynamics import rigid_torque
+from support.jacobians import dense, differences, differences_of, told
+from support.phases import phase_of, reachable_points
+
+BREAKS = np.array([0.0, 0.1, 0.25, 0.5, 0.6, 0.85, 0.95, 1.0])
+DURATION = 0.6
+PAUSE = 0.4
+
+
+def linear_law() -> TimeLaw:
+    knots = np.array([0.0, 0.0, DURATION, DURATION])
+    rate = 1.0 / DURATION
+    ends = np.array([[0.0, rate, 0.0, 0.0], [1.0, rate, 0.0, 0.0]])
+    return TimeLaw(DURATION, BSpline(knots, np.array([0.0, 1.0]), 1), ends)
+
+
+def bent_law() -> TimeLaw:
+    """s = u + sin(2 pi u) / 9 with u = t / DURATION, by a spline of degree 5."""
+    u = np.linspace(0.0, 1.0, 41)
+    s = u + np.sin(2.0 * np.pi * u) / 9.0
+    spline = make_interp_spline(u * DURATION, s, k=5)
+    ends = [[spline(t, nu=order) for order in range(4)] for t in (0.0, DURATION)]
+    return TimeLaw(DURATION, spline, np.array(ends))
+
+
+LAWS = {"linear": linear_law, "bent": bent_law}
+
+
+def at_given_speed(case: str, law: str) -> Phase:
+    """A phase with every kind of limit whose s(t) is given."""
+    phase = phase_of(case)
+    boundary = replace(phase.boundary, time_law=LAWS[law]())
+    return phase.with_grid(phase.grid, boundary)
+
+
+def points_at_given_speed(phase: Phase, count: int) -> list[np.ndarray]:
+    points = reachable_points(phase, count)
+    return [np.append(DURATION, x[1:]) for x in points]
+
+
+def compare_by_kind(
+    phase: Phase, own: np.ndarray, x: np.ndarray, error: np.ndarray
+) -> None:
+    """Compare every kind of a phase's rows by its own scale."""
+    for limit in phase.limits:
+        if limit.guarantee.is_mean:
+            continue
+        rows = phase.rows_of(limit).ravel()[told(phase, limit, x)]
+        assert len(rows) > 0
+        scale = max(1e-3, np.abs(own[rows]).max())
+        assert error[rows].max() <= 1e-6 * scale, limit.kind
+
+
+@settings(max_examples=50)
+@given(
+    degree=st.integers(4, 6),
+    derivatives=st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3),
+    is_start=st.booleans(),
+    duration=st.floats(0.1, 10.0),
+    seed=st.integers(0, 99),
+)
+def test_given_derivatives_hold_for_any_duration(
+    degree, derivatives, is_start, duration, seed
+):
+    knots = clamped_knots(degree, BREAKS)
+    condition = EndCondition(0.7, np.array(derivatives))
+    other = EndCondition(np.nan, np.empty(0))
+    sides = (condition, other) if is_start else (other, condition)
+    spline = BoundarySpline.between(knots, degree, *sides)
+    free = np.random.default_rng(seed).normal(size=spline.free)
+    points = spline.control_points(free, duration)
+    curve = BSpline(knots * duration, points, degree)
+    place = 0.0 if is_start else duration
+    size = 1.0 + np.abs(points).max()
+    for order, wanted in enumerate([0.7, *derivatives]):
+        # The first interval is a tenth, the last one a twentieth.
+        rounding = 1e-14 * size * (20.0 * degree / duration) ** order
+        assert float(curve(place, nu=order)) == pytest.approx(wanted, abs=rounding)
+    assert spline.free == len(points) - 4
+    slope = spline.given_points(duration, slope=True)
+    by_differences = differences_of(
+        lambda x: spline.given_points(float(x[0])), np.array([duration]), 1e-3
+    )
+    np.testing.assert_allclose(
+        slope, by_differences[:, 0], atol=1e-9 * (1.0 + np.abs(slope).max())
+    )
+    np.testing.assert_allclose(spline.free_from(points, duration), free, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("case", ["r0", "r1", "r2"])
+def test_jacobian_with_a_given_speed(case, law):
+    phase = at_given_speed(case, law)
+    assert len(phase.splines) == phase.joint_map.r
+    assert phase.x_lower[0] == phase.x_upper[0] == DURATION
+    for x in points_at_given_speed(phase, 2):
+        exact = dense(phase, x)
+        expected = differences(phase, x, 1e-5)
+        assert np.count_nonzero(exact) > 0
+        compare_by_kind(phase, expected, x, np.abs(exact - expected).max(axis=1))
+        t = phase.t_norm * DURATION
+        state = phase.state(x)
+        own = [part[:, 0] for part in (state.y, state.ydot, state.yddot, state.ydddot)]
+        np.testing.assert_allclose(own, phase.time_law.at(t), atol=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("case", ["r1", "r2"])
+def test_gradient_of_the_end_time_with_a_given_speed(case, law):
+    phase = at_given_speed(case, law)
+    program = Program([phase])
+    (x,) = points_at_given_speed(phase, 1)
+    assert program.end_time(x) == DURATION
+    assert program.objective(x) > DURATION
+    exact = program.gradient(x)
+    assert exact[0] == 1.0
+    # The objective is quadratic in the control points, so that long steps are exact.
+    expected = differences_of(program.objective, x, 5e-3)
+    assert np.count_nonzero(exact[1:]) > 0
+    size = np.abs(expected[1:]).max()
+    np.testing.assert_allclose(exact[1:], expected[1:], atol=1e-6 * size)
+    slower = program.with_time_scaled(x, 2.0)
+    np.testing.assert_array_equal(slower, x)
+
+
+def in_two_phases(
+    knots: str, *, orders: tuple[int, ...] = (0,), points: int | None = None
+) -> Program:
+    """Two phases, the first at a given speed, and a pause in between; the redundant joint is linked there."""
+    moves = phase_of("r1")
+    given = at_given_speed("r1", "bent")
+    free = EndCondition(np.nan, np.empty(0))
+    start = (moves.boundary.start[0], free)
+    moves = moves.with_grid(moves.grid, replace(moves.boundary, start=start))
+    end = (given.boundary.end[0], free)
+    boundary = replace(given.boundary, end=end)
+    first = Phase(
+        given.joint_map,
+        given.limits,
+        given.grid,
+        boundary,
+        margin=None,
+        pause=PAUSE,
+    )
+    phases = [first, moves]
+    if points is not None:
+        phases = [own.with_points(np.linspace(0.0, 1.0, points)) for own in phases]
+    if knots == "free":
+        phases = [own.with_free_knots(0.1) for own in phases]
+    return Program(phases, [Link(0, 1, (1,), orders)])
+
+
+def point_in_two_phases(program: Program) -> np.ndarray:
+    first, second = program.phases
+    (x,) = points_at_given_speed(first, 1)
+    return np.concatenate([x, reachable_points(second, 1)[0]])
+
+
+@pytest.mark.parametrize("orders", [(0,), (0, 1, 2)])
+@pytest.mark.parametrize("knots", ["uniform", "free"])
+def test_jacobian_of_phases_with_a_pause(knots, orders):
+    program = in_two_phases(knots, orders=orders)
+    x = point_in_two_phases(program)
+    assert program.end_time(x) == pytest.approx(
+        DURATION + PAUSE + x[program.phases[0].variables], rel=1e-14
+    )
+    exact = dense(program, x)
+    expected = differences(program, x, 1e-5)
+    (mean,) = program.means
+    own = program.rows_of(mean).ravel()
+    size = np.abs(expected[own]).max()
+    assert np.count_nonzero(exact[own]) > 0.9 * exact[own].size
+    np.testing.assert_allclose(exact[own], expected[own], atol=1e-6 * size)
+    linked = np.arange(own[-1] + 1, len(exact))
+    assert len(linked) == len(orders)
+    assert not exact[linked, 0].any(), "the given duration is no variable of links"
+    expected[linked, 0] = 0.0
+    assert np.count_nonzero(expected[linked], axis=1).min() >= 2
+    size = np.abs(expected[linked]).max()
+    np.testing.assert_allclose(exact[linked], expected[linked], atol=1e-8 * size)
+    # A row is the difference of a derivative, in units of the last interval.
+    first, second = (
+        phase.motion(part).at(np.array([place * part[0]]))
+        for (phase, part), place in zip(program.split(x), (1.0, 0.0), strict=True)
+    )
+    interval = DURATION * np.diff(program.phases[0].breaks)[-1]
+    gaps = [interval**k * (first[k][0, 1] - second[k][0, 1]) for k in orders]
+    np.testing.assert_allclose(program.rows(x)[linked], gaps, rtol=1e-9)
+    for phase, free in zip(program.phases, (False, knots == "free"), strict=True):
+        assert (len(phase.grid.lower) > 0) == free, "a given s(t) keeps its knots"
+    places = program.jacobian_rows * program.variables + program.jacobian_columns
+    assert len(np.unique(places)) == len(places)
+
+
+def test_mean_over_phases_and_pause_is_the_integral():
+    program = in_two_phases("uniform", points=1001)
+    x = point_in_two_phases(program)
+    (mean,) = program.means
+    sums = 0.0
+    for phase, part in program.split(x):
+        t_norm = np.linspace(0.0, 1.0, 4001)
+        state = phase.with_points(t_norm).state(part)
+        values = mean.values(state)
+        sums = sums + simpson(values, x=t_norm * part[0], axis=0)
+        if phase.pause:
+            still = np.zeros_like(state.q[-1:])
+            robot = phase.joint_map.robot
+            load = rigid_torque(robot, state.q[-1:], still, still)[0]
+            sums = sums + PAUSE * (load / 70.0) ** 2
+    np.testing.assert_allclose(
+        program.mean_values(x), sums / program.end_time(x), rtol=1e-6
+    )
+
+
+def test_a_bent_time_law_is_a_spline():
+    phase = at_given_speed("r2", "bent")
+    (x,) = points_at_given_speed(phase, 1)
+    motion = phase.motion(x)
+    assert motion.control_points.shape[0] == 2
+    both = motion.as_spline()
+    assert both.t_end == DURATION
+    curves = BSpline(both.knots, both.control_points.T, both.degree)
+    t = np.linspace(0.0, DURATION, 997)
+    found = curves(t / DURATION)
+    np.testing.assert_allclose(found[:, 0], phase.time_law.at(t)[0], rtol=0, atol=1e-12)
+    rates = curves(t / DURATION, nu=1)[:, 0] / DURATION
+    np.testing.assert_allclose(rates, phase.time_law.at(t)[1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found, motion.at(t)[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("orders", [1, 3])
+def test_a_motion_with_another_start(orders):
+    phase = phase_of("r2", degree=5)
+    (x,) = reachable_points(phase, 1)
+    motion = phase.motion(x)
+    values = np.random.default_rng(2).normal(size=(orders, 3))
+    other = motion.with_start(values)
+    found = other.at(np.zeros(1))
+    for order in range(orders):
+        np.testing.assert_allclose(found[order][0], values[order], atol=1e-10)
+    np.testing.assert_array_equal(
+        other.control_points[:, orders:], motion.control_points[:, orders:]
+    )
+    assert np.abs(found[0][0] - motion.at(np.zeros(1))[0][0]).max() > 0.01
