@@ -199,7 +199,8 @@ class SplineSettings(Model):
     """Degree of the splines; 3 gives continuous torque, 4 continuous torque rate."""
     intervals: Intervals = "auto"
     """Number of knot intervals of every phase. auto halves the intervals that lose most time, until two rounds together
-    gain less than half the tolerance. A number makes planning faster and the motion slower. knots: free needs a number."""
+    gain less than half the tolerance. A number makes planning faster and the motion slower. knots: free needs a
+    number."""
     tolerance: Positive = Field(default=1.0e-3, le=0.1)
     """With intervals: auto, the accepted loss against very many intervals, as a fraction of the end time t_E."""
     knots: Literal["uniform", "free"] = "uniform"
@@ -207,8 +208,8 @@ class SplineSettings(Model):
     shortest_interval: Positive = Field(default=0.1, lt=1.0)
     """With knots: free, the shortest interval as a fraction of the mean one; never less than 5e-5 t_E."""
     rest: Literal["velocity", "full", "jerk"] = "full"
-    """What is zero at both ends and at stops. velocity: the velocity. full: velocity and acceleration. jerk: velocity, acceleration,
-    jerk, and with them the torque rates; needs degree >= 4."""
+    """What is zero at both ends and at stops. velocity: the velocity. full: velocity and acceleration. jerk: velocity,
+    acceleration, jerk, and with them the torque rates; needs degree >= 4."""
     points_per_interval: Count = Field(default=3, ge=1, le=100)
     """Collocation points per knot interval."""
 
