@@ -48,7 +48,8 @@ def starting_point(
     ):
         for fit in (_smooth, _follow):
             with contextlib.suppress(UnreachableError):
-                parts.append(_scale_time(phase, fit(phase, joint_path, duration)))
+                x = fit(phase, joint_path, duration)
+                parts.append(_scale_time(phase, x, (0, 0)))
                 break
         else:
             return None
@@ -146,20 +147,21 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
         A collocation point is out of the branch's reach.
     """
     return np.concatenate(
-        [_scale_time(phase, part) for phase, part in program.split(x)]
+        [
+            _scale_time(phase, part, program.held_orders(number))
+            for number, (phase, part) in enumerate(program.split(x))
+        ]
     )
 
 
-def _scale_time(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Scale the time of a phase; see `shortest_time`."""
+def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarray:
+    """Scale the time of a phase; see `shortest_time` and `Phase.with_time_scaled`."""
     if phase.time_law is not None:
         phase.state(x)
         return x
 
     def scale(x: np.ndarray, factor: float) -> np.ndarray:
-        x = x.copy()
-        x[0] *= factor
-        return x
+        return phase.with_time_scaled(x, factor, held)
 
     best = x
     least = np.inf

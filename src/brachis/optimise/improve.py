@@ -269,9 +269,7 @@ class SolverSession:
         # Only the time that is not given can get shorter.
         share = program.free_time(x) / program.end_time(x) or 1.0
         progress = share * self.options.progress
-        options = dataclasses.replace(
-            self.options, time_limit=left, progress=progress
-        )
+        options = dataclasses.replace(self.options, time_limit=left, progress=progress)
         report = self.backend.solve(program, x, options, self.progress)
         if report.status.usable or report.violation > self.acceptable:
             return report

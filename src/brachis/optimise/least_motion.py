@@ -42,7 +42,7 @@ _KEPT_BACK = 0.1 * tolerances.END_TIME
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
 _FOR_MANY = "ipopt"
-"""With more than 150 variables a phase active sets take seconds an iteration; a few iterations of an interior point do."""
+"""With more than 150 variables a phase active sets take seconds an iteration; a few steps of an interior point do."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

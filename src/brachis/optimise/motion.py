@@ -23,8 +23,8 @@ from brachis.trajectory import PhaseSpline
 
 _S_MISS = 1e-12
 """By which s may miss what is given of it."""
-_RATE_MISS = 1e-9
-"""By which ds/dt may, per duration."""
+_LOOKS = 5
+"""Times in every interval at which s is compared."""
 
 
 def bisect(
@@ -141,18 +141,17 @@ class Motion(Summary):
         for _ in range(12):
             knots = clamped_knots(self.degree, breaks)
             points = self._interpolate_given(knots)
-            t_norm = spread(breaks, 5)
+            t_norm = spread(breaks, _LOOKS)
             basis = LocalBasis.of(knots, self.degree, t_norm)
-            found = basis.curves(points[None])[:2, :, 0]
-            wanted = self.time_law.at(t_norm * self.t_end)[:2]
-            miss = np.abs(found - wanted * [[1.0], [self.t_end]]).max(axis=1)
-            if (miss < [_S_MISS, _RATE_MISS]).all():
-                others = insert_knots(
-                    self.control_points, self.knots, knots, self.degree
-                )
-                both = np.vstack([points, others])
+            found = basis.curves(points[None])[0, :, 0]
+            miss = np.abs(found - self.time_law.at(t_norm * self.t_end)[0])
+            worst = miss[:-1].reshape(-1, _LOOKS).max(axis=1)
+            if worst.max() < _S_MISS:
+                finer = (self.control_points, self.knots, knots, self.degree)
+                both = np.vstack([points, insert_knots(*finer)])
                 return PhaseSpline(self.t_end, knots, self.degree, both)
-            breaks = spread(breaks, 2)
+            middles = 0.5 * (breaks[:-1] + breaks[1:])
+            breaks = np.union1d(breaks, middles[worst >= _S_MISS])
         raise UnreachableError("the given speed changes too sharply for splines")
 
     def _interpolate_given(self, knots: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ Slopes of the limits by y and its derivatives come from the `evaluator`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,12 @@ import numpy as np
 from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit, Moments, Partials, Role
 from brachis.limits.safeguards import MARGIN, build_branch_margins
-from brachis.optimise.boundary import Boundary, LocalBasis
+from brachis.optimise.boundary import (
+    Boundary,
+    BoundarySpline,
+    EndCondition,
+    LocalBasis,
+)
 from brachis.optimise.bspline import ORDERS
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.grid import FixedGrid, FreeGrid
@@ -216,6 +222,38 @@ class Phase:
         given = given_orders(self.time_law, self.grid.t_norm_at(h))
         factor = 0.0 if is_slope else 1.0
         return np.concatenate([*(factor * part for part in given), own], axis=2)
+
+    def with_time_scaled(
+        self, x: np.ndarray, factor: float, held: tuple[int, int] = (0, 0)
+    ) -> np.ndarray:
+        """Return the same motion, longer by a factor; a duration that is given stays.
+
+        Parameters
+        ----------
+        x : (v,) ndarray
+        factor : float
+        held : tuple of int, optional
+            So many time derivatives of the redundant joints stay at start and end. What they change fades from there.
+        """
+        if self.time_law is not None:
+            return x
+        scaled = x.copy()
+        scaled[0] *= factor
+        if not any(held):
+            return scaled
+        motion = self.motion(scaled)
+        before = self.motion(x)
+        curves = np.array(before.at(np.array([0.0, before.t_end])))
+        points = motion.control_points.copy()
+        for j in range(1, len(points)):
+            sides = []
+            for end, order in enumerate(held):
+                orders = np.arange(1, order + 1)
+                lost = curves[orders, end, j] * (1.0 - 1.0 / factor**orders)
+                sides.append(EndCondition(0.0, lost))
+            change = BoundarySpline.between(motion.knots, self.degree, *sides)
+            points[j] += change.given_points(motion.t_end)
+        return self.variables_from(replace(motion, control_points=points))
 
     def variables_from(self, motion: Motion) -> np.ndarray:
         """Point x nearest to given curves over the same knots, or over as many where these are free."""

@@ -228,10 +228,26 @@ class Program(Summary):
 
     def with_time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
         """Return the same motion, every phase longer by a factor whose duration is not given."""
-        x = x.copy()
-        pairs = zip(self.phases, self._durations, strict=True)
-        x[[first for phase, first in pairs if phase.time_law is None]] *= factor
-        return x
+        return np.concatenate(
+            [
+                phase.with_time_scaled(part, factor, self.held_orders(number))
+                for number, (phase, part) in enumerate(self.split(x))
+            ]
+        )
+
+    def held_orders(self, number: int) -> tuple[int, int]:
+        """Return the highest derivatives that links to phases of given duration hold at start and end of a phase."""
+        first = [
+            max(link.orders)
+            for link in self.links
+            if link.after == number and self.phases[link.before].time_law is not None
+        ]
+        last = [
+            max(link.orders)
+            for link in self.links
+            if link.before == number and self.phases[link.after].time_law is not None
+        ]
+        return max(first, default=0), max(last, default=0)
 
     def objective(self, x: np.ndarray) -> float:
         """Value to be minimised; raises UnreachableError as `states` does where it depends on the joints."""
