@@ -161,6 +161,7 @@ def breaks_of(problem: Problem) -> np.ndarray:
     intervals = problem.task.spline.intervals
     count = COARSE_INTERVALS if intervals == "auto" else intervals
     if intervals == "auto" and any(problem.time_laws):
-        # The way to a given speed may be short: over few intervals no motion reaches it.
-        count *= 2
+        # The way to a given speed may be short: over few intervals no motion reaches it. With several redundant joints
+        # a solve takes too long over many.
+        count = 20 if problem.robot.n - problem.task_map.m <= 1 else 12
     return np.linspace(0.0, 1.0, count + 1)

@@ -13,6 +13,7 @@ friction a part near the path's end may be passed faster.
 from __future__ import annotations
 
 import itertools
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -357,7 +358,9 @@ def explain_speeds(
             share = _largest_share(check.allows, share, enough)
             best = check
     assert best is not None
-    return _explain(best, share)
+    failure = _explain(best, share)
+    # A refusal is to be quick: the number that it names is an estimate, and no plan is made to check it.
+    return failure if are_tried else dataclasses.replace(failure, remedies=())
 
 
 def _explain(check: _SpeedCheck, share: float) -> Failure:
@@ -396,10 +399,10 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         f"the {speed.name} is too high {why}",
         where=speed.key,
         found=str(speed),
-        needed=f"about {most} along the best joint path that was found"
+        needed=f"about {most} along the best joint path that was found (estimate)"
         if check.is_redundant
         else f"no more than {most} (estimate)",
-        hint="Raise the limits that hold the motion back",
+        hint="Lower the speed, or raise the limits that hold the motion back",
         remedies=[
             Remedy(each.key, each.figure, most, each.unit)
             for each, most in ((check.speeds[i], most) for i, most in possible.items())
