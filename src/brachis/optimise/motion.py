@@ -21,7 +21,7 @@ from brachis.optimise.bspline import (
 from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
 
-_S_MISS = 1e-12
+_S_MISS = 2e-13
 """By which s may miss what is given of it."""
 _LOOKS = 5
 """Times in every interval at which s is compared."""
