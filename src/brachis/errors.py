@@ -51,12 +51,15 @@ class Remedy:
     guess : float
         A number that may be enough.
     unit : str
+    is_known : bool
+        Whether the guess is as near to what is asked as it can be.
     """
 
     key: str
     asked: float
     guess: float
     unit: str = ""
+    is_known: bool = False
 
     @property
     def verb(self) -> str:

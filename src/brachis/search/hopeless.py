@@ -13,7 +13,6 @@ friction a part near the path's end may be passed faster.
 from __future__ import annotations
 
 import itertools
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -358,9 +357,7 @@ def explain_speeds(
             share = _largest_share(check.allows, share, enough)
             best = check
     assert best is not None
-    failure = _explain(best, share)
-    # A refusal is to be quick: the number that it names is an estimate, and no plan is made to check it.
-    return failure if are_tried else dataclasses.replace(failure, remedies=())
+    return _explain(best, share)
 
 
 def _explain(check: _SpeedCheck, share: float) -> Failure:
@@ -402,9 +399,9 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         needed=f"about {most} along the best joint path that was found (estimate)"
         if check.is_redundant
         else f"no more than {most} (estimate)",
-        hint="Lower the speed, or raise the limits that hold the motion back",
+        hint="Raise the limits that hold the motion back",
         remedies=[
-            Remedy(each.key, each.figure, most, each.unit)
+            Remedy(each.key, each.figure, most, each.unit, is_known=True)
             for each, most in ((check.speeds[i], most) for i, most in possible.items())
         ],
     )

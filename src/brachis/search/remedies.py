@@ -151,6 +151,8 @@ def _bracket(
             break
         if is_enough(value, 1):
             good = value
+            if remedy.is_known and bad == remedy.asked:
+                break
         else:
             bad = value
         if good is None:
