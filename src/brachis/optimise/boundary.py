@@ -94,11 +94,7 @@ class BoundarySpline:
 
     def given_points(self, duration: float, *, slope: bool = False) -> np.ndarray:
         """Return what the control points (N + d,) have besides the free variables; or its slope by the duration, s."""
-        powers = np.arange(len(self.given))
-        if slope:
-            factors = powers[1:] * duration ** powers[:-1]
-            return np.asarray(factors @ self.given[1:])
-        return np.asarray(duration**powers @ self.given)
+        return sum_powers(self.given, duration, slope=slope)
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
@@ -111,6 +107,16 @@ class BoundarySpline:
         is_alone &= self.matrix.max(axis=1, initial=0.0) == 1.0
         own = self.matrix[is_alone]
         return np.asarray(own_part[is_alone] @ own / own.sum(axis=0))
+
+
+def sum_powers(
+    terms: np.ndarray, duration: float, *, slope: bool = False
+) -> np.ndarray:
+    """Add up terms, (1 + k, p), times the powers of a duration, s; or return the slope of the sum by the duration."""
+    powers = np.arange(len(terms))
+    if slope:
+        return np.asarray((powers[1:] * duration ** powers[:-1]) @ terms[1:])
+    return np.asarray(duration**powers @ terms)
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:

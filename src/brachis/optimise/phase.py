@@ -31,7 +31,7 @@ from brachis.optimise.bspline import ORDERS
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.grid import FixedGrid, FreeGrid
 from brachis.optimise.layout import Layout
-from brachis.optimise.motion import Motion, given_orders, per_second
+from brachis.optimise.motion import Motion, per_second, sample_law
 
 
 class Means(NamedTuple):
@@ -219,7 +219,7 @@ class Phase:
         """
         h = self._h(x)
         own = self.grid.basis(h).curves(control_points)
-        given = given_orders(self.time_law, self.grid.t_norm_at(h))
+        given = sample_law(self.time_law, self.grid.t_norm_at(h))
         factor = 0.0 if is_slope else 1.0
         return np.concatenate([*(factor * part for part in given), own], axis=2)
 

@@ -59,12 +59,9 @@ class Link:
 
     def rows(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
         """Values of the rows, by order and curve; `parts` are all phases, with their variables."""
-        last, first = (
-            _curves_at(*parts[number], point)[
-                np.ix_(list(self.orders), list(self.curves))
-            ]
-            for number, point in ((self.before, -1), (self.after, 0))
-        )
+        chosen = np.ix_(self.orders, self.curves)
+        last = _curves_at(*parts[self.before], -1)[chosen]
+        first = _curves_at(*parts[self.after], 0)[chosen]
         return np.asarray((self._scales(*parts[self.before]) * (last - first)).ravel())
 
     def pattern(
@@ -91,7 +88,7 @@ class Link:
     def jacobian(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,)."""
         orders = np.array(self.orders)
-        chosen = np.ix_(list(self.orders), list(self.curves))
+        chosen = np.ix_(self.orders, self.curves)
         phase, x = parts[self.before]
         after, x_after = parts[self.after]
         scales = self._scales(phase, x)
@@ -237,17 +234,14 @@ class Program(Summary):
 
     def held_orders(self, number: int) -> tuple[int, int]:
         """Return the highest derivatives that links to phases of given duration hold at start and end of a phase."""
-        first = [
-            max(link.orders)
-            for link in self.links
-            if link.after == number and self.phases[link.before].time_law is not None
-        ]
-        last = [
-            max(link.orders)
-            for link in self.links
-            if link.before == number and self.phases[link.after].time_law is not None
-        ]
-        return max(first, default=0), max(last, default=0)
+        first = 0
+        last = 0
+        for link in self.links:
+            if link.after == number and self.phases[link.before].time_law is not None:
+                first = max(first, *link.orders)
+            if link.before == number and self.phases[link.after].time_law is not None:
+                last = max(last, *link.orders)
+        return first, last
 
     def objective(self, x: np.ndarray) -> float:
         """Value to be minimised; raises UnreachableError as `states` does where it depends on the joints."""

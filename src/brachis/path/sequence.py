@@ -163,14 +163,12 @@ class SequencePath:
     @property
     def knots(self) -> Array:
         """Values of s between which the path is analytic, from its begin to its end."""
-        inner = [
-            begin
-            + (knots[(knots > piece.first) & (knots < piece.last)] - piece.first)
-            / self.total
-            for begin, piece in zip(self.breaks, self.pieces, strict=False)
-            for knots in (piece.curve.knots,)
-        ]
-        return np.unique(np.concatenate([self.breaks, *inner]))
+        found = [self.breaks]
+        for begin, piece in zip(self.breaks[:-1], self.pieces, strict=True):
+            sigma = piece.curve.knots
+            inside = sigma[(sigma > piece.first) & (sigma < piece.last)]
+            found.append(begin + (inside - piece.first) / self.total)
+        return np.unique(np.concatenate(found))
 
     def between(self, begin: float, end: float) -> Self:
         """Return the part from s = `begin` to `end`, in the same s; see `brachis.path.protocol.Path`."""

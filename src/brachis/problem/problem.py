@@ -83,8 +83,8 @@ class Problem(Summary):
         ----------
         robot : Robot
         task : Task
-        further : sequence of LimitModel, optional
-            Limits of the user's own.
+        user_limits : sequence of LimitModel, optional
+            Limits that are not in the task.
 
         Raises
         ------
@@ -134,13 +134,9 @@ class Problem(Summary):
 
         It is 0 at rest, and at the ends of a periodic motion without a given speed there.
         """
-        joints = [
-            self._rate_between(before, before + 1)
-            for before in range(len(self.legs) - 1)
-        ]
         first, last = self.end_rates
-        rates = [first, *joints, last]
-        return tuple(pairwise(rates))
+        inner = [self._rate_between(*pair) for pair in pairwise(range(len(self.legs)))]
+        return tuple(pairwise([first, *inner, last]))
 
     @cached_property
     def given_time(self) -> float:

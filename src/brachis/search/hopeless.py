@@ -13,10 +13,9 @@ friction a part near the path's end may be passed faster.
 from __future__ import annotations
 
 import itertools
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -30,7 +29,7 @@ from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
 from brachis.search.phase_plane import (
     PhasePlane,
-    given_motion,
+    follow_law,
     postures_along,
     spread_stations,
     stations_on,
@@ -240,7 +239,7 @@ class _SpeedCheck:
         plane = self._planes[speed.leg]
         law = self.problem.time_laws[speed.leg]
         if law is not None:
-            _, rate, acceleration = given_motion(law, plane.s)
+            _, rate, acceleration = follow_law(law, plane.s)
             return plane.speed_factor(rate, acceleration)
         assert speed.side is not None
         largest, label = plane.largest_rate(speed.side)
@@ -350,8 +349,7 @@ def explain_speeds(
         check = _SpeedCheck(start, speeds, s, q)
         # The phase plane is exact without other joint paths, and without friction that helps to brake.
         is_exact = not check.is_redundant and not has_friction
-        enough = _EXACT if is_exact else _UNLIKELY
-        enough = 1.0 if are_tried else enough
+        enough = 1.0 if are_tried else (_EXACT if is_exact else _UNLIKELY)
         if not check.allows(_LEAST) or check.allows(enough):
             return None
         if best is None or check.allows(share):
@@ -360,7 +358,7 @@ def explain_speeds(
     assert best is not None
     failure = _explain(best, share)
     # A refusal is to be quick: the number that it names is an estimate, and no plan is made to check it.
-    return failure if are_tried else dataclasses.replace(failure, remedies=())
+    return failure if are_tried else replace(failure, remedies=())
 
 
 def _explain(check: _SpeedCheck, share: float) -> Failure:
@@ -393,6 +391,10 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         for each, own in shares.items()
         if own < _EXACT or each == number
     }
+    remedies = []
+    for each, figure in possible.items():
+        own = check.speeds[each]
+        remedies.append(Remedy(own.key, own.figure, figure, own.unit))
     speed = check.speeds[number]
     most = f"{possible[number]:g} {speed.unit}"
     return Failure(
@@ -403,10 +405,7 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         if check.is_redundant
         else f"no more than {most} (estimate)",
         hint="Lower the speed, or raise the limits that hold the motion back",
-        remedies=[
-            Remedy(each.key, each.figure, most, each.unit)
-            for each, most in ((check.speeds[i], most) for i, most in possible.items())
-        ],
+        remedies=remedies,
     )
 
 

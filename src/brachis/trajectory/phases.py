@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common.arrays import bisect
 from brachis.common.summary import Summary
 from brachis.task import ProcessSpeed
 
@@ -56,14 +57,8 @@ class PhaseSpline(Summary):
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-        low = np.zeros(len(s))
-        high = np.full(len(s), self.t_end)
-        for _ in range(45 if len(s) else 0):  # to 3e-14 of the duration
-            middle = 0.5 * (low + high)
-            before = self.at(middle)[0][:, 0] < s
-            low = np.where(before, middle, low)
-            high = np.where(before, high, middle)
-        return np.asarray(0.5 * (low + high))
+        end = np.full(len(s), self.t_end)
+        return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
 
 
 @dataclass(frozen=True)
@@ -165,11 +160,11 @@ def split_splines(
     """
     outer = degree + 1
     begins = np.append(0.0, phase_ends[:-1])
-    places = phase_places(knots, degree)
+    numbers = find_phase_knots(knots, degree)
     splines = []
     for number, (begin, end) in enumerate(zip(begins, phase_ends, strict=True)):
-        first = places[number]
-        last = places[number + 1] + outer
+        first = numbers[number]
+        last = numbers[number + 1] + outer
         own = (knots[first:last] * phase_ends[-1] - begin) / (end - begin)
         own[:outer] = 0.0
         own[-outer:] = 1.0
@@ -202,12 +197,13 @@ def times_of_knots(
 ) -> np.ndarray:
     """Return joined knots in s; those where phases meet are exactly the ends of the phases, (P,), s."""
     times = knots * phase_ends[-1]
-    for place, end in zip(phase_places(knots, degree)[1:], phase_ends, strict=True):
-        times[place : place + degree + 1] = end
+    numbers = find_phase_knots(knots, degree)
+    for first, end in zip(numbers[1:], phase_ends, strict=True):
+        times[first : first + degree + 1] = end
     return times
 
 
-def phase_places(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Places in a joined knot vector, (P + 1,), of the first of each degree + 1 equal knots."""
+def find_phase_knots(knots: np.ndarray, degree: int) -> np.ndarray:
+    """Find the numbers, (P + 1,), of the first of each degree + 1 equal knots in a joined knot vector."""
     same = knots[degree:] == knots[: len(knots) - degree]
     return np.flatnonzero(same)

@@ -53,12 +53,10 @@ def check_stops(given: Given) -> list[Check]:
         ),
         ("jerk", states.qdddot / (1.0 + jerks), None, options.rest_jerk_tolerance),
     )
-    for name, values, kind, allowed in derivatives[
-        : max(given.task.spline.vanishing, 1)
-    ]:
-        checks.append(
-            _check_joints(given, f"{name} at stops", values, states.t, kind, allowed)
-        )
+    count = max(given.task.spline.vanishing, 1)
+    for name, values, kind, allowed in derivatives[:count]:
+        found = (values, states.t, kind, allowed)
+        checks.append(_check_joints(given, f"{name} at stops", *found))
     moved = [
         given.during(phase.begin, phase.end).states
         for leg in stops
@@ -67,8 +65,7 @@ def check_stops(given: Given) -> list[Check]:
     if moved:
         speeds = np.concatenate([each.qdot for each in moved])
         times = np.concatenate([each.t for each in moved])
-        allowed = options.rest_velocity_tolerance
-        found = (speeds, times, "velocity", allowed)
+        found = (speeds, times, "velocity", options.rest_velocity_tolerance)
         checks.append(_check_joints(given, "velocity in dwells", *found))
     return checks
 
