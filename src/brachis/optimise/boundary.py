@@ -48,7 +48,7 @@ class BoundarySpline:
     matrix : (N + d, free) ndarray
         S.
     given : (1 + k, N + d) ndarray
-        What the control points have besides, by powers of the duration.
+        Given terms of the control points, by powers of the duration.
     """
 
     knots: np.ndarray
@@ -93,7 +93,7 @@ class BoundarySpline:
         return greville(self.knots, self.degree)
 
     def given_points(self, duration: float, *, slope: bool = False) -> np.ndarray:
-        """Return what the control points (N + d,) have besides the free variables; or its slope by the duration, s."""
+        """Return the given part of the control points, (N + d,); or its slope by the duration, s."""
         return sum_powers(self.given, duration, slope=slope)
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:

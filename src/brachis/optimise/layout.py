@@ -38,7 +38,7 @@ class Progress:
     Attributes
     ----------
     given : (1 + k, p) ndarray
-        What the rows are besides the free variables, by powers of the duration.
+        Given terms of the rows, by powers of the duration.
     row, variable : (z,) int ndarray
         Entries of the Jacobian, each place once; variables of the phase, the duration among them.
     weight : (z,) ndarray

@@ -73,7 +73,7 @@ class Motion(Summary):
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), in seconds.
 
-        At knots those behind them.
+        At knots those just after them.
         """
         t_norm = t / self.t_end
         basis = LocalBasis.of(self.knots, self.degree, t_norm)

@@ -454,8 +454,7 @@ class Phase:
         given = [spline.given_points(x[0], slope=True) for spline in self.splines]
         rates = np.reshape(given, (len(self.splines), self.intervals + self.degree))
         moving = per_second(self._orders(x, rates, is_slope=True), x[0])
-        curves = (state.y, state.ydot, state.yddot, state.ydddot)
-        pairs = zip(moving, curves, strict=True)
+        pairs = zip(moving, state.curves, strict=True)
         return [rate - i / x[0] * part for i, (rate, part) in enumerate(pairs)]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:

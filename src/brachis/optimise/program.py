@@ -102,9 +102,7 @@ class Link:
 
 def _curves_at(phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
     """Value and time derivatives of all curves at a collocation point, (4, c)."""
-    state = phase.state(x)
-    curves = (state.y, state.ydot, state.yddot, state.ydddot)
-    return np.array([own[point] for own in curves])
+    return np.array([own[point] for own in phase.state(x).curves])
 
 
 class Program(Summary):

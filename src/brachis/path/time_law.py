@@ -30,7 +30,7 @@ DEGREE = 5
 _ACCURACY = 2e-10
 """Largest relative deviation from the speed, but for the rounding of times."""
 _LEAST_ACCURACY = 1e-7
-"""The same with rounding, which counts where the path turns within micrometres."""
+"""The same with the rounding of times, which matters where the path turns within micrometres."""
 _MOST_INTERVALS = 20_000
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 

@@ -42,7 +42,7 @@ _TINY = 1e-9
 _STATIONS = 401
 """Stations along a joint path of a guess."""
 _LEAST_STATIONS = 41
-"""Stations along a leg, at least."""
+"""Fewest stations along a leg."""
 _NEAR = 1e-4
 """Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
 _ROUNDING = 1e-6

@@ -2,8 +2,8 @@
 
 A motion is a list of phases. One ends where the tool stops, where a wait is over, and where a given speed begins or
 ends. In each phase the curves are B-splines over its own normalised time. One spline over the time of the whole motion
-has their knots, and those where phases meet degree + 1 times: the pieces on both sides share no control point. Its
-value at such a knot is that behind it.
+has their knots, and those where phases meet degree + 1 times: the pieces on both sides share no control point. At
+such a knot it has the value after it.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class PhaseSpline(Summary):
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), s.
 
-        At knots those behind them.
+        At knots those just after them.
         """
         from scipy.interpolate import BSpline
 
@@ -63,7 +63,7 @@ class PhaseSpline(Summary):
 
 @dataclass(frozen=True)
 class MotionPhase:
-    """What a phase of a motion is.
+    """A phase of a motion: its times, its part of the path, and its given speed.
 
     Attributes
     ----------

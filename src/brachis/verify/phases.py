@@ -13,10 +13,9 @@ from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
 
 _DWELL = 1e-9
-"""s: a dwell that is so much longer or shorter is as long as asked; end times are known to 1e-15 of themselves."""
+"""Largest deviation of a dwell from the time asked for, by rounding, s."""
 _SPEED = 1e-6
-"""Relative deviation from a given speed that passes: s(t) is given, so that only rounding and what lies between the
-nodes is left."""
+"""Largest relative deviation from a given speed: by rounding, and by interpolation between nodes."""
 _RESOLUTION = 1e-3
 """Deviations are searched in this unit: `worst_between` tells values apart that differ by 5e-6 units."""
 
