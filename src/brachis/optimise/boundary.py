@@ -229,6 +229,11 @@ class Boundary:
         return replace(self, start=sides[0], end=sides[1])
 
     @property
+    def given(self) -> int:
+        """Number of curves that are given and have no spline: 1 with a time law, else 0."""
+        return int(self.time_law is not None)
+
+    @property
     def ahead(self) -> np.ndarray:
         """By how much the end is ahead of the start, (c,); zero where that is free."""
         pairs = zip(self.start, self.end, strict=True)
@@ -241,8 +246,7 @@ class Boundary:
             return tuple(
                 periodic(knots, degree, own.value, jump) for own, jump in jumps
             )
-        given = 0 if self.time_law is None else 1
-        pairs = zip(self.start[given:], self.end[given:], strict=True)
+        pairs = zip(self.start[self.given :], self.end[self.given :], strict=True)
         return tuple(BoundarySpline.between(knots, degree, *pair) for pair in pairs)
 
 

@@ -363,7 +363,7 @@ def _continue(motion: Motion, phase: Phase, before: _Part, link: Link | None) ->
     else:
         ends = before.motion.at(np.array([before.motion.t_end]))
         last = np.array([ends[order][0, 1:] for order in link.orders])
-    first = 0 if motion.time_law is None else 1
+    first = phase.boundary.given
     own = motion.at(np.zeros(1))
     given = len(phase.boundary.start[-1].derivatives)
     count = max(len(last), 1 + given)

@@ -13,7 +13,7 @@ from brachis.optimise.phase import Phase
 _CALM = 1e-6
 """Weight of the redundant joints' accelerations where the time is given, s per (rad/s^2)^2 or (m/s^2)^2.
 
-So small that it only chooses among motions that are equally fast.
+Small: it chooses among motions that are about equally fast.
 """
 
 

@@ -400,7 +400,7 @@ class Phase:
         number = range(len(self.t_norm))[point]
         layout = self._layout
         curves = len(self.boundary.start)
-        first = curves - len(self.splines)
+        first = self.boundary.given
         slopes = np.zeros((ORDERS, curves, len(layout.point)))
         slopes[:, :, number] = [own[number] for own in self._by_duration(x)]
         begin = len(self.t_norm)
@@ -433,7 +433,7 @@ class Phase:
         pairs = zip(by, self._by_duration(x), strict=False)
         of_time = sum(np.einsum("kcj,kj->kc", slope, own) for slope, own in pairs)
         of_curves = []
-        first = by[0].shape[2] - len(self.splines)  # a given curve has no variables
+        first = self.boundary.given
         bases = zip(self._layout.patterns, self._bases(x), strict=True)
         for j, (pattern, basis) in enumerate(bases, first):
             values = per_second(basis[:orders], x[0])

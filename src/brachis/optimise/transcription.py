@@ -117,11 +117,8 @@ def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
     """Time derivatives of s that are given at the beginning (side 0) or end (-1) of a leg; empty where free."""
     if _is_at_rest(problem, number, side):
         return np.zeros(problem.task.spline.vanishing)
-    count = len(problem.legs)
-    beside = number - 1 if side == 0 else number + 1
-    if problem.task.boundary.periodic:
-        beside %= count
-    if 0 <= beside < count and beside != number:
+    beside = problem.leg_beside(number, side)
+    if beside not in (None, number):
         time_law = problem.time_laws[beside]
         if time_law is None:
             return np.empty(0)

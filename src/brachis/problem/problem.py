@@ -138,6 +138,13 @@ class Problem(Summary):
         inner = [self._rate_between(*pair) for pair in pairwise(range(len(self.legs)))]
         return tuple(pairwise([first, *inner, last]))
 
+    def leg_beside(self, number: int, side: int) -> int | None:
+        """Return the number of the leg before (side 0) or after (-1) a leg; None where the motion begins or ends."""
+        beside = number - 1 if side == 0 else number + 1
+        if self.task.boundary.periodic:
+            return beside % len(self.legs)
+        return beside if 0 <= beside < len(self.legs) else None
+
     @cached_property
     def given_time(self) -> float:
         """Time that passes at given speeds and in dwells, s."""

@@ -248,9 +248,7 @@ class _SpeedCheck:
 
     def speed_at(self, leg: int, side: int) -> int | None:
         """Return the number of the speed that is given at an end of a leg; None at rest."""
-        beside = leg - 1 if side == 0 else leg + 1
-        if self.problem.task.boundary.periodic:
-            beside %= len(self.problem.legs)
+        beside = self.problem.leg_beside(leg, side)
         for number, speed in enumerate(self.speeds):
             if (speed.leg, speed.side) in ((leg, side), (beside, None)):
                 return number if self.problem.leg_rates[leg][side] else None

@@ -351,12 +351,15 @@ def initial_breaks(start: InitialGuess) -> list[np.ndarray]:
         return breaks
     s = spread_stations(problem)
     q = postures_along(start, s)
-    found = [] if q is None else fastest_times(problem, s, q)
+    if q is None:
+        return breaks
+    found = fastest_times(problem, s, q)
     times = [np.inf if part is None else float(part[1][-1]) for part in found]
-    for number, law in enumerate(problem.time_laws if found else ()):
+    times = [np.inf, *times, np.inf]
+    for number, law in enumerate(problem.time_laws):
         if law is None:
             continue
-        beside = [np.inf, *times, np.inf][number : number + 3 : 2]
+        beside = (times[number], times[number + 2])
         first, last = (0.5 * even[1] * time / law.duration for time in beside)
         breaks[number] = grade_breaks(2 * (len(even) // 2), first, last)
     return breaks
