@@ -28,7 +28,7 @@ from brachis.optimise.phase import Phase
 
 @dataclass(frozen=True)
 class Link:
-    """Where one phase ends, another one begins: some curves have the same values and derivatives there.
+    """Equal values and derivatives of some curves where one phase ends and another one begins.
 
     A row for each of them is the difference of the two, times the duration of a knot interval to the power of the
     derivative's order, which is 0. Along a path with the same joint map on both sides, equal curves are equal motions.

@@ -1,4 +1,4 @@
-"""The legs of a path: the parts that are passed in one go, at a given speed or as fast as the limits allow."""
+"""The legs of a path: parts between stops, each at a given speed or as fast as the limits allow."""
 
 from __future__ import annotations
 

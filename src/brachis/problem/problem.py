@@ -132,7 +132,7 @@ class Problem(Summary):
     def leg_rates(self) -> tuple[tuple[float, float], ...]:
         """ds/dt at begin and end of each leg, 1/s.
 
-        It is 0 at rest, and at the ends of a periodic motion without a given speed there.
+        It is 0 at rest. At the ends of a periodic motion it is 0 if no speed is given there.
         """
         first, last = self.end_rates
         inner = [self._rate_between(*pair) for pair in pairwise(range(len(self.legs)))]

@@ -1,4 +1,4 @@
-"""What no motion along the known joint paths can hold: a mean of loads below what holds the arm, and speeds.
+"""Refuse what no motion along the known joint paths can hold: means of loads, and speeds.
 
 Speeds are given for parts of the path and for its ends. Without friction, where the limits allow a motion and the arm
 can hold its postures, they allow the same motion at a lower speed: (u, x) lies between it and rest (see

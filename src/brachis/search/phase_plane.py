@@ -406,7 +406,7 @@ def _given_guess(start: InitialGuess, leg: int) -> _LegGuess | None:
 
 
 def _moving_ends_guess(start: InitialGuess, leg: int) -> _LegGuess | None:
-    """Curves and duration likewise on a leg between moving ends whose speed is free; None elsewhere."""
+    """Curves, (S, c), at even times, and the duration, s, on a leg with a free speed between moving ends; else None."""
     problem = start.problem
     first, last = problem.leg_rates[leg]
     if problem.time_laws[leg] is not None or first == last == 0.0:
