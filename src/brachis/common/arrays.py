@@ -1,4 +1,4 @@
-"""Arrays that cannot be written to, products of arrays of vectors, and rates along motions."""
+"""Arrays that cannot be written to, vectors, interpolation, bisection, and rates along motions."""
 
 from __future__ import annotations
 
@@ -21,6 +21,27 @@ def interpolate_columns(
 ) -> np.ndarray:
     """Interpolate values (S, c) at s, (S,), linearly at places, (P,)."""
     return np.column_stack([np.interp(places, s, column) for column in values.T])
+
+
+def bisect(
+    is_before: Callable[[np.ndarray], np.ndarray], end: np.ndarray
+) -> np.ndarray:
+    """Find numbers between 0 and `end`, (P,), up to which a condition holds.
+
+    Parameters
+    ----------
+    is_before : callable
+        Tells of trial numbers, (P,), whether they come before the ones that are sought.
+    end : (P,) ndarray
+    """
+    low = np.zeros(len(end))
+    high = end
+    for _ in range(45 if len(end) else 0):  # to 3e-14 of the end
+        middle = 0.5 * (low + high)
+        before = is_before(middle)
+        low = np.where(before, middle, low)
+        high = np.where(before, high, middle)
+    return np.asarray(0.5 * (low + high))
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

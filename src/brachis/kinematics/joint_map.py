@@ -69,6 +69,11 @@ class JointState(SharedTorques):
             return np.full(len(self.y), np.nan)
         return self.y[:, 0]
 
+    @property
+    def curves(self) -> tuple[np.ndarray, ...]:
+        """Value y and three time derivatives of the curves, each (K, c)."""
+        return self.y, self.ydot, self.yddot, self.ydddot
+
     @cached_property
     def derivatives(self) -> JointDerivatives:
         """Exact derivatives."""
@@ -92,7 +97,7 @@ class JointState(SharedTorques):
         def slopes(*curves: np.ndarray) -> tuple[np.ndarray]:
             return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
 
-        return rates(slopes, (self.y, self.ydot, self.yddot, self.ydddot))[0]
+        return rates(slopes, self.curves)[0]
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class BoundarySpline:
     matrix : (N + d, free) ndarray
         S.
     given : (1 + k, N + d) ndarray
-        What the control points have besides, by powers of the duration.
+        Given terms of the control points, by powers of the duration.
     """
 
     knots: np.ndarray
@@ -93,12 +93,8 @@ class BoundarySpline:
         return greville(self.knots, self.degree)
 
     def given_points(self, duration: float, *, slope: bool = False) -> np.ndarray:
-        """Return what the control points (N + d,) have besides the free variables; or its slope by the duration, s."""
-        powers = np.arange(len(self.given))
-        if slope:
-            factors = powers[1:] * duration ** powers[:-1]
-            return np.asarray(factors @ self.given[1:])
-        return np.asarray(duration**powers @ self.given)
+        """Return the given part of the control points, (N + d,); or its slope by the duration, s."""
+        return sum_powers(self.given, duration, slope=slope)
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
@@ -111,6 +107,16 @@ class BoundarySpline:
         is_alone &= self.matrix.max(axis=1, initial=0.0) == 1.0
         own = self.matrix[is_alone]
         return np.asarray(own_part[is_alone] @ own / own.sum(axis=0))
+
+
+def sum_powers(
+    terms: np.ndarray, duration: float, *, slope: bool = False
+) -> np.ndarray:
+    """Add up terms, (1 + k, p), times the powers of a duration, s; or return the slope of the sum by the duration."""
+    powers = np.arange(len(terms))
+    if slope:
+        return np.asarray((powers[1:] * duration ** powers[:-1]) @ terms[1:])
+    return np.asarray(duration**powers @ terms)
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:
@@ -223,6 +229,11 @@ class Boundary:
         return replace(self, start=sides[0], end=sides[1])
 
     @property
+    def given(self) -> int:
+        """Number of curves that are given and have no spline: 1 with a time law, else 0."""
+        return int(self.time_law is not None)
+
+    @property
     def ahead(self) -> np.ndarray:
         """By how much the end is ahead of the start, (c,); zero where that is free."""
         pairs = zip(self.start, self.end, strict=True)
@@ -235,8 +246,7 @@ class Boundary:
             return tuple(
                 periodic(knots, degree, own.value, jump) for own, jump in jumps
             )
-        given = 0 if self.time_law is None else 1
-        pairs = zip(self.start[given:], self.end[given:], strict=True)
+        pairs = zip(self.start[self.given :], self.end[self.given :], strict=True)
         return tuple(BoundarySpline.between(knots, degree, *pair) for pair in pairs)
 
 

@@ -325,8 +325,10 @@ class _Part:
         assert path is not None
         if before is not None:
             joint_map = joint_map.along(path, before.nodes.q[-1])
-            motion = _continue(motion, phase, before, _link_to(solved.program, number))
-        joins = motion.times_of(_inside(path.breaks, motion))
+            motion = _continue(
+                motion, phase, before, _find_link(solved.program, number)
+            )
+        joins = motion.times_of(_select_inside(path.breaks, motion))
         gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
         breaks = np.union1d(motion.breaks, joins[gaps > 1e-7 * motion.t_end])
         jumps = motion.degree < CONTINUOUS_TORQUE
@@ -345,7 +347,7 @@ class _Part:
         return _Part(PhaseSpline(self.pause, knots, degree, points), nodes)
 
 
-def _link_to(program: Program, number: int) -> Link | None:
+def _find_link(program: Program, number: int) -> Link | None:
     """Return the link from the phase before; None without one."""
     pair = (number - 1, number)
     links = (link for link in program.links if (link.before, link.after) == pair)
@@ -361,7 +363,7 @@ def _continue(motion: Motion, phase: Phase, before: _Part, link: Link | None) ->
     else:
         ends = before.motion.at(np.array([before.motion.t_end]))
         last = np.array([ends[order][0, 1:] for order in link.orders])
-    first = 0 if motion.time_law is None else 1
+    first = phase.boundary.given
     own = motion.at(np.zeros(1))
     given = len(phase.boundary.start[-1].derivatives)
     count = max(len(last), 1 + given)
@@ -370,8 +372,8 @@ def _continue(motion: Motion, phase: Phase, before: _Part, link: Link | None) ->
     return motion.with_start(values)
 
 
-def _inside(s: np.ndarray, motion: Motion) -> np.ndarray:
-    """Path coordinates that a motion passes within, of (P,)."""
+def _select_inside(s: np.ndarray, motion: Motion) -> np.ndarray:
+    """Select of path coordinates, (P,), those between the ends of a motion."""
     begin, end = motion.at(np.array([0.0, motion.t_end]))[0][:, 0]
     return s[(s > begin) & (s < end)]
 

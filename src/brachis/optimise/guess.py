@@ -60,7 +60,7 @@ def _smooth(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.
     """Take control points from the joint path."""
     t_norm = greville(phase.knots, phase.degree)
     t_end, points = _motion_along(phase, joint_path, duration, t_norm)
-    own = points[:, points.shape[1] - len(phase.splines) :]
+    own = points[:, phase.boundary.given :]
     return phase.variables_from(Motion(t_end, phase.knots, phase.degree, own.T))
 
 
@@ -126,7 +126,7 @@ def fit_curves(
     """
     basis = basis_matrix(phase.knots, phase.degree, t_norm)
     parts = [np.array([duration])]
-    own = wanted[:, wanted.shape[1] - len(phase.splines) :]
+    own = wanted[:, phase.boundary.given :]
     for spline, values in zip(phase.splines, own.T, strict=True):
         missing = values - basis @ spline.given_points(duration)
         parts.append(np.linalg.lstsq(basis @ spline.matrix, missing, rcond=None)[0])

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.limits import Limit
-from brachis.optimise.boundary import BoundarySpline, SparsityPattern
+from brachis.optimise.boundary import BoundarySpline, SparsityPattern, sum_powers
 from brachis.optimise.grid import FixedGrid
 from brachis.path.time_law import TimeLaw
 
@@ -38,7 +38,7 @@ class Progress:
     Attributes
     ----------
     given : (1 + k, p) ndarray
-        What the rows are besides the free variables, by powers of the duration.
+        Given terms of the rows, by powers of the duration.
     row, variable : (z,) int ndarray
         Entries of the Jacobian, each place once; variables of the phase, the duration among them.
     weight : (z,) ndarray
@@ -72,18 +72,13 @@ class Progress:
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (p,)."""
-        powers = np.arange(len(self.given))
-        parts = np.bincount(
-            self.row,
-            weights=self.weight * x[self.variable],
-            minlength=self.given.shape[1],
-        )
-        return np.asarray(x[0] ** powers @ self.given + parts)
+        terms = self.weight * x[self.variable]
+        parts = np.bincount(self.row, terms, self.given.shape[1])
+        return sum_powers(self.given, x[0]) + parts
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian, (z,)."""
-        powers = np.arange(len(self.given))
-        by_duration = (powers[1:] * x[0] ** powers[:-1]) @ self.given[1:]
+        by_duration = sum_powers(self.given, x[0], slope=True)
         return np.where(self.variable == 0, by_duration[self.row], self.weight)
 
 

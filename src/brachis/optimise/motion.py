@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import bisect
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
 from brachis.optimise.boundary import LocalBasis, greville
@@ -22,30 +22,9 @@ from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
 
 _S_MISS = 2e-13
-"""By which s may miss what is given of it."""
+"""Largest deviation of the spline of s from the time law."""
 _LOOKS = 5
-"""Times in every interval at which s is compared."""
-
-
-def bisect(
-    is_before: Callable[[np.ndarray], np.ndarray], end: np.ndarray
-) -> np.ndarray:
-    """Find numbers between 0 and `end`, (P,), up to which a condition holds.
-
-    Parameters
-    ----------
-    is_before : callable
-        Tells of trial numbers, (P,), whether they come before the ones that are sought.
-    end : (P,) ndarray
-    """
-    low = np.zeros(len(end))
-    high = end
-    for _ in range(45 if len(end) else 0):  # to 3e-14 of the end
-        middle = 0.5 * (low + high)
-        before = is_before(middle)
-        low = np.where(before, middle, low)
-        high = np.where(before, high, middle)
-    return np.asarray(0.5 * (low + high))
+"""Times in each interval at which they are compared."""
 
 
 def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
@@ -53,10 +32,8 @@ def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
     return tuple(part / t_end**order for order, part in enumerate(orders))
 
 
-def given_orders(
-    time_law: TimeLaw | None, t_norm: np.ndarray
-) -> tuple[np.ndarray, ...]:
-    """Value and derivatives of given curves per unit of normalised time, (4, K, 1); none without a time law."""
+def sample_law(time_law: TimeLaw | None, t_norm: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Sample s and its derivatives per unit of normalised time, (4, K, 1); nothing without a time law."""
     if time_law is None:
         return ()
     duration = time_law.duration
@@ -77,7 +54,7 @@ class Motion(Summary):
         In normalised time.
     degree : int
     control_points : (c, N + d) ndarray
-        Of each curve: along a path of s unless a time law gives it, then of each redundant joint in chain order.
+        Of each curve: of s along a path without a time law, then of each redundant joint in chain order.
     time_law : TimeLaw or None
         s(t) where it is given.
     """
@@ -96,11 +73,11 @@ class Motion(Summary):
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), in seconds.
 
-        At knots those behind them.
+        At knots those just after them.
         """
         t_norm = t / self.t_end
         basis = LocalBasis.of(self.knots, self.degree, t_norm)
-        given = given_orders(self.time_law, t_norm)
+        given = sample_law(self.time_law, t_norm)
         orders = np.concatenate([*given, basis.curves(self.control_points)], axis=2)
         return per_second(orders, self.t_end)
 
@@ -126,12 +103,12 @@ class Motion(Summary):
         return replace(self, control_points=points)
 
     def as_spline(self) -> PhaseSpline:
-        """Write all curves as splines; one that is given over more knots, so that it is met to rounding.
+        """Write all curves as splines; with a time law over more knots, so that s follows it to rounding.
 
         Raises
         ------
         UnreachableError
-            What is given is too sharp for splines.
+            The time law bends too sharply for splines.
         """
         if self.time_law is None:
             return PhaseSpline(self.t_end, self.knots, self.degree, self.control_points)
@@ -140,7 +117,7 @@ class Motion(Summary):
         breaks = breaks[np.append(np.diff(breaks) > tolerances.PATH, True)]
         for _ in range(12):
             knots = clamped_knots(self.degree, breaks)
-            points = self._interpolate_given(knots)
+            points = self._interpolate_law(knots)
             t_norm = spread(breaks, _LOOKS)
             basis = LocalBasis.of(knots, self.degree, t_norm)
             found = basis.curves(points[None])[0, :, 0]
@@ -154,8 +131,8 @@ class Motion(Summary):
             breaks = np.union1d(breaks, middles[worst >= _S_MISS])
         raise UnreachableError("the given speed changes too sharply for splines")
 
-    def _interpolate_given(self, knots: np.ndarray) -> np.ndarray:
-        """Control points of the curve that is given, over clamped knots, (N + d,)."""
+    def _interpolate_law(self, knots: np.ndarray) -> np.ndarray:
+        """Control points, (N + d,), of s from the time law, over clamped knots."""
         from scipy.interpolate import make_interp_spline
 
         assert self.time_law is not None

@@ -13,7 +13,7 @@ from brachis.optimise.phase import Phase
 _CALM = 1e-6
 """Weight of the redundant joints' accelerations where the time is given, s per (rad/s^2)^2 or (m/s^2)^2.
 
-It decides only what nothing else does.
+Small: it chooses among motions that are about equally fast.
 """
 
 
@@ -42,8 +42,8 @@ class Objective(Protocol):
 class EndTime:
     """The end time t_E, s: the sum of the durations.
 
-    Where the duration of a phase is given, the mean square of the redundant joints' accelerations is added, with a
-    weight so small that no end time notices it. Many motions are as fast there, and solvers need one that is best.
+    Where the duration of a phase is given, many motions are equally fast, and solvers need a best one. So the mean
+    square of the redundant joints' accelerations is added there, with a small weight.
     """
 
     longest: float = np.inf

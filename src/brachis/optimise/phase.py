@@ -31,7 +31,7 @@ from brachis.optimise.bspline import ORDERS
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.grid import FixedGrid, FreeGrid
 from brachis.optimise.layout import Layout
-from brachis.optimise.motion import Motion, given_orders, per_second
+from brachis.optimise.motion import Motion, per_second, sample_law
 
 
 class Means(NamedTuple):
@@ -219,7 +219,7 @@ class Phase:
         """
         h = self._h(x)
         own = self.grid.basis(h).curves(control_points)
-        given = given_orders(self.time_law, self.grid.t_norm_at(h))
+        given = sample_law(self.time_law, self.grid.t_norm_at(h))
         factor = 0.0 if is_slope else 1.0
         return np.concatenate([*(factor * part for part in given), own], axis=2)
 
@@ -400,7 +400,7 @@ class Phase:
         number = range(len(self.t_norm))[point]
         layout = self._layout
         curves = len(self.boundary.start)
-        first = curves - len(self.splines)
+        first = self.boundary.given
         slopes = np.zeros((ORDERS, curves, len(layout.point)))
         slopes[:, :, number] = [own[number] for own in self._by_duration(x)]
         begin = len(self.t_norm)
@@ -433,7 +433,7 @@ class Phase:
         pairs = zip(by, self._by_duration(x), strict=False)
         of_time = sum(np.einsum("kcj,kj->kc", slope, own) for slope, own in pairs)
         of_curves = []
-        first = by[0].shape[2] - len(self.splines)  # a given curve has no variables
+        first = self.boundary.given
         bases = zip(self._layout.patterns, self._bases(x), strict=True)
         for j, (pattern, basis) in enumerate(bases, first):
             values = per_second(basis[:orders], x[0])
@@ -454,8 +454,7 @@ class Phase:
         given = [spline.given_points(x[0], slope=True) for spline in self.splines]
         rates = np.reshape(given, (len(self.splines), self.intervals + self.degree))
         moving = per_second(self._orders(x, rates, is_slope=True), x[0])
-        curves = (state.y, state.ydot, state.yddot, state.ydddot)
-        pairs = zip(moving, curves, strict=True)
+        pairs = zip(moving, state.curves, strict=True)
         return [rate - i / x[0] * part for i, (rate, part) in enumerate(pairs)]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:

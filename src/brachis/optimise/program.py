@@ -28,7 +28,7 @@ from brachis.optimise.phase import Phase
 
 @dataclass(frozen=True)
 class Link:
-    """Where one phase ends, another one begins: some curves have the same values and derivatives there.
+    """Equal values and derivatives of some curves where one phase ends and another one begins.
 
     A row for each of them is the difference of the two, times the duration of a knot interval to the power of the
     derivative's order, which is 0. Along a path with the same joint map on both sides, equal curves are equal motions.
@@ -59,12 +59,9 @@ class Link:
 
     def rows(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
         """Values of the rows, by order and curve; `parts` are all phases, with their variables."""
-        last, first = (
-            _curves_at(*parts[number], point)[
-                np.ix_(list(self.orders), list(self.curves))
-            ]
-            for number, point in ((self.before, -1), (self.after, 0))
-        )
+        chosen = np.ix_(self.orders, self.curves)
+        last = _curves_at(*parts[self.before], -1)[chosen]
+        first = _curves_at(*parts[self.after], 0)[chosen]
         return np.asarray((self._scales(*parts[self.before]) * (last - first)).ravel())
 
     def pattern(
@@ -91,7 +88,7 @@ class Link:
     def jacobian(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,)."""
         orders = np.array(self.orders)
-        chosen = np.ix_(list(self.orders), list(self.curves))
+        chosen = np.ix_(self.orders, self.curves)
         phase, x = parts[self.before]
         after, x_after = parts[self.after]
         scales = self._scales(phase, x)
@@ -105,9 +102,7 @@ class Link:
 
 def _curves_at(phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
     """Value and time derivatives of all curves at a collocation point, (4, c)."""
-    state = phase.state(x)
-    curves = (state.y, state.ydot, state.yddot, state.ydddot)
-    return np.array([own[point] for own in curves])
+    return np.array([own[point] for own in phase.state(x).curves])
 
 
 class Program(Summary):
@@ -237,17 +232,14 @@ class Program(Summary):
 
     def held_orders(self, number: int) -> tuple[int, int]:
         """Return the highest derivatives that links to phases of given duration hold at start and end of a phase."""
-        first = [
-            max(link.orders)
-            for link in self.links
-            if link.after == number and self.phases[link.before].time_law is not None
-        ]
-        last = [
-            max(link.orders)
-            for link in self.links
-            if link.before == number and self.phases[link.after].time_law is not None
-        ]
-        return max(first, default=0), max(last, default=0)
+        first = 0
+        last = 0
+        for link in self.links:
+            if link.after == number and self.phases[link.before].time_law is not None:
+                first = max(first, *link.orders)
+            if link.before == number and self.phases[link.after].time_law is not None:
+                last = max(last, *link.orders)
+        return first, last
 
     def objective(self, x: np.ndarray) -> float:
         """Value to be minimised; raises UnreachableError as `states` does where it depends on the joints."""

@@ -76,9 +76,9 @@ def maps_by_leg(
     problem: Problem, joint_map: JointMap, starts: np.ndarray
 ) -> list[JointMap]:
     """Take a map of the whole path leg by leg, from the postures, (legs, n), at which these begin."""
-    pairs = zip(problem.leg_paths, starts, strict=True)
     if len(problem.legs) == 1:
         return [joint_map]
+    pairs = zip(problem.leg_paths, starts, strict=True)
     return [joint_map.along(path, start) for path, start in pairs]
 
 
@@ -98,30 +98,27 @@ def _boundary(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
     sides = []
     for side, values in ((0, y_start), (-1, y_end)):
         s_derivatives = _derivatives_of_s(problem, number, side)
-        others = rest if _rests(problem, number, side) else np.empty(0)
+        others = rest if _is_at_rest(problem, number, side) else np.empty(0)
         first = EndCondition(float(values[0]), s_derivatives)
         more = (EndCondition(float(value), others) for value in values[1:])
         sides.append((first, *more))
     return Boundary(sides[0], sides[1], time_law=problem.time_laws[number])
 
 
-def _rests(problem: Problem, number: int, side: int) -> bool:
+def _is_at_rest(problem: Problem, number: int, side: int) -> bool:
     """Tell whether the arm rests at the beginning (side 0) or end (-1) of a leg."""
-    place = number + (0 if side == 0 else 1)
-    if 0 < place < len(problem.legs):
-        return problem.legs[place - 1].stops
+    before = number - 1 if side == 0 else number
+    if 0 <= before < len(problem.legs) - 1:
+        return problem.legs[before].stops
     return not problem.task.boundary.periodic and not problem.leg_rates[number][side]
 
 
 def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
     """Time derivatives of s that are given at the beginning (side 0) or end (-1) of a leg; empty where free."""
-    if _rests(problem, number, side):
+    if _is_at_rest(problem, number, side):
         return np.zeros(problem.task.spline.vanishing)
-    count = len(problem.legs)
-    beside = number - 1 if side == 0 else number + 1
-    if problem.task.boundary.periodic:
-        beside %= count
-    if 0 <= beside < count and beside != number:
+    beside = problem.leg_beside(number, side)
+    if beside not in (None, number):
         time_law = problem.time_laws[beside]
         if time_law is None:
             return np.empty(0)

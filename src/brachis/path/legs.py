@@ -1,4 +1,4 @@
-"""The legs of a path: the parts that are passed in one go, at a given speed or as fast as the limits allow."""
+"""The legs of a path: parts between stops, each at a given speed or as fast as the limits allow."""
 
 from __future__ import annotations
 
@@ -135,9 +135,9 @@ def _check_motion(
     """Refuse a part in which the tool stands still."""
     s = np.linspace(*part.s, 401)
     velocity = tool_derivatives(task_map, path.between(*part.s), s)[0]
-    slowest = np.linalg.norm(velocity, axis=1)
-    worst = int(np.argmin(slowest))
-    if slowest[worst] <= tolerances.LENGTH:
+    speeds = np.linalg.norm(velocity, axis=1)
+    worst = int(np.argmin(speeds))
+    if speeds[worst] <= tolerances.LENGTH:
         raise PathError(
             "the tool has a process speed where its position stands still",
             s_interval=(float(s[worst]), float(s[worst])),

@@ -75,7 +75,7 @@ class Path(Protocol):
         """Return the path at K values of s, shape (K,).
 
         Beyond its ends the path continues as the formula of its first or last piece, so that an optimiser's trial point
-        just outside meets smooth derivatives. At a stop it is the path behind it.
+        just outside meets smooth derivatives. At a stop the path is sampled as it is after the stop.
         """
         ...
 

@@ -96,11 +96,15 @@ class Piece:
         """Range of sigma."""
         return self.last - self.first
 
+    @property
+    def inner_knots(self) -> Array:
+        """The curve's knots between `first` and `last`, without these, sigma."""
+        knots = self.curve.knots
+        return knots[(knots > self.first) & (knots < self.last)]
+
     def arc_length(self, positions: int) -> float:
         """Return the arc length of the position rows by Gauss quadrature between the curve's knots."""
-        knots = self.curve.knots
-        inner = knots[(knots > self.first) & (knots < self.last)]
-        bounds = np.concatenate([[self.first], inner, [self.last]])
+        bounds = np.concatenate([[self.first], self.inner_knots, [self.last]])
         half = np.diff(bounds)[:, None] / 2
         sigma = bounds[:-1, None] + half * (_NODES + 1)
         slope = self.curve.derivatives(sigma.ravel(), 1)[1, :, :positions]
@@ -163,14 +167,10 @@ class SequencePath:
     @property
     def knots(self) -> Array:
         """Values of s between which the path is analytic, from its begin to its end."""
-        inner = [
-            begin
-            + (knots[(knots > piece.first) & (knots < piece.last)] - piece.first)
-            / self.total
-            for begin, piece in zip(self.breaks, self.pieces, strict=False)
-            for knots in (piece.curve.knots,)
-        ]
-        return np.unique(np.concatenate([self.breaks, *inner]))
+        found = [self.breaks]
+        for begin, piece in zip(self.breaks[:-1], self.pieces, strict=True):
+            found.append(begin + (piece.inner_knots - piece.first) / self.total)
+        return np.unique(np.concatenate(found))
 
     def between(self, begin: float, end: float) -> Self:
         """Return the part from s = `begin` to `end`, in the same s; see `brachis.path.protocol.Path`."""

@@ -30,7 +30,7 @@ DEGREE = 5
 _ACCURACY = 2e-10
 """Largest relative deviation from the speed, but for the rounding of times."""
 _LEAST_ACCURACY = 1e-7
-"""The same with rounding, which counts where the path turns within micrometres."""
+"""The same with the rounding of times, which matters where the path turns within micrometres."""
 _MOST_INTERVALS = 20_000
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -46,7 +46,7 @@ class TimeLaw:
     spline : BSpline
         s over t in [0, duration], s.
     ends : (2, 4) ndarray
-        s and three derivatives by time, per second, at the beginning and at the end.
+        s and its first three derivatives by time, per second, at the beginning and at the end.
     """
 
     duration: float
@@ -85,14 +85,14 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
     knots = tool.path.knots
     parts = knots[:-1, None] + np.arange(32) / 32 * np.diff(knots)[:, None]
     distances = tool.slopes(np.append(parts, leg.end))[0]
-    ends = tool.rates(np.array([leg.begin, leg.end])).T
     if np.ptp(distances) <= tolerances.ROUNDING * distances.max():
         duration = float(distances.mean()) * (leg.end - leg.begin) / leg.speed
-        times = [0.0, 0.0, duration, duration]
         rate = (leg.end - leg.begin) / duration
         ends = np.array([[leg.begin, rate, 0.0, 0.0], [leg.end, rate, 0.0, 0.0]])
-        line = BSpline(np.array(times), np.array([leg.begin, leg.end]), 1)
+        times = np.array([0.0, 0.0, duration, duration])
+        line = BSpline(times, ends[:, 0], 1)
         return TimeLaw(duration, line, ends)
+    ends = tool.rates(np.array([leg.begin, leg.end])).T
     breaks = knots
     while True:
         spline = _interpolate(tool, breaks, np.isin(breaks, knots), ends)

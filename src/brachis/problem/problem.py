@@ -83,8 +83,8 @@ class Problem(Summary):
         ----------
         robot : Robot
         task : Task
-        further : sequence of LimitModel, optional
-            Limits of the user's own.
+        user_limits : sequence of LimitModel, optional
+            Limits that are not in the task.
 
         Raises
         ------
@@ -132,15 +132,18 @@ class Problem(Summary):
     def leg_rates(self) -> tuple[tuple[float, float], ...]:
         """ds/dt at begin and end of each leg, 1/s.
 
-        It is 0 at rest, and at the ends of a periodic motion without a given speed there.
+        It is 0 at rest. At the ends of a periodic motion it is 0 if no speed is given there.
         """
-        joints = [
-            self._rate_between(before, before + 1)
-            for before in range(len(self.legs) - 1)
-        ]
         first, last = self.end_rates
-        rates = [first, *joints, last]
-        return tuple(pairwise(rates))
+        inner = [self._rate_between(*pair) for pair in pairwise(range(len(self.legs)))]
+        return tuple(pairwise([first, *inner, last]))
+
+    def leg_beside(self, number: int, side: int) -> int | None:
+        """Return the number of the leg before (side 0) or after (-1) a leg; None where the motion begins or ends."""
+        beside = number - 1 if side == 0 else number + 1
+        if self.task.boundary.periodic:
+            return beside % len(self.legs)
+        return beside if 0 <= beside < len(self.legs) else None
 
     @cached_property
     def given_time(self) -> float:

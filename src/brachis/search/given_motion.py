@@ -53,7 +53,7 @@ def given_guess(
     if motion.joint_names != joints:
         return f"its joints are {', '.join(motion.joint_names)}, the robot's {', '.join(joints)}"
     # The postures over s, and on every leg the time law.
-    splits = np.clip([leg.end for leg in problem.legs[:-1]], 0.0, 1.0)
+    splits = [leg.end for leg in problem.legs[:-1]]
     t = np.linspace(0.0, motion.t_end, 4001)
     passed = np.clip(motion.path_coordinate(t), 0.0, 1.0)
     ends = np.concatenate([[0.0], np.interp(splits, passed, t), [motion.t_end]])

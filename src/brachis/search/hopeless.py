@@ -1,4 +1,4 @@
-"""What no motion along the known joint paths can hold: a mean of loads below what holds the arm, and speeds.
+"""Refuse what no motion along the known joint paths can hold: means of loads, and speeds.
 
 Speeds are given for parts of the path and for its ends. Without friction, where the limits allow a motion and the arm
 can hold its postures, they allow the same motion at a lower speed: (u, x) lies between it and rest (see
@@ -15,7 +15,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -29,7 +29,7 @@ from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
 from brachis.search.phase_plane import (
     PhasePlane,
-    given_motion,
+    follow_law,
     postures_along,
     spread_stations,
     stations_on,
@@ -239,7 +239,7 @@ class _SpeedCheck:
         plane = self._planes[speed.leg]
         law = self.problem.time_laws[speed.leg]
         if law is not None:
-            _, rate, acceleration = given_motion(law, plane.s)
+            _, rate, acceleration = follow_law(law, plane.s)
             return plane.speed_factor(rate, acceleration)
         assert speed.side is not None
         largest, label = plane.largest_rate(speed.side)
@@ -248,9 +248,7 @@ class _SpeedCheck:
 
     def speed_at(self, leg: int, side: int) -> int | None:
         """Return the number of the speed that is given at an end of a leg; None at rest."""
-        beside = leg - 1 if side == 0 else leg + 1
-        if self.problem.task.boundary.periodic:
-            beside %= len(self.problem.legs)
+        beside = self.problem.leg_beside(leg, side)
         for number, speed in enumerate(self.speeds):
             if (speed.leg, speed.side) in ((leg, side), (beside, None)):
                 return number if self.problem.leg_rates[leg][side] else None
@@ -349,8 +347,7 @@ def explain_speeds(
         check = _SpeedCheck(start, speeds, s, q)
         # The phase plane is exact without other joint paths, and without friction that helps to brake.
         is_exact = not check.is_redundant and not has_friction
-        enough = _EXACT if is_exact else _UNLIKELY
-        enough = 1.0 if are_tried else enough
+        enough = 1.0 if are_tried else (_EXACT if is_exact else _UNLIKELY)
         if not check.allows(_LEAST) or check.allows(enough):
             return None
         if best is None or check.allows(share):
@@ -390,6 +387,12 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         for each, own in shares.items()
         if own < _EXACT or each == number
     }
+    remedies = []
+    for each, figure in possible.items():
+        own = check.speeds[each]
+        remedies.append(
+            Remedy(own.key, own.figure, figure, own.unit, is_known=True)
+        )
     speed = check.speeds[number]
     most = f"{possible[number]:g} {speed.unit}"
     return Failure(
@@ -400,10 +403,7 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         if check.is_redundant
         else f"no more than {most} (estimate)",
         hint="Raise the limits that hold the motion back",
-        remedies=[
-            Remedy(each.key, each.figure, most, each.unit, is_known=True)
-            for each, most in ((check.speeds[i], most) for i, most in possible.items())
-        ],
+        remedies=remedies,
     )
 
 

@@ -35,14 +35,14 @@ from brachis.path.legs import Leg
 from brachis.path.time_law import TimeLaw
 from brachis.problem.problem import Problem
 
-_Part = tuple[np.ndarray, float | None]
+_LegGuess = tuple[np.ndarray, float | None]
 """Guess for a leg: curves, (S, c), and duration, s, if these are a motion's at even times."""
 _TINY = 1e-9
 """Coefficients and slopes below this are taken for zero."""
 _STATIONS = 401
 """Stations along a joint path of a guess."""
 _LEAST_STATIONS = 41
-"""Stations along a leg, at least."""
+"""Fewest stations along a leg."""
 _NEAR = 1e-4
 """Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
 _ROUNDING = 1e-6
@@ -96,7 +96,7 @@ def fastest_times(
         plane = PhasePlane(problem.limits, stations, postures)
         times = plane.times(rates) if law is None else None
         if law is not None:
-            times, rate, acceleration = given_motion(law, stations)
+            times, rate, acceleration = follow_law(law, stations)
             if plane.speed_factor(rate, acceleration)[0] < _ROUGH:
                 times = None
         found.append(None if times is None else (stations, times))
@@ -124,7 +124,7 @@ def stations_on(
     return stations, interpolate_columns(stations, s, q)
 
 
-def given_motion(
+def follow_law(
     law: TimeLaw, stations: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find when a time law passes stations, (P,), s, and ds/dt, 1/s, and d2s/dt2, 1/s^2, there."""
@@ -323,7 +323,7 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     """
     parts = start.legs
     legs = range(len(parts))
-    guesses: list[list[_Part]]
+    guesses: list[list[_LegGuess]]
     if start.durations is not None:
         guesses = [list(zip(parts, start.durations, strict=True))]
     else:
@@ -351,12 +351,15 @@ def initial_breaks(start: InitialGuess) -> list[np.ndarray]:
         return breaks
     s = spread_stations(problem)
     q = postures_along(start, s)
-    found = [] if q is None else fastest_times(problem, s, q)
+    if q is None:
+        return breaks
+    found = fastest_times(problem, s, q)
     times = [np.inf if part is None else float(part[1][-1]) for part in found]
-    for number, law in enumerate(problem.time_laws if found else ()):
+    times = [np.inf, *times, np.inf]
+    for number, law in enumerate(problem.time_laws):
         if law is None:
             continue
-        beside = [np.inf, *times, np.inf][number : number + 3 : 2]
+        beside = (times[number], times[number + 2])
         first, last = (0.5 * even[1] * time / law.duration for time in beside)
         breaks[number] = grade_breaks(2 * (len(even) // 2), first, last)
     return breaks
@@ -393,7 +396,7 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
     return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
 
 
-def _given_guess(start: InitialGuess, leg: int) -> _Part | None:
+def _given_guess(start: InitialGuess, leg: int) -> _LegGuess | None:
     """Curves, (S, c), at even times, and the duration, s, on a leg whose speed is given; else None."""
     law = start.problem.time_laws[leg]
     if law is None:
@@ -402,8 +405,8 @@ def _given_guess(start: InitialGuess, leg: int) -> _Part | None:
     return _curves_along(start, s), law.duration
 
 
-def _moving_ends_guess(start: InitialGuess, leg: int) -> _Part | None:
-    """Curves and duration likewise on a leg between moving ends whose speed is free; None elsewhere."""
+def _moving_ends_guess(start: InitialGuess, leg: int) -> _LegGuess | None:
+    """Curves, (S, c), at even times, and the duration, s, on a leg with a free speed between moving ends; else None."""
     problem = start.problem
     first, last = problem.leg_rates[leg]
     if problem.time_laws[leg] is not None or first == last == 0.0:

@@ -2,8 +2,8 @@
 
 A motion is a list of phases. One ends where the tool stops, where a wait is over, and where a given speed begins or
 ends. In each phase the curves are B-splines over its own normalised time. One spline over the time of the whole motion
-has their knots, and those where phases meet degree + 1 times: the pieces on both sides share no control point. Its
-value at such a knot is that behind it.
+has their knots, and those where phases meet degree + 1 times: the pieces on both sides share no control point. At
+such a knot it has the value after it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common.arrays import bisect
 from brachis.common.summary import Summary
 from brachis.task import ProcessSpeed
 
@@ -46,7 +47,7 @@ class PhaseSpline(Summary):
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), s.
 
-        At knots those behind them.
+        At knots those just after them.
         """
         from scipy.interpolate import BSpline
 
@@ -56,19 +57,13 @@ class PhaseSpline(Summary):
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-        low = np.zeros(len(s))
-        high = np.full(len(s), self.t_end)
-        for _ in range(45 if len(s) else 0):  # to 3e-14 of the duration
-            middle = 0.5 * (low + high)
-            before = self.at(middle)[0][:, 0] < s
-            low = np.where(before, middle, low)
-            high = np.where(before, high, middle)
-        return np.asarray(0.5 * (low + high))
+        end = np.full(len(s), self.t_end)
+        return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
 
 
 @dataclass(frozen=True)
 class MotionPhase:
-    """What a phase of a motion is.
+    """A phase of a motion: its times, its part of the path, and its given speed.
 
     Attributes
     ----------
@@ -165,11 +160,11 @@ def split_splines(
     """
     outer = degree + 1
     begins = np.append(0.0, phase_ends[:-1])
-    places = phase_places(knots, degree)
+    numbers = find_phase_knots(knots, degree)
     splines = []
     for number, (begin, end) in enumerate(zip(begins, phase_ends, strict=True)):
-        first = places[number]
-        last = places[number + 1] + outer
+        first = numbers[number]
+        last = numbers[number + 1] + outer
         own = (knots[first:last] * phase_ends[-1] - begin) / (end - begin)
         own[:outer] = 0.0
         own[-outer:] = 1.0
@@ -202,12 +197,13 @@ def times_of_knots(
 ) -> np.ndarray:
     """Return joined knots in s; those where phases meet are exactly the ends of the phases, (P,), s."""
     times = knots * phase_ends[-1]
-    for place, end in zip(phase_places(knots, degree)[1:], phase_ends, strict=True):
-        times[place : place + degree + 1] = end
+    numbers = find_phase_knots(knots, degree)
+    for first, end in zip(numbers[1:], phase_ends, strict=True):
+        times[first : first + degree + 1] = end
     return times
 
 
-def phase_places(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Places in a joined knot vector, (P + 1,), of the first of each degree + 1 equal knots."""
+def find_phase_knots(knots: np.ndarray, degree: int) -> np.ndarray:
+    """Find the numbers, (P + 1,), of the first of each degree + 1 equal knots in a joined knot vector."""
     same = knots[degree:] == knots[: len(knots) - degree]
     return np.flatnonzero(same)

@@ -23,7 +23,7 @@ from brachis.robot.from_task import robot_from_settings
 from brachis.task import load_task
 from brachis.task.fields import LARGEST, Model
 from brachis.task.messages import task_error
-from brachis.trajectory.phases import phase_places
+from brachis.trajectory.phases import find_phase_knots
 from brachis.trajectory.recovered import Recovered, StoredRecovery
 
 SCHEMA = 4
@@ -280,7 +280,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
         allowed=f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_MOST['degree']}",
     )
     inner = knots[degree : len(knots) - degree]
-    ends = knots[phase_places(knots, degree)]
+    ends = knots[find_phase_knots(knots, degree)]
     gaps = np.diff(inner)
     _refuse_unless(
         bool(((gaps >= shortest) | np.isin(inner[1:], ends) & (gaps == 0.0)).all()),

@@ -257,13 +257,13 @@ class Given:
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
-        """Parts of the path that the task has one phase pass each, read anew."""
+        """Legs of the path, found anew from the task."""
         return legs_of(self.task, self.task_map, self.path)
 
     def during(self, begin: float, end: float) -> Given:
-        """Return the same with only the states of the pieces between the times of two nodes, s.
+        """Return the same with only the states of the pieces between two times, s.
 
-        Of times that are no nodes the pieces around them count as well.
+        A piece counts if a part of it lies between them.
         """
         times = self.pieces.times
         rounding = tolerances.TIME * times[-1]

@@ -13,10 +13,9 @@ from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
 
 _DWELL = 1e-9
-"""s: a dwell that is so much longer or shorter is as long as asked; end times are known to 1e-15 of themselves."""
+"""Largest deviation of a dwell from the time asked for, by rounding, s."""
 _SPEED = 1e-6
-"""Relative deviation from a given speed that passes: s(t) is given, so that only rounding and what lies between the
-nodes is left."""
+"""Largest relative deviation from a given speed: by rounding, and by interpolation between nodes."""
 _RESOLUTION = 1e-3
 """Deviations are searched in this unit: `worst_between` tells values apart that differ by 5e-6 units."""
 
@@ -53,12 +52,10 @@ def check_stops(given: Given) -> list[Check]:
         ),
         ("jerk", states.qdddot / (1.0 + jerks), None, options.rest_jerk_tolerance),
     )
-    for name, values, kind, allowed in derivatives[
-        : max(given.task.spline.vanishing, 1)
-    ]:
-        checks.append(
-            _check_joints(given, f"{name} at stops", values, states.t, kind, allowed)
-        )
+    count = max(given.task.spline.vanishing, 1)
+    for name, values, kind, allowed in derivatives[:count]:
+        found = (values, states.t, kind, allowed)
+        checks.append(_check_joints(given, f"{name} at stops", *found))
     moved = [
         given.during(phase.begin, phase.end).states
         for leg in stops
@@ -67,8 +64,7 @@ def check_stops(given: Given) -> list[Check]:
     if moved:
         speeds = np.concatenate([each.qdot for each in moved])
         times = np.concatenate([each.t for each in moved])
-        allowed = options.rest_velocity_tolerance
-        found = (speeds, times, "velocity", allowed)
+        found = (speeds, times, "velocity", options.rest_velocity_tolerance)
         checks.append(_check_joints(given, "velocity in dwells", *found))
     return checks
 

@@ -11,7 +11,7 @@ from brachis.apps.recording.recording import FEWEST_ROWS
 from brachis.common import tolerances
 
 _SLOW = 1e-3
-"""Velocity at a rest, as a part of the largest one, that is rounding."""
+"""Part of the largest velocity up to which a velocity at rest is rounding."""
 
 
 def find_rests(nodes: Nodes) -> list[tuple[int, int]]:

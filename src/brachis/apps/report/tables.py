@@ -192,7 +192,7 @@ def what_limits(motion: ReportedMotion) -> str:
 
 
 def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
-    """List the phases, each with the limits that hold it back; none if there is but one."""
+    """List the phases, each with the limits that hold it back; none of a motion with one phase."""
     phases = limits_by_phase(motion.trajectory, motion.saturations)
     rows = phase_rows(motion.trajectory.phases)
     if len(rows) == 1:

@@ -54,7 +54,7 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
 
 
 def phases_table(trajectory: Trajectory) -> str:
-    """List the phases of the motion; empty if there is but one."""
+    """List the phases of the motion; empty for one phase."""
     rows = phase_rows(trajectory.phases)
     return _table(PHASE_COLUMNS, rows) if len(rows) > 1 else ""
 
