@@ -229,7 +229,7 @@ def test_a_payload_in_g_and_mm(payload, where):
         ),
         (
             {"process_speed": {"speed": 100.0, "s": [0.2, 0.8]}},
-            "tool_limits.process_speed: the limit looks like mm/s",
+            "tool_limits.process_speed: the speed looks like mm/s; found 100 m/s; usual: below 50 m/s",
         ),
         (
             {"acceleration": 1000.0},

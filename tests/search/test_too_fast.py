@@ -139,6 +139,16 @@ def refuse(*_):
     raise TriedError
 
 
+def test_of_two_legs_that_are_too_short_the_worse_one_is_named(monkeypatch):
+    """0.05 m are somewhat too short to reach 0.35 m/s, and 0.0005 m are far too short to leave it."""
+    monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    with pytest.raises(
+        brachis.PlanningError,
+        match=r"s = 0\.5 to 0\.501 is too short to get from 0\.35 m/s to 0\.1 m/s",
+    ):
+        brachis.plan(slide(0.35, (0.1, 0.5), parts=[{"speed": 0.1, "s": [0.501, 0.6]}]))
+
+
 def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
     """25 N brake 25 kg from 0.32 m/s in 0.05 m, and with 10 N of friction from 0.37 m/s."""
 

@@ -35,7 +35,7 @@ _OF_MASS = " for this mass"
 USUAL = {
     # Delta robots move at 10 m/s, and accelerate with 15 g.
     "tool_limits.speed": ("the limit looks like mm/s", 50.0, "m/s", _OR_NULL),
-    "tool_limits.process_speed": ("the limit looks like mm/s", 50.0, "m/s", _OR_NULL),
+    "tool_limits.process_speed": ("the speed looks like mm/s", 50.0, "m/s", ""),
     "tool_limits.acceleration": (
         "the limit looks like mm/s^2",
         300.0,

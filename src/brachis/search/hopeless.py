@@ -371,7 +371,12 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         alone = ((each, check.lower_one(each, 0.9 * share)) for each in numbers)
         shares = {each: _REACHED * own for each, own in alone if own is not None}
         shares = shares or dict.fromkeys(numbers, _REACHED * share)
-        leg = short[0]
+        leg = min(
+            short,
+            key=lambda leg: _largest_share(
+                lambda own: check.pass_leg(leg, own * every) is not None, share, 1.0
+            ),
+        )
         ends = [check.speed_at(leg, side) for side in (0, -1)]
         number = max(shares, key=lambda number: (number in ends, shares[number]))
         first, last = (

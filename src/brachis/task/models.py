@@ -338,11 +338,12 @@ class Task(Model):
                 found=self.path[-1].blend,
                 allowed="no blend on the last segment",
             )
-        if self.path[-1].stop:
+        last = self.path[-1]
+        if last.stop:
             raise refuse(
                 "the last segment cannot stop: the path ends there, and the motion with it",
-                key=f"path[{len(self.path) - 1}].stop",
-                found=True,
+                key=f"path[{len(self.path) - 1}].{'dwell' if last.dwell else 'stop'}",
+                found=last.dwell or True,
                 allowed="no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
             )
         return self.check(

@@ -240,7 +240,9 @@ def _print_fit(fit: FitReport) -> None:
     if corners:
         columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
         print_table(
-            "corners, blended within the tolerance; with blend 0 the tool stops",
+            "corners, rounded within the tolerance"
+            if any(corner.blend for corner in fit.corners)
+            else "corners, at which the tool stops",
             columns,
             corners,
             numbers=columns,
