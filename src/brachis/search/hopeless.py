@@ -15,7 +15,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -395,9 +395,7 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
     remedies = []
     for each, figure in possible.items():
         own = check.speeds[each]
-        remedies.append(
-            Remedy(own.key, own.figure, figure, own.unit, is_known=True)
-        )
+        remedies.append(Remedy(own.key, own.figure, figure, own.unit, is_known=True))
     speed = check.speeds[number]
     most = f"{possible[number]:g} {speed.unit}"
     return Failure(
