@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,19 +31,6 @@ from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.grid import FixedGrid, FreeGrid
 from brachis.optimise.layout import Layout
 from brachis.optimise.motion import Motion, per_second, sample_law
-
-
-class Means(NamedTuple):
-    """Means over a phase of the values that are held as means, and their slopes.
-
-    Attributes
-    ----------
-    values : (m,) ndarray
-    slopes : (m, v) ndarray
-    """
-
-    values: np.ndarray
-    slopes: np.ndarray
 
 
 class Phase:
@@ -315,17 +301,22 @@ class Phase:
         total[:, self._layout.lengths] += values.T @ self.grid.mean_slopes.T
         return total
 
-    def waiting(self, x: np.ndarray) -> Means:
-        """Values that are held as means, and their slopes, while the arm waits at the phase's end."""
-        evaluation = self.evaluate(x)
-        still = Moments.at_rest(evaluation.motion.q[-1:])
+    def values_at_rest(self, x: np.ndarray) -> np.ndarray:
+        """Values that are held as means while the arm waits at the phase's end, (m,)."""
+        still = Moments.at_rest(self.state(x).q[-1:])
         limits = [limit for limit in self.limits if limit.guarantee.is_mean]
-        values = np.concatenate([limit.values(still)[0] for limit in limits])
+        return np.concatenate([limit.values(still)[0] for limit in limits])
+
+    def slopes_at_rest(self, x: np.ndarray) -> np.ndarray:
+        """Slopes of `values_at_rest`, (m, v)."""
+        state = self.state(x)
+        still = Moments.at_rest(state.q[-1:])
+        limits = [limit for limit in self.limits if limit.guarantee.is_mean]
         by_q = [_by_posture(limit.partials(still), still.q) for limit in limits]
-        by_y = np.zeros((len(self.t_norm), len(values), evaluation.motion.y.shape[1]))
-        by_y[-1] = np.concatenate(by_q) @ evaluation.motion.gradient[-1]
-        slopes = self._chain_rule((by_y,), x)
-        return Means(values, self._sum_up(slopes, np.ones(len(self.t_norm))))
+        at_end = np.concatenate(by_q) @ state.gradient[-1]
+        by_y = np.zeros((len(self.t_norm), *at_end.shape))
+        by_y[-1] = at_end
+        return self._sum_up(self._chain_rule((by_y,), x), np.ones(len(self.t_norm)))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
         """How far the limits are violated at every collocation point, (K, c); negative inside.

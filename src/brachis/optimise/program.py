@@ -291,7 +291,7 @@ class Program(Summary):
         for phase, part in self.split(x):
             sums.append(part[0] * phase.means(part))
             if phase.pause:
-                sums.append(phase.pause * phase.waiting(part).values)
+                sums.append(phase.pause * phase.values_at_rest(part))
         return np.asarray(sum(sums) / self.end_time(x))
 
     def _mean_slopes(self, x: np.ndarray) -> np.ndarray:
@@ -304,7 +304,7 @@ class Program(Summary):
             own = part[0] * phase.mean_slopes(part)
             own[:, 0] += phase.means(part) - total
             if phase.pause:
-                own += phase.pause * phase.waiting(part).slopes
+                own += phase.pause * phase.slopes_at_rest(part)
             columns.append(own)
         return np.hstack(columns) / self.end_time(x)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -82,6 +82,14 @@ class PathFrame:
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
+def integrate(function: Callable[[Array], Array], bounds: Array) -> Array:
+    """Integrate a function of (K,) between successive bounds, (N + 1,), by Gauss quadrature: (N,)."""
+    half = np.diff(bounds)[:, None] / 2.0
+    nodes = bounds[:-1, None] + half * (_NODES + 1.0)
+    values = function(nodes.ravel()).reshape(nodes.shape)
+    return np.asarray((values * half) @ _WEIGHTS)
+
+
 @dataclass(frozen=True, eq=False)
 class Piece:
     """The part of a curve between sigma = `first` and sigma = `last`; of which segment, or None for a blend."""
@@ -105,10 +113,12 @@ class Piece:
     def arc_length(self, positions: int) -> float:
         """Return the arc length of the position rows by Gauss quadrature between the curve's knots."""
         bounds = np.concatenate([[self.first], self.inner_knots, [self.last]])
-        half = np.diff(bounds)[:, None] / 2
-        sigma = bounds[:-1, None] + half * (_NODES + 1)
-        slope = self.curve.derivatives(sigma.ravel(), 1)[1, :, :positions]
-        return float(np.linalg.norm(slope, axis=1) @ (half * _WEIGHTS).ravel())
+
+        def speeds(sigma: Array) -> Array:
+            slope = self.curve.derivatives(sigma, 1)[1, :, :positions]
+            return np.linalg.norm(slope, axis=1)
+
+        return float(integrate(speeds, bounds).sum())
 
 
 @dataclass(frozen=True, eq=False)

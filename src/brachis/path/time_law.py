@@ -19,7 +19,7 @@ from brachis.common import tolerances
 from brachis.errors import PathError
 from brachis.path.legs import Leg
 from brachis.path.protocol import Array, Path
-from brachis.path.sequence import tool_derivatives
+from brachis.path.sequence import integrate, tool_derivatives
 from brachis.robot import TaskMap
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ _ACCURACY = 2e-10
 _LEAST_ACCURACY = 1e-7
 """The same with the rounding of times, which matters where the path turns within micrometres."""
 _MOST_INTERVALS = 20_000
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,11 +142,8 @@ class _ToolAlongPath:
 
     def times(self, s: Array) -> Array:
         """Return the times, (K,), s, at ascending path coordinates, from the first one on."""
-        half = np.diff(s)[:, None] / 2.0
-        nodes = s[:-1, None] + half * (_NODES + 1.0)
-        distances = self.slopes(nodes.ravel())[0].reshape(nodes.shape)
-        steps = (distances * half) @ _WEIGHTS / self.speed
-        return np.append(0.0, np.cumsum(steps))
+        distances = integrate(lambda nodes: self.slopes(nodes)[0], s)
+        return np.append(0.0, np.cumsum(distances / self.speed))
 
 
 def _interpolate(
