@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from brachis.errors import ResultFileError
+from brachis.task import ProcessSpeed
 from brachis.trajectory import (
     PHASE_COLUMNS,
     PhaseSpline,
@@ -14,6 +15,7 @@ from brachis.trajectory import (
     phase_rows,
     split_splines,
 )
+from brachis.trajectory.phases import list_phases
 from support.gantry import DWELL, SPEED, SPLINES, gantry_motion
 from support.result_files import with_parts
 
@@ -73,6 +75,14 @@ def test_a_trajectory_says_what_its_phases_are(motion):
     expected = [(0.0, 0.4), (0.4, 0.4), (0.4, 0.55), (0.55, 0.85), (0.85, 1.0)]
     np.testing.assert_allclose(places, expected)
     assert motion.phases[-1].end == motion.t_end
+
+
+def test_a_phase_longer_than_a_part_has_no_given_speed():
+    """As in recorded motions, of which only the stops are known."""
+    part = ProcessSpeed(speed=SPEED, s=[0.1, 0.3])
+    (phase,) = list_phases(SPLINES[:1], np.array([1.0]), [part])
+    assert phase.kind == "move"
+    assert phase.speed is None
 
 
 def test_splines_of_the_whole_motion_are_those_of_the_phases(motion):

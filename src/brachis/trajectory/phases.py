@@ -183,9 +183,10 @@ def list_phases(
     phases = []
     for spline, begin, end in zip(splines, begins, phase_ends, strict=True):
         s = spline.control_points[0]
-        middle = 0.5 * (s[0] + s[-1])
         is_dwell = bool(s[0] == s[-1])
-        given = [part.speed for part in speeds if part.s[0] < middle < part.s[1]]
+        # The phases of a recorded motion are between its stops, and longer than the parts.
+        ends = s[[0, -1]]
+        given = [part.speed for part in speeds if np.allclose(ends, part.s, 0.0, 1e-9)]
         speed = None if is_dwell or not given else given[0]
         times = (float(begin), float(end))
         phases.append(MotionPhase(*times, float(s[0]), float(s[-1]), speed, is_dwell))

@@ -52,6 +52,22 @@ def test_inspect_says_what_was_found(seam):
     assert fit["corners"] == []
 
 
+@pytest.mark.parametrize(
+    ("corner", "said"),
+    [
+        ("stop", "corners, at which the tool stops"),
+        ("blend", "corners, rounded within the tolerance"),
+    ],
+)
+def test_inspect_says_what_happens_at_corners(corner, said, task, write, tmp_path):
+    there = [f"1700;{4 * i}" for i in range(100)]
+    back = [f"{1700 - 4 * i};396" for i in range(1, 100)]
+    (tmp_path / "corner.csv").write_text("\n".join(["x_mm;y_mm", *there, *back]))
+    read = {"file": "corner.csv", "tolerance": {"position": "1 mm"}, "corner": corner}
+    task = write({**task, "path": [{"csv": read}], "start": "free"})
+    assert said in RUNNER.invoke(app, ["inspect", str(task)]).stdout
+
+
 def test_inspect_of_a_path_without_points(task, write):
     assert (
         "no part of the path comes from points"
