@@ -125,7 +125,7 @@ def solve_candidate(
         program=solved.program,
         target=target,
         reports=(*before, *solved.reports),
-        coarse=solved.report.objective if status.usable else np.inf,
+        coarse=solved.t_end if status.usable else np.inf,
     )
 
 

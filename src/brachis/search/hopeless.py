@@ -37,7 +37,7 @@ from brachis.search.phase_plane import (
 
 _EXACT = 0.97
 """Share of a speed below which it is impossible according to the phase plane, where that is exact."""
-_UNLIKELY = 0.5
+_UNLIKELY = 0.4
 """Share of a speed below which no other joint path of a redundant robot makes up for what is missing."""
 _REACHED = 0.92
 """Part of the largest speed to which a leg leads in the phase plane: splines over the first mesh fall short of it."""

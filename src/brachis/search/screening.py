@@ -115,7 +115,7 @@ def _solve_quickly(
             start,
             joint_map=chart.along(problem.path, chart.start),
             joint_path=np.concatenate(even),
-            estimate=float(solved.report.objective),
+            estimate=solved.t_end,
             durations=tuple(motion.t_end for motion in motions),
         )
     except (ImportError, UnreachableError):  # the plan says which backend is missing
