@@ -35,6 +35,7 @@ ORDER = (
     "ik",
     "kinematics",
     "limits",
+    "timing",
     "problem",
     "optimise",
     "search",
@@ -52,7 +53,15 @@ ORDER = (
     "apps.compose",
     "apps.cli",
 )
-VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "problem", "optimise", "search"}
+VERIFY_MUST_NOT_REACH = {
+    "ik",
+    "kinematics",
+    "limits",
+    "timing",
+    "problem",
+    "optimise",
+    "search",
+}
 MAY_NAME_KINDS = ("limits", "verify/limits", "task", "robot")
 HEAVY = {
     "matplotlib",

@@ -41,6 +41,7 @@ from brachis.robots import is_robot, locate
 from brachis.search import Search, first_maps, try_remedies
 from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
+from brachis.timing import find_timing_gap
 from brachis.trajectory import Motion, motion_of
 
 Given = Source | Robot | None
@@ -178,6 +179,11 @@ def plan(
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=asked.strict, stacklevel=3)
+            assert best.trajectory is not None
+            gap = find_timing_gap(best.trajectory, problem.limits)
+            is_given = asked.spline.intervals != "auto"
+            if gap is not None:
+                remarks += gap.issues(intervals_are_given=is_given)
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)
             try_remedies(error, robot, asked, families, own_limits, until)
@@ -204,6 +210,7 @@ def plan(
             interrupted=search.interrupted,
             not_completed=search.not_completed(),
             warnings=remarks,
+            timing_gap=gap,
         )
 
 

@@ -45,7 +45,9 @@ class Result(PlannedMotion):
     not_completed : tuple of str
         What was left undone, in plain words.
     warnings : tuple of Issue
-        What of robot, task and motion is implausible.
+        What of robot, task and motion is implausible, and a timing that is much slower than possible.
+    timing_gap : TimingGap or None
+        By how much another timing of the same joint path could be faster; None if the phase plane finds none.
 
     Examples
     --------

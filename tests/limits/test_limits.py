@@ -10,7 +10,6 @@ import pytest
 
 from brachis.limits import (
     TABLE,
-    HasPhasePlaneRows,
     Label,
     Limit,
     Moments,
@@ -133,50 +132,6 @@ def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
         np.testing.assert_allclose(limit.violation(values)[0, on], 0.0, atol=1e-12)
 
 
-NO_LINES = {
-    "position",
-    "power",
-    "total_power",
-    "torque_speed",
-    "rms_torque",
-    "jerk",
-    "torque_rate",
-}
-
-
-def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
-    """Without velocity friction: values (or, for ceilings, their squares) are a u + b x + c."""
-    free = dataclasses.replace(
-        ROBOT, friction=planar_robot("RRP", "xz").friction, limits=limit_source(limit)
-    )
-    limit = TABLE[limit.kind](free, TASK)
-    q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
-    s, u, speed = np.array([0.1, 0.2, 0.5, 0.65, 0.95]), 0.7, 1.3
-    if not isinstance(limit, HasPhasePlaneRows):
-        assert limit.kind in NO_LINES
-        return
-    lines = limit.phase_plane_rows(s, q, q_ds, q_dds)
-    values = limit.values(
-        Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, np.zeros_like(q), s)
-    )
-    found = (
-        (0.0 if lines.u is None else lines.u * u) + lines.x * speed**2 + lines.constant
-    )
-    if limit.kind == "tool_acceleration":  # components of it
-        found = np.linalg.norm(found, axis=1)[:, None]
-    expected = values**2 if lines.u is None else values
-    np.testing.assert_allclose(found, expected, atol=1e-9)
-
-
-def limit_source(limit):
-    given = {
-        kind: np.array([5.0, np.inf, 7.0])
-        for kind in ("acceleration", "jerk", "torque_rate")
-        if kind == limit.kind
-    }
-    return dataclasses.replace(ROBOT.limits, **given)
-
-
 def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     kinds = [limit.kind for limit in limits_of(ROBOT, TASK)]
     assert kinds == [
@@ -259,25 +214,6 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
     assert inside.sum() > 0
     np.testing.assert_allclose(
         limit.ratio(limit.values(STATES))[inside, column], share[inside], atol=1e-12
-    )
-
-
-def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
-    torque, velocity = pairs("torque"), pairs("velocity")
-    s = np.linspace(0.0, 1.0, 5)
-    q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
-    squares = velocity.phase_plane_rows(s, q, q_ds, q_dds).x[:, 1]
-    np.testing.assert_allclose(
-        np.sqrt(squares), np.maximum(q_ds[:, 1] / 4.0, -q_ds[:, 1] / 1.0)
-    )
-    still = planar_robot("RRP", "xz", limits=LimitSpec(**PAIRS))
-    torque, u, speed = TABLE["torque"](still, TASK), 0.7, 1.3
-    lines = torque.phase_plane_rows(s, q, q_ds, q_dds)
-    values = torque.values(
-        Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, 0.0 * q, s)
-    )
-    np.testing.assert_allclose(
-        lines.u * u + lines.x * speed**2 + lines.constant, values, atol=1e-9
     )
 
 

@@ -12,6 +12,7 @@ from brachis.limits.joint import AccelerationLimit, TorqueLimit, VelocityLimit
 from brachis.problem.problem import Problem
 from brachis.robot import dynamics
 from brachis.search import phase_plane
+from brachis.timing import JointPath, PhasePlane
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
@@ -31,7 +32,7 @@ def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
         for build in (TorqueLimit.build, VelocityLimit.build, AccelerationLimit.build)
     )
     limits = [limit for limit in built if limit is not None]
-    times = phase_plane.PhasePlane(limits, s, q).times()
+    times = PhasePlane(limits, JointPath.through(s, q)).times()
     return np.inf if times is None else float(times[-1])
 
 
@@ -222,7 +223,7 @@ def test_how_much_faster_a_motion_may_be():
     """Where it accelerates by a third of the limit, 3 ** 0.5; where it is at half its velocity limit, twice."""
     robot = gantry(acceleration=3.0, velocity=1.0)
     limits = [VelocityLimit.build(robot, None), AccelerationLimit.build(robot, None)]
-    plane = phase_plane.PhasePlane(limits, S, joint_path(0.4))
+    plane = PhasePlane(limits, JointPath.through(S, joint_path(0.4)))
     speed, place, label = plane.speed_factor(
         np.where(S < 0.7, 1.0, 0.5 / 0.4), np.zeros_like(S)
     )
@@ -239,7 +240,7 @@ def test_the_limit_that_holds_a_motion_back():
     robot = gantry(acceleration=3.0, velocity=0.4)
     limits = [VelocityLimit.build(robot, None), AccelerationLimit.build(robot, None)]
     for distance, label in ((0.05, "acceleration"), (2.0, "velocity")):
-        plane = phase_plane.PhasePlane(limits, S, joint_path(distance))
+        plane = PhasePlane(limits, JointPath.through(S, joint_path(distance)))
         rate = plane.fastest((0.0, 0.0))
         assert plane.active_limit(rate) == f"x_axis {label}"
         assert plane.largest_rate(0)[0] == pytest.approx(0.4 / distance)

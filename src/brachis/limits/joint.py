@@ -28,12 +28,10 @@ from brachis.limits.protocol import (
     Bound,
     Guarantee,
     HasLatticeWeights,
-    HasPhasePlaneRows,
     JointStates,
     Label,
     Limit,
     Partials,
-    PhasePlaneRows,
 )
 from brachis.robot import Robot, dynamics
 from brachis.task import LIMIT_KINDS, Task
@@ -185,37 +183,21 @@ class PositionLimit(_DerivativeLimit):
         return super(JointLimit, self).centre
 
 
-class VelocityLimit(_DerivativeLimit, HasPhasePlaneRows, HasLatticeWeights):
+class VelocityLimit(_DerivativeLimit, HasLatticeWeights):
     """Joint velocities within their limits."""
 
     kind = "velocity"
     derivative = "qdot"
 
-    def phase_plane_rows(
-        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhasePlaneRows:
-        """Write the square of the ratio, q_ds^2 x / v^2, to the limit of the direction."""
-        low, high = self._ends
-        tangent = q_ds[:, self._joints]
-        squares = (tangent / np.where(tangent > 0.0, high, low)) ** 2
-        return PhasePlaneRows(None, squares, np.zeros_like(squares))
-
     def lattice_weights(self, q: np.ndarray) -> tuple[None, np.ndarray]:
         return None, self._scale_rows(self._identity(len(q)))
 
 
-class AccelerationLimit(_DerivativeLimit, HasPhasePlaneRows, HasLatticeWeights):
+class AccelerationLimit(_DerivativeLimit, HasLatticeWeights):
     """Joint accelerations within their limits."""
 
     kind = "acceleration"
     derivative = "qddot"
-
-    def phase_plane_rows(
-        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhasePlaneRows:
-        by_u = q_ds[:, self._joints] * self._scale
-        by_x = q_dds[:, self._joints] * self._scale
-        return PhasePlaneRows(by_u, by_x, np.zeros_like(by_u))
 
     def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
         return self._scale_rows(self._identity(len(q))), None
@@ -240,28 +222,12 @@ class _TorqueLimit(JointLimit):
         return Partials(exact.q, exact.qdot, exact.qddot)
 
 
-class TorqueLimit(_TorqueLimit, HasPhasePlaneRows, HasLatticeWeights):
+class TorqueLimit(_TorqueLimit, HasLatticeWeights):
     """Joint torques within their limits."""
 
     kind = "torque"
     at_rest = "posture"
     refusal = "cannot hold the arm against gravity"
-
-    def phase_plane_rows(
-        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhasePlaneRows:
-        """Write a = M q_ds, b = M q_dds + C(q, q_ds) q_ds, and c, the torque at rest; without velocity friction."""
-        robot = self._robot
-        still = np.zeros_like(q)
-        at_rest = dynamics.rigid_torque(robot, q, still, still)
-        rows = [
-            dynamics.rigid_torque(robot, q, velocity, acceleration)
-            - at_rest
-            + robot.friction.armature * acceleration
-            for velocity, acceleration in ((still, q_ds), (q_ds, q_dds))
-        ]
-        by_u, by_x = (row[:, self._joints] * self._scale for row in rows)
-        return PhasePlaneRows(by_u, by_x, self._normalise(at_rest))
 
     def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
         return self._scale_rows(dynamics.mass_matrices(self._robot, q)), None

@@ -186,34 +186,6 @@ class Partials:
         return Partials(*(None if part is None else change(part) for part in parts))
 
 
-@dataclass(frozen=True)
-class PhasePlaneRows:
-    """A limit along a fixed joint path q(s): a u + b x + c in [-1, 1], with u = d2s/dt2 and x = (ds/dt)^2.
-
-    Attributes
-    ----------
-    u : (S, c) ndarray or None
-        a; None for a limit without acceleration. Then only b x + c <= 1 holds: an upper bound of x where b is
-        positive, a lower bound where it is negative.
-    x, constant : (S, c) ndarray
-        b and c.
-    """
-
-    u: np.ndarray | None
-    x: np.ndarray
-    constant: np.ndarray
-
-
-class HasPhasePlaneRows(ABC):
-    """A limit that can be written in the phase plane of a joint path."""
-
-    @abstractmethod
-    def phase_plane_rows(
-        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhasePlaneRows:
-        """Write the limit along a joint path: postures q, (S, n), at s, (S,), and their derivatives by s."""
-
-
 class HasLatticeWeights(ABC):
     """A limit by which the lattice measures joint steps between postures."""
 

@@ -18,12 +18,10 @@ import numpy as np
 
 from brachis.limits.protocol import (
     Bound,
-    HasPhasePlaneRows,
     JointStates,
     Label,
     Limit,
     Partials,
-    PhasePlaneRows,
     Role,
 )
 from brachis.robot import ROLL_JOINT, Robot, task_map_of
@@ -89,7 +87,7 @@ class ToolSpeed:
         return speed, _along(direction, by_q), _along(direction, jacobian)
 
 
-class _ToolLimit(Limit, HasPhasePlaneRows):
+class _ToolLimit(Limit):
     """Ratios of what the tool does to its limits.
 
     Parameters
@@ -158,15 +156,6 @@ class ToolAccelerationLimit(_ToolLimit):
         return Partials(
             *(_along(direction, part)[:, None] / self._figure for part in parts)
         )
-
-    def phase_plane_rows(
-        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhasePlaneRows:
-        """Write the components along the world's axes, each of which is not larger than the size."""
-        twists = self._tool.twists(q)
-        by_u = self._acceleration(twists, np.zeros_like(q), q_ds)
-        by_x = self._acceleration(twists, q_ds, q_dds)
-        return PhasePlaneRows(by_u, by_x, np.zeros_like(by_u))
 
 
 def build_tool_acceleration(robot: Robot, task: Task) -> ToolAccelerationLimit | None:
@@ -284,13 +273,6 @@ class ToolSpeedLimit(_ToolLimit):
         speed, by_q, by_qdot = self._tool.derivatives(motion)
         q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))
         return Partials(q=q, qdot=qdot, s=-speed[:, None] * slope / largest**2)
-
-    def phase_plane_rows(
-        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
-    ) -> PhasePlaneRows:
-        """Write the square of the ratio."""
-        squares = self._ratios(self._tool.slope(q, q_ds), s) ** 2
-        return PhasePlaneRows(None, squares, np.zeros_like(squares))
 
 
 class ToolAngularSpeedLimit(ToolSpeedLimit):

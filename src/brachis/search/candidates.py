@@ -53,6 +53,7 @@ from brachis.optimise.improve import (
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
+from brachis.optimise.retiming import keep, retime
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
@@ -162,9 +163,18 @@ def finish_candidate(
         solved = best_of_joints(start.problem, solved, session)
         target = solved.program
     adapted = adapt_mesh(solved, session, task.spline, options, target=target)
-    candidate = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     options = dataclasses.replace(options, deadline=deadline)
     session = dataclasses.replace(session, deadline=deadline)
+    spline = task.spline
+    if spline.intervals == "auto" and spline.knots != "free" and adapted.usable:
+        retimed = retime(adapted, spline.tolerance, spline.points_per_interval)
+        if retimed is not None:
+            own = refine_and_verify(
+                candidate, retimed.program, retimed.reports, keep, options
+            )
+            if own.verified and own.t_end < adapted.t_end:
+                return own
+    candidate = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     return refine_and_verify(
         candidate, adapted.program, adapted.reports, session, options
     )

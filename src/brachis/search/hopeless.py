@@ -28,12 +28,12 @@ from brachis.problem.feasibility import load_remedies
 from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
 from brachis.search.phase_plane import (
-    PhasePlane,
     follow_law,
     postures_along,
     spread_stations,
     stations_on,
 )
+from brachis.timing import JointPath, PhasePlane
 
 _EXACT = 0.97
 """Share of a speed below which it is impossible according to the phase plane, where that is exact."""
@@ -229,7 +229,8 @@ class _SpeedCheck:
         self.is_redundant = start.joint_map.r > 0
         limits = self.problem.limits
         self._planes = [
-            PhasePlane(limits, *stations_on(leg, s, q)) for leg in self.problem.legs
+            PhasePlane(limits, JointPath.through(*stations_on(leg, s, q)))
+            for leg in self.problem.legs
         ]
         self.caps = [self._find_cap(speed) for speed in speeds]
         self._known: dict[tuple[int, float, float], np.ndarray | None] = {}
@@ -239,12 +240,12 @@ class _SpeedCheck:
         plane = self._planes[speed.leg]
         law = self.problem.time_laws[speed.leg]
         if law is not None:
-            _, rate, acceleration = follow_law(law, plane.s)
+            _, rate, acceleration = follow_law(law, plane.path.s)
             return plane.speed_factor(rate, acceleration)
         assert speed.side is not None
         largest, label = plane.largest_rate(speed.side)
         asked = self.problem.leg_rates[speed.leg][speed.side]
-        return largest / asked, float(plane.s[speed.side]), label
+        return largest / asked, float(plane.path.s[speed.side]), label
 
     def speed_at(self, leg: int, side: int) -> int | None:
         """Return the number of the speed that is given at an end of a leg; None at rest."""

@@ -1,17 +1,7 @@
-"""Least time along a fixed joint path, and first guesses from it: the phase plane of s and ds/dt.
+"""Least times along the joint paths of guesses, leg by leg, and first guesses from them.
 
-With u = d2s/dt2 and x = (ds/dt)^2, limits along a joint path q(s) are lines in (u, x) (`phase_plane_rows`):
-
-    a(s) u + b(s) x + c(s)   in [-1, 1],
-
-for torques a = M q_ds / tau_max, b = (M q_dds + C(q, q_ds) q_ds) / tau_max and c the torque at rest; those without u
-are ceilings or floors for x. Backwards along the joint path, the largest x from which the next station's interval can
-be reached is kept; forwards, the largest u that stays within is taken (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
-Torque may jump here, and viscous and Coulomb friction are left out, so the time is an estimate by which joint paths are
-ranked, not a bound.
-
-A joint path has kinks where the tool stops, so every leg of the path is looked at by itself. A leg with a given speed
-has no fastest motion, but one motion, which the limits allow or do not allow.
+A joint path has kinks where the tool stops, so every leg of the path is timed by itself (`timing`). A leg with a given
+speed has no fastest motion, but one motion, which the limits allow or do not allow.
 
 The usual first guess of a leg follows its joint path smoothly from rest to rest, and its time is scaled until nothing
 is too fast. Between moving ends the first guess lies half-way between a constant acceleration and the phase plane. The
@@ -21,12 +11,10 @@ former alone may need no force at all, so that no limit's change with the end ti
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from brachis.common.arrays import interpolate_columns
-from brachis.limits import HasPhasePlaneRows, Limit
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
 from brachis.optimise.program import Program
@@ -34,19 +22,16 @@ from brachis.optimise.transcription import breaks_of
 from brachis.path.legs import Leg
 from brachis.path.time_law import TimeLaw
 from brachis.problem.problem import Problem
+from brachis.timing import JointPath, PhasePlane
 
 _LegGuess = tuple[np.ndarray, float | None]
 """Guess for a leg: curves, (S, c), and duration, s, if these are a motion's at even times."""
-_TINY = 1e-9
-"""Coefficients and slopes below this are taken for zero."""
 _STATIONS = 401
 """Stations along a joint path of a guess."""
 _LEAST_STATIONS = 41
 """Fewest stations along a leg."""
 _NEAR = 1e-4
 """Stations that are nearer to an end of a leg, in s, are left out: differences would be rough."""
-_ROUNDING = 1e-6
-"""Part of (ds/dt)^2 at the ends by which rounding may exceed a limit."""
 _ROUGH = 0.99
 """Part of a given speed that the limits have to allow: derivatives of a joint path are differences."""
 
@@ -93,7 +78,7 @@ def fastest_times(
     parts = zip(problem.legs, problem.leg_rates, problem.time_laws, strict=True)
     for leg, rates, law in parts:
         stations, postures = stations_on(leg, s, q)
-        plane = PhasePlane(problem.limits, stations, postures)
+        plane = PhasePlane(problem.limits, JointPath.through(stations, postures))
         times = plane.times(rates) if law is None else None
         if law is not None:
             times, rate, acceleration = follow_law(law, stations)
@@ -132,180 +117,6 @@ def follow_law(
     times = np.interp(stations, law.at(t)[0], t)
     _, rate, acceleration, _ = law.at(times)
     return times, rate, acceleration
-
-
-class PhasePlane:
-    """Limits along a joint path: slope x + lower <= u <= slope x + upper, and floor <= x <= ceiling.
-
-    Parameters
-    ----------
-    limits : sequence of Limit
-    s : (P,) ndarray
-        Path coordinates, ascending, at least three.
-    q : (P, n) ndarray
-        Postures there, rad or m, continuous with their derivatives.
-    """
-
-    def __init__(self, limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> None:
-        q_ds = np.gradient(q, s, axis=0, edge_order=2)
-        q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
-        self.s = s
-        self._steps = np.diff(s)
-        self._floor = np.zeros(len(s))
-        sloped = []
-        levels = [np.empty((len(s), 0))]
-        names: list[str] = []
-        level_names: list[str] = []
-        for limit in limits:
-            if not isinstance(limit, HasPhasePlaneRows):
-                continue
-            rows = limit.phase_plane_rows(s, q, q_ds, q_dds)
-            labels = [str(label) for label in limit.labels]
-            own = (
-                labels
-                if rows.x.shape[1] == len(labels)
-                else labels[:1] * rows.x.shape[1]
-            )
-            if rows.u is not None:
-                sloped.append((rows.u, rows.x, rows.constant))
-                names += own
-                continue
-            with np.errstate(divide="ignore", invalid="ignore"):
-                level = (1.0 - rows.constant) / rows.x
-            lowest = np.where(rows.x < 0.0, level, 0.0).max(axis=1)
-            self._floor = np.maximum(self._floor, lowest)
-            levels.append(np.where(rows.x > 0.0, level, np.inf))
-            level_names += own
-        self._levels = np.concatenate(levels, axis=1)
-        self._ceiling = self._levels.min(axis=1, initial=np.inf)
-        self._labels = [*names, *level_names]
-        a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
-        # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
-        a = np.where(np.abs(a) < _TINY, _TINY, a)
-        ends = (1.0 - c) / a, (-1.0 - c) / a
-        self._slope = -b / a
-        self._lower = np.minimum(*ends)
-        self._upper = np.maximum(*ends)
-
-    def times(self, rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray | None:
-        """Estimate when the stations are passed, (P,), s, with ds/dt at both ends, 1/s; None if they cannot be."""
-        rate = self.fastest(rates)
-        if rate is None:
-            return None
-        durations = 2.0 * self._steps / (rate[1:] + rate[:-1])
-        return np.append(0.0, np.cumsum(durations))
-
-    def speed_factor(
-        self, rate: np.ndarray, acceleration: np.ndarray
-    ) -> tuple[float, float, str]:
-        """Find by how much a motion may be faster, or has to be slower.
-
-        Parameters
-        ----------
-        rate, acceleration : (P,) ndarray
-            ds/dt, 1/s, and d2s/dt2, 1/s^2, at the stations.
-
-        Returns
-        -------
-        tuple of float, float and str
-            The largest factor of its speed; the path coordinate and the label of the limit that allow no more.
-        """
-        factors = self._factors(rate, acceleration)
-        least = factors.min(axis=1)
-        # The first place of equal ones.
-        station = int(np.argmax(least <= least.min() * (1.0 + _ROUNDING)))
-        column = int(np.argmin(factors[station]))
-        return float(least[station]), float(self.s[station]), self._labels[column]
-
-    def _factors(self, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-        """Largest factor, (P, c), of the speed of a motion for each limit alone."""
-        x = rate[:, None] ** 2
-        beside = acceleration[:, None] - self._slope * x
-        bound = np.hstack(
-            [np.where(beside > 0.0, self._upper, self._lower), self._levels]
-        )
-        used = np.hstack([beside, np.broadcast_to(x, self._levels.shape)])
-        squares = np.divide(
-            bound, used, out=np.full_like(bound, np.inf), where=used != 0.0
-        )
-        return np.sqrt(np.maximum(squares, 0.0))
-
-    def active_limit(self, rate: np.ndarray) -> str:
-        """Name the limit that a motion, ds/dt (P,), 1/s, as fast as possible, is at for most of its way."""
-        acceleration = np.diff(rate**2) / (2.0 * self._steps)
-        factors = self._factors(rate, np.append(acceleration, acceleration[-1]))
-        columns = np.argmin(factors[:-1], axis=1)
-        return self._labels[int(np.argmax(np.bincount(columns, self._steps)))]
-
-    def largest_rate(self, station: int) -> tuple[float, str]:
-        """Find the largest ds/dt, 1/s, that the limits allow at a station, and which one allows no more."""
-        tilt = self._slope[station][:, None] - self._slope[station]
-        clearance = self._upper[station][:, None] - self._lower[station]
-        falls = tilt < -_TINY
-        squares = np.divide(
-            clearance, -tilt, out=np.full_like(tilt, np.inf), where=falls
-        )
-        highest = np.append(squares.min(axis=1), self._levels[station])
-        column = int(np.argmin(highest))
-        return math.sqrt(max(highest[column], 0.0)), self._labels[column]
-
-    def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
-        """Largest ds/dt at the stations, (P,), 1/s, each as large as any motion along the joint path has it there.
-
-        Parameters
-        ----------
-        rates : tuple of float
-            ds/dt at both ends, 1/s.
-
-        Returns
-        -------
-        (P,) ndarray or None
-            None for a joint path that cannot be followed.
-        """
-        first, last = (rate**2 for rate in rates)
-        intervals = self._go_backwards(last)
-        if intervals is None:
-            return None
-        low, high = intervals
-        if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
-            return None
-        x = np.full(len(low), first)
-        for i, step in enumerate(self._steps):
-            upper = self._slope[i] * x[i] + self._upper[i]
-            largest = np.min(upper, initial=np.inf)
-            x[i + 1] = np.clip(x[i] + 2.0 * step * largest, low[i + 1], high[i + 1])
-        if not x.max() > 0.0:
-            return None
-        # Between stations nothing stops; a station where the grid says so is an artefact of its width.
-        x[1:-1] = np.maximum(x[1:-1], 1e-3 * np.median(x))
-        return np.sqrt(x)
-
-    def _go_backwards(self, last: float) -> tuple[np.ndarray, np.ndarray] | None:
-        """Find the intervals of x, (P,), from which the end can be reached with x = `last`; None if one is empty."""
-        lowest = self._floor[-1] * (1.0 - _ROUNDING)
-        if not lowest <= last <= self._ceiling[-1] * (1.0 + _ROUNDING):
-            return None
-        low = np.full(len(self._floor), last)
-        high = low.copy()
-        for i in range(len(low) - 2, -1, -1):
-            # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
-            half = 0.5 / self._steps[i]
-            slope = np.append(self._slope[i], -half)
-            upper = np.append(self._upper[i], half * high[i + 1])
-            lower = np.append(self._lower[i], half * low[i + 1])
-            tilt = (slope[:, None] - slope[None]).ravel()
-            clearance = (upper[:, None] - lower[None]).ravel()
-            if np.any((clearance < 0.0) & (np.abs(tilt) < _TINY)):
-                return None
-            falling = tilt < -_TINY
-            rising = tilt > _TINY
-            highest = np.min(clearance[falling] / -tilt[falling], initial=np.inf)
-            lowest = np.max(-clearance[rising] / tilt[rising], initial=0.0)
-            high[i] = min(self._ceiling[i], highest)
-            low[i] = max(self._floor[i], lowest)
-            if low[i] > high[i]:
-                return None
-        return low, high
 
 
 def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
@@ -415,7 +226,10 @@ def _moving_ends_guess(start: InitialGuess, leg: int) -> _LegGuess | None:
     end = problem.legs[leg].end
     s = np.linspace(begin, end, _STATIONS)
     q = postures_along(start, s)
-    times = None if q is None else PhasePlane(problem.limits, s, q).times((first, last))
+    times = None
+    if q is not None:
+        plane = PhasePlane(problem.limits, JointPath.through(s, q))
+        times = plane.times((first, last))
     if times is None or not np.isfinite(times[-1]):
         return None
     part = (s - begin) / (end - begin)

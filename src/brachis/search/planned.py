@@ -14,6 +14,7 @@ from brachis.optimise.least_motion import LeastMotion
 from brachis.robot.from_task import in_use
 from brachis.robot.plausibility import Issue
 from brachis.task import FitReport, Task
+from brachis.timing import TimingGap
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification
 
@@ -36,6 +37,7 @@ class PlannedMotion(Summary):
     interrupted: bool = False
     not_completed: tuple[str, ...] = ()
     warnings: tuple[Issue, ...] = ()
+    timing_gap: TimingGap | None = None
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
         """Sample the trajectory every `dt` seconds, as `Trajectory.sample` does."""
@@ -60,6 +62,7 @@ class PlannedMotion(Summary):
             "solver": f"{report.solver}, {report.status.name.lower()}",
             "candidates": f"{len(self.candidates)}, {verified} verified",
             "wall time": f"{self.timing.get('total', 0.0):.2f} s",
+            "timing": "" if self.timing_gap is None else str(self.timing_gap),
             "not_completed": "; ".join(self.not_completed),
             "warnings": "; ".join(remark.message for remark in self.warnings),
         }
@@ -123,6 +126,7 @@ class PlannedMotion(Summary):
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,
             "verified": self.verified,
+            "timing_gap": self.timing_gap and self.timing_gap.to_dict(),
             "worst_ratio": self.verification.worst_ratio,
             "path_error": self.verification.path_error,
             "joint_names": list(trajectory.joint_names),

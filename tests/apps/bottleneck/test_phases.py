@@ -53,8 +53,8 @@ def test_costs_are_those_of_all_phases(stopping):
     assert found.sensitivities.reliable
     assert found.check.larger()
     assert found.check.worst_deviation() < 0.02
-    assert found.knots.saved > 0.0
-    assert found.knots.t_end > 0.3
+    assert found.timing.gap > 0.0
+    assert found.timing.least_time > 0.3
     assert "phase 2 dwell, s = 0.5, 0.3000 s" in str(found)
     assert found.to_dict()["phases"][1]["limits"] == []
 

@@ -14,10 +14,8 @@ from brachis.apps.bottleneck.check import (
     check_sensitivities,
 )
 from brachis.apps.bottleneck.reference import (
-    KnotCost,
     Reference,
     find_reference,
-    knot_cost,
 )
 from brachis.apps.bottleneck.report import BottleneckReport, report, solve_again
 from brachis.apps.bottleneck.saturation import (
@@ -45,7 +43,6 @@ __all__ = [
     "BottleneckReport",
     "BranchBoundary",
     "CheckedSensitivity",
-    "KnotCost",
     "LimitRatios",
     "PhaseLimits",
     "Reference",
@@ -55,7 +52,6 @@ __all__ = [
     "SensitivityCheck",
     "check_sensitivities",
     "find_reference",
-    "knot_cost",
     "limit_ratios",
     "limits_by_phase",
     "report",

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -26,7 +25,6 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis.errors import UnreachableError
-from brachis.limits import Limit, Moments
 from brachis.optimise.backends import (
     Solver,
     SolverOptions,
@@ -40,8 +38,6 @@ from brachis.optimise.guess import fit_curves, shortest_time, worst_time_scaling
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.search.phase_plane import PhasePlane
-from brachis.trajectory import MotionPhase, PhaseSpline, Trajectory
 
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _PARABOLAS = 2
@@ -219,111 +215,3 @@ def _violation(answer: SolvedProgram) -> float:
             return np.inf
         violations.append(float(found.max()))
     return max(violations)
-
-
-@dataclass(frozen=True)
-class KnotCost:
-    """What the knots cost.
-
-    Attributes
-    ----------
-    intervals : int
-        Number of knot intervals of the motion.
-    given : bool
-        Whether the task gives this number, so that ``intervals: auto`` is left to try.
-    t_end : float
-        Of the fastest timing of the same joint path, s, to about 0.2 %.
-    saved : float
-        How much shorter that is, as a fraction of the motion's end time.
-    """
-
-    intervals: int
-    given: bool
-    t_end: float
-    saved: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures as plain data for JSON."""
-        return {"intervals": self.intervals, "t_end_s": self.t_end, "saved": self.saved}
-
-
-def knot_cost(
-    trajectory: Trajectory, limits: Sequence[Limit], t_end: float
-) -> KnotCost | None:
-    """Compare a planned motion with the fastest timing of its own joint path.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    limits : sequence of Limit
-        Of the task.
-    t_end : float
-        Of the fastest motion over these knots, s; the trajectory may be a calmer one.
-
-    Returns
-    -------
-    KnotCost or None
-        None if it cannot be compared: a limit bounds the jerk, the rate of the torque, or the mean over several phases,
-        or the motion in the phase plane exceeds a limit that the phase plane leaves out.
-    """
-    phases = trajectory.phases
-    has_means = any(limit.guarantee.is_mean for limit in limits)
-    if any(limit.order > _JUMPING for limit in limits) or (
-        has_means and len(phases) > 1
-    ):
-        return None
-    least = 0.0
-    intervals = 0
-    for phase, spline in zip(phases, trajectory.phase_splines, strict=True):
-        duration = phase.duration
-        if phase.kind == "move":
-            found = _fastest_time(trajectory, phase, spline, limits)
-            if found is None:
-                return None
-            duration = found
-            intervals += len(spline.breaks) - 1
-        least += duration
-    given = trajectory.task.spline.intervals != "auto"
-    return KnotCost(intervals, given, least, 1.0 - least / t_end)
-
-
-def _fastest_time(
-    trajectory: Trajectory,
-    phase: MotionPhase,
-    spline: PhaseSpline,
-    limits: Sequence[Limit],
-) -> float | None:
-    """Return the time, s, of the fastest motion along the joint path of a phase, between its velocities at the ends.
-
-    None if the motion in the phase plane exceeds a limit.
-    """
-    s = np.linspace(phase.s_begin, phase.s_end, 1001)
-    q = trajectory.position(phase.begin + spline.times_of(s))
-    first, last = np.abs(spline.at(np.array([0.0, spline.t_end]))[1][:, 0])
-    rate = PhasePlane(limits, s, q).fastest((first, last))
-    if rate is None:
-        return None
-    steps = 2.0 * np.diff(s) / (rate[1:] + rate[:-1])
-    largest = _largest_ratios(limits, s, q, rate, steps)
-    # Derivatives are differences here, and rough at the stations next to rest.
-    if steps[largest > 1.02].sum() > 0.01 * steps.sum():
-        return None
-    return float(steps.sum())
-
-
-def _largest_ratios(
-    limits: Sequence[Limit],
-    s: np.ndarray,
-    q: np.ndarray,
-    rate: np.ndarray,
-    steps: np.ndarray,
-) -> np.ndarray:
-    """Return the largest ratio to a limit of the motion in the phase plane between its stations, (S - 1,)."""
-    q_ds = np.gradient(q, s, axis=0, edge_order=2)
-    q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
-    acceleration = (np.diff(rate**2) / (2.0 * np.diff(s)))[:, None]
-    speed = rate[:-1, None]
-    qddot = q_ds[:-1] * acceleration + q_dds[:-1] * speed**2
-    moments = Moments(q[:-1], q_ds[:-1] * speed, qddot, np.zeros_like(qddot), s[:-1])
-    ratios = [limit.ratios(moments, np.cumsum(steps)) for limit in limits]
-    return np.abs(np.hstack(ratios)).max(axis=1)

@@ -21,10 +21,8 @@ from threadpoolctl import ThreadpoolController
 from brachis.apps.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.apps.bottleneck.reference import (
     MEANING,
-    KnotCost,
     Reference,
     find_reference,
-    knot_cost,
 )
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
@@ -47,7 +45,6 @@ from brachis.errors import (
     InputError,
     PlanningError,
     UnreachableError,
-    write_count,
 )
 from brachis.kinematics import (
     ChartRows,
@@ -69,6 +66,7 @@ from brachis.robot import ROLL_JOINT
 from brachis.robot.joints import shown_unit
 from brachis.robot.task_map import JOINTS
 from brachis.search.candidates import MARGINS
+from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory, phase_rows
 
 if TYPE_CHECKING:
@@ -193,8 +191,8 @@ class BottleneckReport:
         When every limit is active, those active longest first.
     phases : tuple of PhaseLimits
         Which limits are active in each phase.
-    knots : KnotCost or None
-        What the knots cost; None if that is not known.
+    timing : TimingGap or None
+        The fastest timing of its joint path; None if that is not known.
     check : SensitivityCheck or None
         The predictions compared with solving again, if requested.
     reference : Reference or None
@@ -214,7 +212,7 @@ class BottleneckReport:
     sensitivities: Sensitivities | None
     saturations: tuple[Saturation, ...]
     phases: tuple[PhaseLimits, ...]
-    knots: KnotCost | None = None
+    timing: TimingGap | None = None
     check: SensitivityCheck | None = None
     reference: Reference | None = None
     reference_sought: bool = False
@@ -228,8 +226,8 @@ class BottleneckReport:
         lines = ["the motion was not planned, so the cost of its limits is unknown"]
         if self.sensitivities is not None:
             lines = _costs(self.sensitivities, self.t_end, degrees=degrees)
-        if self.knots is not None:
-            lines += _knots(self.knots, self.t_end)
+        if self.timing is not None:
+            lines += _timing(self.timing, self.t_end)
         if self.check is not None:
             lines += _check_lines(self.check)
         lines += write_active(self.saturations)
@@ -258,7 +256,7 @@ class BottleneckReport:
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
             "phases": [each.to_dict() for each in self.phases],
-            "knots": self.knots and self.knots.to_dict(),
+            "timing_gap": self.timing and self.timing.to_dict(),
             "check": self.check and self.check.to_dict(),
             "reference": self.reference and self.reference.to_dict(),
         }
@@ -336,7 +334,7 @@ def report(
         sensitivities=found,
         saturations=active,
         phases=limits_by_phase(trajectory, active),
-        knots=knot_cost(trajectory, limits, refined.t_end),
+        timing=find_timing_gap(trajectory, limits),
         check=check_sensitivities(refined, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
         reference_sought=reference,
@@ -401,16 +399,15 @@ def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
     return f"{more} saves {_part(-entry.change(_FRACTION), t_end)}"
 
 
-def _knots(found: KnotCost, t_end: float) -> list[str]:
-    """Say what the knots cost from 1 % on: it is known to 0.2 %, and ``intervals: auto`` leaves 0.1 %."""
-    if found.saved < 0.01:
+def _timing(found: TimingGap, t_end: float) -> list[str]:
+    """Say what the timing costs from 1 % on: ``intervals: auto`` leaves 0.1 %."""
+    saved = 1.0 - found.least_time / t_end
+    if saved < 0.01 or found.left_out:
         return []
     line = (
-        f"the knots cost about {_part(found.saved * t_end, t_end)} with {write_count(found.intervals, 'interval')}: "
-        f"with torques that may jump, the same joint path takes {found.t_end:.4g} s"
+        f"the timing costs about {_part(saved * t_end, t_end)}: the same joint path takes {found.least_time:.4g} s "
+        "with torques that may jump; to come closer, set spline.intervals: auto or a larger number"
     )
-    if found.given:
-        line += "; to come closer, set spline.intervals: auto or a larger number"
     return [line]
 
 

@@ -1,0 +1,432 @@
+"""The fastest timing of a motion's own joint path, and the splines that follow it.
+
+The fastest timing of a joint path is known from the phase plane within milliseconds (`timing`). Its accelerations jump,
+and splines can only ramp: so knots stand close together where accelerations jump, and far apart where they are nearly
+linear. The control points of the splines' rates are means of the curves' rates (`spline_along`): no such spline
+accelerates more than the curve that it follows does near by. Where it exceeds a limit all the same, the limits are
+narrowed there, and the timing is computed anew.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.optimise.backends import SolverReport, SolveStatus
+from brachis.optimise.boundary import greville
+from brachis.optimise.bspline import clamped_knots, spread
+from brachis.optimise.grid import FixedGrid
+from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.motion import Motion
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Program
+from brachis.timing import Course, TimedCourse, Timing, is_left_out
+
+SOLVER = "phase plane"
+"""Name of what solves a program by its timing alone."""
+PLACES = 2000
+"""Places at which a joint path is timed, about, and no fewer."""
+_LEAST_PLACES = 12
+"""Places in every knot interval, no fewer."""
+_ROUNDS = 10
+"""Timings with limits that are narrowed, no more."""
+_FIRST_INTERVALS = 8
+"""Intervals that are halved, no fewer."""
+_PLACES_AN_INTERVAL = 250
+"""Places for each of these."""
+_SHORTEST = 0.2
+"""Shortest interval that is halved: this part of the tolerance, for each of the first intervals."""
+_LOOKS = 12
+"""Times in each interval at which limits are looked at."""
+_LESS = 3.0
+"""Intervals lose less than is estimated, by about this factor."""
+_ANCHORED = 100
+"""Intervals after which the splines are where the timing is."""
+_ENOUGH = 5e-5
+"""Violation of a limit, as a part of it, that is small enough."""
+
+
+@dataclass(frozen=True)
+class PhaseTiming:
+    """A phase's motion beside the fastest timing of its joint path.
+
+    Attributes
+    ----------
+    course : TimedCourse
+    rates : tuple of float
+        Of the path's length at both ends, 1/s.
+    times : (P,) ndarray
+        When the motion passes the stations, s.
+    timing : Timing or None
+        None where the limits allow none, not even the motion's own, within rounding.
+    """
+
+    course: TimedCourse
+    rates: tuple[float, float]
+    times: np.ndarray
+    timing: Timing | None
+
+    @classmethod
+    def of(cls, phase: Phase, x: np.ndarray) -> PhaseTiming | None:
+        """Time the joint path of a phase; None where its speed is given, or where it cannot be evaluated."""
+        if phase.time_law is not None:
+            return None
+        motion = phase.motion(x)
+        count = max(_LEAST_PLACES, -(-PLACES // phase.intervals))
+        t = spread(motion.breaks / motion.t_end, count) * motion.t_end
+        y, ydot, yddot, _ = motion.at(t)
+        try:
+            course = TimedCourse(
+                Course(t, y, ydot, yddot), phase.joint_map, phase.limits
+            )
+        except UnreachableError:
+            return None
+        speeds = course.speeds
+        rates = float(speeds[0]), float(speeds[-1])
+        return cls(course, rates, t[course.kept], course.solve(rates))
+
+
+def time_phases(solved: SolvedProgram) -> list[PhaseTiming | None]:
+    """Time the joint paths of all phases of a motion; see `PhaseTiming.of`."""
+    return [PhaseTiming.of(*pair) for pair in solved.program.split(solved.x)]
+
+
+def least_time_of(
+    program: Program, x: np.ndarray, timings: Sequence[PhaseTiming | None]
+) -> float:
+    """Return the least time of a motion's own joint paths, s, with the durations that are given, and the pauses."""
+    total = 0.0
+    for (phase, part), own in zip(program.split(x), timings, strict=True):
+        fastest = None if own is None else own.timing
+        total += phase.pause + (part[0] if fastest is None else fastest.t_end)
+    return float(total)
+
+
+def breaks_for(
+    course: TimedCourse, timing: Timing, tolerance: float, *, from_rest: bool
+) -> np.ndarray:
+    """Choose knots over which splines follow a timing.
+
+    Intervals are halved, those first that lose most: their length times how far accelerations are from linear within
+    them, as a part of the limits.
+
+    Parameters
+    ----------
+    course : TimedCourse
+    timing : Timing
+    tolerance : float
+        Part of the time that all intervals together may lose.
+    from_rest : bool
+        Whether accelerations vanish at both ends.
+
+    Returns
+    -------
+    (N + 1,) ndarray
+        In normalised time.
+    """
+    values = course.accelerations(timing)
+    t = 0.5 * (timing.times[1:] + timing.times[:-1]) / timing.t_end
+    if from_rest:
+        # Accelerations begin and end at zero.
+        values = np.pad(values, ((1, 1), (0, 0)))
+        t = np.concatenate([[0.0], t, [1.0]])
+
+    def loss(low: float, high: float) -> float:
+        first, last = np.searchsorted(t, [low, high])
+        inside = values[max(first - 1, 0) : last + 1]
+        at = t[max(first - 1, 0) : last + 1]
+        if len(at) < 3:
+            return 0.0
+        part = (at - at[0]) / (at[-1] - at[0])
+        line = inside[0] + part[:, None] * (inside[-1] - inside[0])
+        return float(np.abs(inside - line).max() * (high - low))
+
+    pieces = max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL)
+    shortest = _SHORTEST * tolerance / pieces
+    evenly = np.linspace(0.0, 1.0, pieces + 1)
+    queue = [(-loss(*pair), *pair) for pair in itertools.pairwise(evenly)]
+    heapq.heapify(queue)
+    done = []
+    lost = -sum(item[0] for item in queue)
+    while lost > tolerance and queue:
+        worst, low, high = heapq.heappop(queue)
+        lost += worst
+        if high - low < shortest:
+            done.append(low)
+            continue
+        middle = 0.5 * (low + high)
+        for part in ((low, middle), (middle, high)):
+            own = loss(*part)
+            lost += own
+            heapq.heappush(queue, (-own, *part))
+    begins = [*done, *(low for _, low, _ in queue)]
+    return np.append(np.sort(begins), 1.0)
+
+
+def spline_along(
+    course: TimedCourse,
+    timing: Timing,
+    knots: np.ndarray,
+    degree: int,
+    vanishing: tuple[int, int],
+) -> np.ndarray:
+    """Control points, (c, N + d), of splines whose rates have means of the curves' rates for control points.
+
+    At the ends so many derivatives, from the acceleration on, vanish.
+
+    A control point of the rate belongs to d - 1 knots. Its mean is weighted by the B-spline over these; for cubics this
+    is the chord over an interval. Curves of degree 2 are met exactly, and accelerations stay among those near by.
+    """
+    t_end = timing.t_end
+    windows = np.lib.stride_tricks.sliding_window_view(knots[2:-2], degree - 1)
+    widths = windows[:, -1] - windows[:, 0]
+    is_point = widths <= 0.0
+    if degree == 3:
+        y = course.curves(timing, windows.ravel() * t_end)[0]
+        y = y.reshape(len(windows), 2, -1)
+        rates = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths * t_end)[:, None]
+    else:
+        rates = _weighted_rates(course, timing, windows)
+    rates[is_point] = course.curves(timing, windows[is_point, 0] * t_end)[1]
+    first = course.curves(timing, np.zeros(1))[0]
+    rates = _without_bias(rates, knots, degree, vanishing)
+    # What that takes from the rates is spread over all.
+    places = _windows(knots[2:-2], degree - 1).mean(axis=1)
+    end = course.curves(timing, np.array([t_end]))[1]
+    rates = rates + (places**2 * (3.0 - 2.0 * places))[:, None] * (end - rates[-1])
+    return np.concatenate([first, _integrate(first, rates, knots[1:-1], t_end)]).T
+
+
+def _windows(knots: np.ndarray, count: int) -> np.ndarray:
+    return np.lib.stride_tricks.sliding_window_view(knots, count)
+
+
+def _integrate(
+    first: np.ndarray, rates: np.ndarray, knots: np.ndarray, t_end: float
+) -> np.ndarray:
+    """Control points behind the first one, (w, c), of splines with these control points of the rate, (w, c)."""
+    degree = len(knots) - len(rates)
+    support = _windows(knots, degree + 1)
+    steps = (support[:, -1] - support[:, 0]) * t_end / degree
+    return np.asarray(first + np.cumsum(rates * steps[:, None], axis=0))
+
+
+def _without_bias(
+    rates: np.ndarray, knots: np.ndarray, degree: int, vanishing: tuple[int, int]
+) -> np.ndarray:
+    """Move the accelerations from where their means are taken to where they belong.
+
+    Where intervals of different length meet these places differ. Slopes are the smaller ones of both sides, so that
+    nothing swings beside a jump.
+    """
+    inner = _windows(knots[2:-2], degree)
+    widths = (inner[:, -1] - inner[:, 0])[:, None] / (degree - 1)
+    means = np.diff(rates, axis=0) / widths
+    taken = inner.mean(axis=1)
+    belong = inner[:, 1:-1].mean(axis=1) if degree > 2 else taken
+    slopes = np.diff(means, axis=0) / np.diff(taken)[:, None]
+    before = np.concatenate([slopes[:1], slopes])
+    behind = np.concatenate([slopes, slopes[-1:]])
+    smaller = np.where(np.abs(before) < np.abs(behind), before, behind)
+    smaller = np.where(before * behind > 0.0, smaller, 0.0)
+    moved = means + smaller * (belong - taken)[:, None]
+    moved[: vanishing[0]] = 0.0
+    moved[len(moved) - vanishing[1] :] = 0.0
+    return np.concatenate([rates[:1], rates[:1] + np.cumsum(moved * widths, axis=0)])
+
+
+def _weighted_rates(
+    course: TimedCourse, timing: Timing, windows: np.ndarray
+) -> np.ndarray:
+    """Means of the curves' rates, (w, c), weighted by the B-splines over windows of knots, (w, k)."""
+    from scipy.interpolate import BSpline
+
+    count = windows.shape[1]
+    if count == 1:
+        return course.curves(timing, windows[:, 0] * timing.t_end)[1]
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    found = []
+    for knots in windows:
+        if knots[-1] <= knots[0]:
+            found.append(np.zeros(course.curves(timing, np.zeros(1))[1].shape[1]))
+            continue
+        basis = BSpline.basis_element(knots)
+        inner = np.unique(knots)
+        half = 0.5 * np.diff(inner)
+        t = (0.5 * (inner[1:] + inner[:-1])[:, None] + half[:, None] * nodes).ravel()
+        share = (half[:, None] * weights).ravel() * basis(t)
+        rates = course.curves(timing, t * timing.t_end)[1]
+        found.append(share @ rates / share.sum())
+    return np.array(found)
+
+
+def fit(phase: Phase, course: TimedCourse, timing: Timing) -> np.ndarray:
+    """Point x, (v,), of a phase that follows a timing; see `spline_along`."""
+    knots = phase.knots
+    t_end = timing.t_end
+    ends = phase.boundary.start, phase.boundary.end
+    first, last = (max(len(end[-1].derivatives) - 1, 0) for end in ends)
+    points = spline_along(course, timing, knots, phase.degree, (first, last))
+    places = greville(knots, phase.degree)
+    # Means of rates miss the curves by a little, which grows along the motion.
+    count = 1 + phase.intervals // _ANCHORED
+    anchors = np.linspace(0.0, 1.0, count + 1)
+    wanted = course.curves(timing, anchors * t_end)[0]
+    for _ in range(2):
+        reached = Motion(t_end, knots, phase.degree, points).at(anchors * t_end)[0]
+        points = points + _smoothly(anchors, wanted - reached, places).T
+    return phase.variables_from(Motion(t_end, knots, phase.degree, points))
+
+
+def _smoothly(
+    anchors: np.ndarray, values: np.ndarray, places: np.ndarray
+) -> np.ndarray:
+    """Interpolate values, (A, c), at anchors without a slope at the ends, at places, (P,)."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(anchors, values, bc_type="clamped")(places))
+
+
+def _spread_excess(worst: np.ndarray, breaks: np.ndarray, timing: Timing) -> np.ndarray:
+    """Spread what exceeds limits in knot intervals, (N,), over these and those beside them, (P - 1,)."""
+    padded = np.pad(np.maximum(worst - 0.5 * _ENOUGH, 0.0), 1)
+    around = np.max([padded[:-2], padded[1:-1], padded[2:]], axis=0)
+    t_norm = timing.times / timing.t_end
+    first = np.searchsorted(breaks, t_norm[:-1], side="right") - 1
+    last = np.searchsorted(breaks, t_norm[1:], side="left")
+    first = np.clip(first, 0, len(around) - 1)
+    pairs = np.column_stack([first, np.maximum(last, first + 1)]).ravel()
+    return np.maximum.reduceat(np.append(around, 0.0), pairs)[::2]
+
+
+def follow(
+    phase: Phase, own: PhaseTiming, tolerance: float, points: int
+) -> tuple[Phase, np.ndarray] | None:
+    """Lay splines along the fastest timing of a phase's joint path, within the limits.
+
+    Parameters
+    ----------
+    phase : Phase
+        With another grid.
+    own : PhaseTiming
+    tolerance : float
+        See `breaks_for`.
+    points : int
+        Collocation points an interval.
+
+    Returns
+    -------
+    phase : Phase
+        Over the knots that the timing needs.
+    x : (v,) ndarray
+        Its motion, which may still exceed limits by a little; None where the limits allow no timing.
+    """
+    course = own.course
+    timing = own.timing
+    if timing is None:
+        return None
+    tolerance *= _LESS
+    from_rest = (
+        max(
+            len(end[0].derivatives)
+            for end in (phase.boundary.start, phase.boundary.end)
+        )
+        > 1
+    )
+    breaks = breaks_for(course, timing, tolerance, from_rest=from_rest)
+    knots = clamped_knots(phase.degree, breaks)
+    target = phase.with_grid(FixedGrid(knots, phase.degree, spread(breaks, points)))
+    dense = target.with_points(spread(breaks, _LOOKS))
+    narrower = np.zeros(len(timing.acceleration))
+    best: tuple[float, np.ndarray] | None = None
+    for _ in range(_ROUNDS):
+        x = fit(target, course, timing)
+        try:
+            worst = dense.violation(x).max(axis=1, initial=0.0)
+        except UnreachableError:
+            break
+        largest = float(worst.max())
+        if best is None or timing.t_end * (1.0 + largest) < best[0]:
+            best = timing.t_end * (1.0 + largest), x
+        if largest <= _ENOUGH:
+            break
+        each = worst[:-1].reshape(-1, _LOOKS).max(axis=1)
+        each[-1] = max(each[-1], worst[-1])
+        narrower = narrower + _spread_excess(each, breaks, timing)
+        slower = course.solve(own.rates, narrower)
+        if slower is None:
+            break
+        timing = slower
+    return None if best is None else (target, best[1])
+
+
+def keep(program: Program, x: np.ndarray) -> SolverReport:
+    """Solve nothing: a timing is not improved by more collocation points, but lengthened until limits hold."""
+    return _report(program, x, SolveStatus.STALLED, 0.0)
+
+
+def _report(
+    program: Program, x: np.ndarray, status: SolveStatus, seconds: float
+) -> SolverReport:
+    """Report a motion that no solver changed."""
+    return SolverReport(
+        solver=SOLVER,
+        status=status,
+        x=x,
+        objective=program.objective(x),
+        violation=0.0 if status.usable else np.inf,
+        multipliers=np.zeros(len(program.lower)),
+        iterations=0,
+        wall_time=seconds,
+        message="the fastest timing of the joint path",
+    )
+
+
+def retime(
+    solved: SolvedProgram, tolerance: float, points: int
+) -> SolvedProgram | None:
+    """Give a solved program the fastest timing of its own joint path, over the knots that this needs.
+
+    Parameters
+    ----------
+    solved : SolvedProgram
+        Without free knots.
+    tolerance : float
+        A part of the end time; less than that is not worth a change.
+    points : int
+        Collocation points an interval.
+
+    Returns
+    -------
+    SolvedProgram or None
+        None if that is no faster, or where timing is not all: with limits on jerk, torque rate or means, in periodic
+        motions, and where a phase goes on in motion from another one.
+    """
+    began = time.perf_counter()
+    program = solved.program
+    is_linked = any(max(link.orders) for link in program.links)
+    is_periodic = any(phase.boundary.periodic for phase in program.phases)
+    if is_linked or is_periodic or any(map(is_left_out, program.limits)):
+        return None
+    timings = time_phases(solved)
+    least = least_time_of(program, solved.x, timings)
+    if solved.t_end < least * (1.0 + tolerance):
+        return None
+    phases = []
+    parts = []
+    for (phase, x), own in zip(program.split(solved.x), timings, strict=True):
+        followed = None if own is None else follow(phase, own, tolerance, points)
+        faster, part = followed or (phase, x)
+        phases.append(faster)
+        parts.append(part)
+    finer = program.with_phases(phases)
+    x = np.concatenate(parts)
+    seconds = time.perf_counter() - began
+    report = _report(finer, x, SolveStatus.ACCEPTABLE, seconds)
+    return SolvedProgram(finer, (*solved.reports, report))

@@ -1,0 +1,18 @@
+"""The fastest timing of a joint path that is given: the phase plane."""
+
+from brachis.timing.course import Course, TimedCourse
+from brachis.timing.gap import TimingGap, find_timing_gap
+from brachis.timing.joint_path import JointPath, Passage
+from brachis.timing.phase_plane import PhasePlane, Timing, is_left_out
+
+__all__ = [
+    "Course",
+    "JointPath",
+    "Passage",
+    "PhasePlane",
+    "TimedCourse",
+    "Timing",
+    "TimingGap",
+    "find_timing_gap",
+    "is_left_out",
+]

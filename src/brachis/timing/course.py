@@ -1,0 +1,118 @@
+"""The curves y(p) of a joint map along a path parameter, and the fastest timing of the joint path that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.kinematics import JointMap
+from brachis.limits import Limit
+from brachis.timing.joint_path import JointPath, Passage
+from brachis.timing.phase_plane import PhasePlane, Timing
+
+
+@dataclass(frozen=True)
+class Course:
+    """Curves of a joint map at stations, with their derivatives by a path parameter p.
+
+    Attributes
+    ----------
+    p : (P,) ndarray
+        For example the time of a known motion, s.
+    y, y_dp, y_ddp : (P, c) ndarray
+    """
+
+    p: np.ndarray
+    y: np.ndarray
+    y_dp: np.ndarray
+    y_ddp: np.ndarray
+
+    @classmethod
+    def through(cls, curves: np.ndarray, s: np.ndarray) -> Course:
+        """Lay cubic splines through curves, (S, c), the first of them the path coordinate, and take them at s, (P,)."""
+        from scipy.interpolate import CubicSpline
+
+        y = np.column_stack([s, np.empty((len(s), curves.shape[1] - 1))])
+        y_dp = np.zeros_like(y)
+        y_ddp = np.zeros_like(y)
+        y_dp[:, 0] = 1.0
+        if curves.shape[1] > 1:
+            spline = CubicSpline(curves[:, 0], curves[:, 1:])
+            y[:, 1:], y_dp[:, 1:], y_ddp[:, 1:] = (spline(s, nu) for nu in range(3))
+        return cls(s, y, y_dp, y_ddp)
+
+
+class TimedCourse:
+    """The fastest timing of a course.
+
+    Parameters
+    ----------
+    course : Course
+    joint_map : JointMap
+        Of its curves.
+    limits : sequence of Limit
+
+    Attributes
+    ----------
+    path : JointPath
+        By its length, at the stations at which the joints move.
+    kept : (P,) int ndarray
+        Their numbers among the stations of the course.
+
+    Raises
+    ------
+    UnreachableError
+        The joint map has no posture at a station.
+    """
+
+    def __init__(
+        self, course: Course, joint_map: JointMap, limits: Sequence[Limit]
+    ) -> None:
+        still = np.zeros_like(course.y)
+        curves = (course.y, course.y_dp, course.y_ddp, still)
+        state = joint_map.state(*curves, t=course.p - course.p[0])
+        along = JointPath(course.p, state.s, state.q, state.qdot, state.qddot)
+        self.course = course
+        self.path, self.kept = along.by_length()
+        self.speeds = np.linalg.norm(state.qdot, axis=1)
+        self._limits = limits
+        self._plane = PhasePlane(limits, self.path)
+        y_dp = course.y_dp[self.kept]
+        slopes = y_dp / np.maximum(self.speeds[self.kept], 1e-300)[:, None]
+        for end, beside in ((0, 1), (-1, -2)):
+            if not self.speeds[self.kept[end]] > 0.0:
+                slopes[end] = slopes[beside]
+        self._y = course.y[self.kept]
+        self._slopes = slopes
+
+    def solve(
+        self, rates: tuple[float, float], narrower: np.ndarray | None = None
+    ) -> Timing | None:
+        """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane`."""
+        if narrower is not None:
+            self._plane.narrow(narrower)
+        return self._plane.solve(rates)
+
+    def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Curves and their rates, (K, c), at times of a timing, (K,), s: cubics between the stations."""
+        i = np.clip(np.searchsorted(timing.times, t, side="right") - 1, 0, None)
+        i = np.minimum(i, len(timing.acceleration) - 1)
+        ahead = t - timing.times[i]
+        way = (timing.rate[i] + 0.5 * timing.acceleration[i] * ahead) * ahead
+        rate = timing.rate[i] + timing.acceleration[i] * ahead
+        step = np.diff(self.path.p)[i]
+        u = np.clip(way / step, 0.0, 1.0)[:, None]
+        chord = self._y[i + 1] - self._y[i]
+        first = self._slopes[i] * step[:, None] - chord
+        last = self._slopes[i + 1] * step[:, None] - chord
+        bump = (1.0 - u) * first - u * last
+        y = self._y[i] + u * (chord + (1.0 - u) * bump)
+        by_u = chord + (1.0 - 2.0 * u) * bump - u * (1.0 - u) * (first + last)
+        return y, by_u * (rate / step)[:, None]
+
+    def accelerations(self, timing: Timing) -> np.ndarray:
+        """Joint accelerations half-way between the stations, (P - 1, n), each as what it takes of a limit."""
+        motion = Passage(self.path.middles(), timing.middle_rate, timing.acceleration)
+        return motion.qddot * self._plane.weights

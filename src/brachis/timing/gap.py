@@ -1,0 +1,177 @@
+"""The timing gap: by how much another timing of a motion's own joint path could be faster."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brachis.common.summary import Summary
+from brachis.limits import Limit
+from brachis.robot.plausibility import Issue
+from brachis.timing.joint_path import JointPath
+from brachis.timing.phase_plane import PhasePlane, is_left_out
+from brachis.trajectory import MotionPhase, Trajectory
+
+PLACES = 2000
+"""Places at which the joint path of a motion is timed, no fewer."""
+_LEAST_PLACES = 12
+"""Places in every knot interval, no fewer."""
+WORTH_A_WARNING = 0.02
+"""Gap from which on a plan warns."""
+_STILL = 1e-9
+"""Part of the largest speed below which a phase begins or ends at rest."""
+_SHARE = 0.8
+"""Part of the lost time that lies in the s-interval that is named."""
+
+
+@dataclass(frozen=True, repr=False)
+class TimingGap(Summary):
+    """A motion beside the fastest timing of its own joint path.
+
+    Attributes
+    ----------
+    t_end : float
+        Of the motion, s.
+    least_time : float
+        Of its joint path, s: between the same speeds at the ends of its phases, with accelerations that may jump.
+    places : int
+        Places of the grid on which that is known.
+    left_out : tuple of str
+        Kinds of the limits that the least time leaves out: it is a bound then.
+    s_interval : tuple of float
+        Shortest part of the path on which four fifths of the difference are lost.
+    """
+
+    t_end: float
+    least_time: float
+    places: int
+    left_out: tuple[str, ...]
+    s_interval: tuple[float, float]
+
+    @property
+    def gap(self) -> float:
+        """How much longer the motion takes, as a fraction of the least time."""
+        return self.t_end / self.least_time - 1.0
+
+    def __str__(self) -> str:
+        """Say how much faster another timing could be."""
+        saved = 100.0 * max(1.0 - self.least_time / self.t_end, 0.0)
+        without = ""
+        if self.left_out:
+            without = f", even without the limit on {' and '.join(self.left_out)}"
+        rounded = max(np.ceil(10.0 * saved - 1e-6) / 10.0, 0.1)
+        return (
+            f"no timing of this joint path is more than {rounded:.1f} % faster{without} "
+            f"(on a grid of {self.places} places)"
+        )
+
+    def issues(self, *, intervals_are_given: bool) -> tuple[Issue, ...]:
+        """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known."""
+        if self.gap <= WORTH_A_WARNING or self.left_out:
+            return ()
+        low, high = (round(s, 4) for s in self.s_interval)
+        saved = 100.0 * (1.0 - self.least_time / self.t_end)
+        advice = "raise search.time_limit"
+        if intervals_are_given:
+            advice = "set spline.intervals: auto, or a larger number"
+        message = (
+            f"another timing of the same joint path is {saved:.1f} % faster: {self.least_time:.4g} s; most of this "
+            f"is lost at s = {low:.3g} to {high:.3g}; to come closer, {advice}"
+        )
+        found = f"a motion of {self.t_end:.4g} s"
+        usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
+        return (Issue("spline.intervals", message, found, usual),)
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown."""
+        return {"t_end": f"{self.t_end:.4f} s", "timing": str(self)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {
+            "gap": self.gap,
+            "least_time_s": self.least_time,
+            "places": self.places,
+            "left_out": list(self.left_out),
+            "s_interval": list(self.s_interval),
+        }
+
+
+def find_timing_gap(
+    trajectory: Trajectory, limits: Sequence[Limit]
+) -> TimingGap | None:
+    """Compare a motion with the fastest timing of its own joint path.
+
+    Phases of given speed, and pauses, take as long as they do.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    limits : sequence of Limit
+        Of its task.
+
+    Returns
+    -------
+    TimingGap or None
+        None if the limits allow no timing of the joint path on the grid.
+    """
+    total = 0.0
+    places = 0
+    lost_s = []
+    lost = []
+    for phase, spline in zip(trajectory.phases, trajectory.phase_splines, strict=True):
+        if phase.kind != "move":
+            total += phase.duration
+            continue
+        found = _time_phase(trajectory, phase, len(spline.breaks) - 1, limits)
+        if found is None:
+            return None
+        path, own, times = found
+        total += float(times[-1])
+        places += len(times)
+        lost_s.append(path.s[1:])
+        lost.append(np.diff(own) - np.diff(times))
+    left_out = sorted({limit.name for limit in limits if is_left_out(limit)})
+    interval = (0.0, 1.0)
+    if lost:
+        interval = _narrowest(np.concatenate(lost_s), np.concatenate(lost))
+    return TimingGap(trajectory.t_end, total, places, tuple(left_out), interval)
+
+
+def _time_phase(
+    trajectory: Trajectory,
+    phase: MotionPhase,
+    intervals: int,
+    limits: Sequence[Limit],
+) -> tuple[JointPath, np.ndarray, np.ndarray] | None:
+    """Stations of a phase's joint path, when the motion passes them, and when the fastest timing does, (P,), s."""
+    count = max(PLACES, _LEAST_PLACES * intervals)
+    inner = trajectory.times[
+        (trajectory.times > phase.begin) & (trajectory.times < phase.end)
+    ]
+    t = np.union1d(np.linspace(phase.begin, phase.end, count + 1), inner)
+    t = t[np.append(np.diff(t) > 1e-9 * phase.duration, True)]
+    motion = trajectory.at(t)
+    path, kept = JointPath(t, motion.s, motion.q, motion.qdot, motion.qddot).by_length()
+    speeds = np.linalg.norm(motion.qdot, axis=1)
+    speeds = np.where(speeds > _STILL * speeds.max(), speeds, 0.0)
+    timing = PhasePlane(limits, path).solve((float(speeds[0]), float(speeds[-1])))
+    if timing is None:
+        return None
+    return path, t[kept], timing.times
+
+
+def _narrowest(s: np.ndarray, lost: np.ndarray) -> tuple[float, float]:
+    """Shortest part of the path, (P,), on which most of the time, (P,), is lost."""
+    total = np.append(0.0, np.cumsum(np.maximum(lost, 0.0)))
+    if np.isnan(s).any() or not total[-1] > 0.0:
+        return 0.0, 1.0
+    ends = np.searchsorted(total, total + _SHARE * total[-1])
+    begins = np.flatnonzero(ends < len(total))
+    places = np.append(s[0], s)
+    lengths = places[ends[begins]] - places[begins]
+    first = begins[int(np.argmin(lengths))]
+    return float(places[first]), float(places[ends[first]])

@@ -1,0 +1,118 @@
+"""A joint path q(p) at stations, with its first and second derivatives by the path parameter p.
+
+The parameter may be the path coordinate s, the time of a known motion, or the length of the joint path. The least time
+does not depend on which it is. By its length a path is regular where a motion along it starts from rest: there both s
+and q depend on time by powers, and derivatives by time vanish.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.kinematics import JointState
+from brachis.robot.dynamics import SharedTorques
+
+_STANDING = 1e-7
+"""Part of the largest speed below which a motion is taken to stand still."""
+
+
+@dataclass(frozen=True)
+class JointPath:
+    """A joint path at stations.
+
+    Attributes
+    ----------
+    p : (P,) ndarray
+        Path parameter, ascending.
+    s : (P,) ndarray
+        Path coordinate of the tool; NaN without a path.
+    q, q_dp, q_ddp : (P, n) ndarray
+        Postures, rad or m, and their derivatives by p.
+    """
+
+    p: np.ndarray
+    s: np.ndarray
+    q: np.ndarray
+    q_dp: np.ndarray
+    q_ddp: np.ndarray
+
+    @classmethod
+    def through(cls, s: np.ndarray, q: np.ndarray) -> JointPath:
+        """Lay cubic splines through postures, (P, n), at path coordinates, (P,)."""
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(s, q)
+        return cls(s, s, q, spline(s, 1), spline(s, 2))
+
+    @classmethod
+    def of_state(cls, p: np.ndarray, state: JointState) -> JointPath:
+        """Take a state whose derivatives by time are derivatives by p, (P,)."""
+        return cls(p, state.s, state.q, state.qdot, state.qddot)
+
+    def by_length(self) -> tuple[JointPath, np.ndarray]:
+        """Measure the path by its length in place of p.
+
+        Returns
+        -------
+        path : JointPath
+            Without the stations at which q does not change with p, but with both ends.
+        kept : (P',) int ndarray
+            Numbers of its stations.
+        """
+        speed = np.linalg.norm(self.q_dp, axis=1)
+        moves = speed > _STANDING * speed.max()
+        inner = moves.copy()
+        inner[[0, -1]] = True
+        kept = np.flatnonzero(inner)
+        q = self.q[kept]
+        speed = speed[kept]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tangent = self.q_dp[kept] / speed[:, None]
+            along = np.sum(self.q_ddp[kept] * tangent, axis=1)
+            bend = (self.q_ddp[kept] - tangent * along[:, None]) / speed[:, None] ** 2
+        for end, beside in ((0, 1), (-1, -2)):
+            if not moves[kept[end]]:
+                tangent[end] = tangent[beside]
+                bend[end] = bend[beside]
+        chords = np.linalg.norm(np.diff(q, axis=0), axis=1)
+        # The arc over a chord of a circle; both ends may bend differently.
+        bends = np.linalg.norm(bend, axis=1)
+        half = 0.25 * (bends[1:] + bends[:-1]) * chords
+        lengths = chords * (1.0 + np.minimum(half, 1.0) ** 2 / 6.0)
+        length = np.append(0.0, np.cumsum(np.maximum(lengths, 1e-300)))
+        return JointPath(length, self.s[kept], q, tangent, bend), kept
+
+    def middles(self) -> JointPath:
+        """Take the path half-way between its stations, by cubics between these."""
+        steps = np.diff(self.p)[:, None]
+        p, s, q, q_dp, q_ddp = (
+            0.5 * (part[1:] + part[:-1])
+            for part in (self.p, self.s, self.q, self.q_dp, self.q_ddp)
+        )
+        q -= 0.125 * steps * np.diff(self.q_dp, axis=0)
+        q_dp -= 0.125 * steps * np.diff(self.q_ddp, axis=0)
+        return JointPath(p, s, q, q_dp, q_ddp)
+
+
+class Passage(SharedTorques):
+    """The motion that passes the stations of a joint path; limits take it as it is.
+
+    Parameters
+    ----------
+    path : JointPath
+    rate, acceleration : (P,) ndarray
+        dp/dt, 1/s, and d2p/dt2, 1/s^2.
+    """
+
+    def __init__(
+        self, path: JointPath, rate: np.ndarray, acceleration: np.ndarray
+    ) -> None:
+        self.rate = rate
+        self.acceleration = acceleration
+        self.s = path.s
+        self.q = path.q
+        self.qdot = path.q_dp * rate[:, None]
+        self.qddot = path.q_dp * acceleration[:, None] + path.q_ddp * rate[:, None] ** 2
+        self.qdddot = np.zeros_like(self.q)

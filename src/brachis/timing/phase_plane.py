@@ -1,0 +1,410 @@
+"""The fastest timing of a joint path: the phase plane of the path parameter p and its rate dp/dt.
+
+With u = d2p/dt2 and x = (dp/dt)^2 the motion along q(p) is
+
+    qdot = q_dp sqrt(x),        qddot = q_dp u + q_ddp x,        dx/dp = 2 u.
+
+Every limit on velocities, accelerations and torques is a row in (u, x) half-way between stations,
+
+    lower <= a u + b x + c <= upper,        a = v_a q_dp,   b = v_a q_ddp + v_v q_dp / (2 sqrt(x)),
+
+where v_v and v_a are the partial derivatives of its value by qdot and qddot. For rigid bodies and for accelerations the
+rows are exact. Friction, torque that falls with speed, power and the size of the tool's acceleration are linearised at
+the last timing, again and again until the rows agree with the values. A limit without acceleration bounds x alone.
+
+Between two stations u is constant and x is linear in p, and the rows half-way between them hold. Backwards from the
+end, the interval of x is kept from which the next station's interval can be reached; forwards, the largest u is taken
+(Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
+
+Limits on the third derivative and on means have no such rows, and are left out: without them the time is a bound.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from brachis.limits import Limit
+from brachis.timing.joint_path import JointPath, Passage
+
+_TINY = 1e-9
+"""Coefficients and slopes below this are taken for zero."""
+_ROUNDING = 1e-6
+"""Part of (dp/dt)^2 at the ends by which rounding may exceed a limit."""
+_SLOWEST = 1e-3
+"""Part of the median rate below which rows are not linearised."""
+_STOPPED = 1e-6
+"""Part of the median rate below which no station but the ends is passed."""
+_ROUNDS = 12
+"""Linearisations, no more."""
+_AGREE = 1e-6
+"""Change of the time, as a part of it, with which linearisations end."""
+_PAIRS = 4_000_000
+"""Pairs of rows that are compared at once."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When the stations of a joint path are passed.
+
+    Attributes
+    ----------
+    path : JointPath
+    rate : (P,) ndarray
+        dp/dt, 1/s.
+    acceleration : (P - 1,) ndarray
+        d2p/dt2 between the stations, 1/s^2.
+    times : (P,) ndarray
+        From 0 on, s.
+    """
+
+    path: JointPath
+    rate: np.ndarray
+    acceleration: np.ndarray
+    times: np.ndarray
+
+    @classmethod
+    def of(cls, path: JointPath, rate: np.ndarray) -> Timing:
+        """Integrate a rate, (P,), whose square is linear in p between the stations."""
+        steps = np.diff(path.p)
+        durations = 2.0 * steps / (rate[1:] + rate[:-1])
+        acceleration = np.diff(rate**2) / (2.0 * steps)
+        return cls(path, rate, acceleration, np.append(0.0, np.cumsum(durations)))
+
+    @property
+    def t_end(self) -> float:
+        """Time for the whole path, s."""
+        return float(self.times[-1])
+
+    @property
+    def middle_rate(self) -> np.ndarray:
+        """dp/dt half-way between the stations, (P - 1,), 1/s."""
+        squares = self.rate**2
+        return np.sqrt(0.5 * (squares[1:] + squares[:-1]))
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """A limit as rows lower <= a u + b x <= upper at every station, or as largest x where it has no acceleration.
+
+    Attributes
+    ----------
+    limit : Limit
+    by_u, by_x, constant : (P, c) ndarray or None
+        a, b and the value at u = x = 0; None without acceleration.
+    lower, upper : (P, c) ndarray
+        Bounds; without acceleration of x.
+    """
+
+    limit: Limit
+    by_u: np.ndarray | None
+    by_x: np.ndarray | None
+    constant: np.ndarray | None
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @classmethod
+    def of(
+        cls, limit: Limit, path: JointPath, motion: Passage, narrower: np.ndarray
+    ) -> _Rows | None:
+        """Linearise a limit at a motion; None if it restricts neither velocity nor acceleration."""
+        partials = limit.partials(motion)
+        values = limit.values(motion)
+        lower = limit.lower + narrower[:, None]
+        upper = limit.upper - narrower[:, None]
+        rate = motion.rate[:, None]
+        by_rate = np.zeros_like(values)
+        if partials.qdot is not None:
+            by_rate = np.einsum("kcn,kn->kc", partials.qdot, path.q_dp)
+        if partials.qddot is None:
+            if partials.qdot is None:
+                return None
+            with np.errstate(divide="ignore", invalid="ignore"):
+                bound = np.where(by_rate > 0.0, upper, lower)
+                largest = rate + (bound - values) / by_rate
+            largest = np.where(np.abs(by_rate) > _TINY, largest, np.inf)
+            squares = np.maximum(largest, 0.0) ** 2
+            return cls(limit, None, None, None, np.zeros_like(squares), squares)
+        by_u = np.einsum("kcn,kn->kc", partials.qddot, path.q_dp)
+        by_x = np.einsum("kcn,kn->kc", partials.qddot, path.q_ddp)
+        by_x += by_rate / (2.0 * rate)
+        constant = values - by_u * motion.acceleration[:, None] - by_x * rate**2
+        return cls(limit, by_u, by_x, constant, lower - constant, upper - constant)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the values."""
+        return [str(label) for label in self.limit.labels]
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether its tangents at other motions may be kept: sizes of vectors, which have no lower bound."""
+        return self.by_u is not None and not np.isfinite(self.limit.lower).any()
+
+    def error(self, motion: Passage) -> float:
+        """How far the rows are from the values along a motion."""
+        values = self.limit.values(motion)
+        if self.by_u is None or self.by_x is None or self.constant is None:
+            return float((values - self.limit.upper).max(initial=0.0))
+        rate = motion.rate[:, None]
+        rows = self.by_u * motion.acceleration[:, None] + self.by_x * rate**2
+        return float(np.abs(values - rows - self.constant).max(initial=0.0))
+
+
+class PhasePlane:
+    """Limits along a joint path: slope x + lower <= u <= slope x + upper, and floor <= x <= ceiling.
+
+    Parameters
+    ----------
+    limits : sequence of Limit
+    path : JointPath
+        At least three stations.
+    """
+
+    def __init__(self, limits: Sequence[Limit], path: JointPath) -> None:
+        self.path = path
+        self._middles = path.middles()
+        self._limits = [
+            limit
+            for limit in limits
+            if limit.longer_time == "relieves" and not is_left_out(limit)
+        ]
+        self._steps = np.diff(path.p)
+        self._narrower = np.zeros(len(self._steps))
+        self._rounds: list[list[_Rows]] = []
+        rate = np.full(len(self._steps), path.p[-1] - path.p[0])
+        self._linearise(Passage(self._middles, rate, np.zeros_like(rate)))
+
+    def _linearise(self, motion: Passage) -> None:
+        """Write the limits at a motion half-way between the stations, and the bounds that follow."""
+        found = [
+            _Rows.of(limit, self._middles, motion, self._narrower)
+            for limit in self._limits
+        ]
+        rows = [own for own in found if own is not None]
+        self._motion = motion
+        self._rounds = [rows, *self._rounds[:2]]
+        earlier = [own for older in self._rounds[1:] for own in older if own.is_convex]
+        sloped = [own for own in rows + earlier if own.by_u is not None]
+        levels = [own for own in rows if own.by_u is None]
+        blank = [np.empty((len(self._steps), 0))]
+        self._levels = np.hstack(blank + [own.upper for own in levels])
+        self._labels = [name for own in sloped + levels for name in own.names]
+        a, b, low, high = (
+            np.hstack(blank + [getattr(own, part) for own in sloped])
+            for part in ("by_u", "by_x", "lower", "upper")
+        )
+        self._slope, self._lower, self._upper = _as_lines(a, b, low, high)
+        # Half-way x is x + step u, seen from the station before.
+        step = self._steps[:, None]
+        slope, lower, upper = _as_lines(a + step * b, b, low, high)
+        self._floor, ceiling = _bounds_of_pairs(slope, lower, upper)
+        highest = self._levels.min(axis=1, initial=np.inf)
+        with np.errstate(invalid="ignore"):
+            between = 0.5 * (highest[1:] + highest[:-1])
+        at_stations = np.concatenate([highest[:1], between, highest[-1:]])
+        self._ceiling = np.minimum(np.append(ceiling, np.inf), at_stations)
+        # x + 2 step u is x at the next station.
+        self._factor = 1.0 + 2.0 * step * slope
+        self._least = 2.0 * step * lower
+        self._most = 2.0 * step * upper
+
+    def narrow(self, narrower: np.ndarray) -> None:
+        """Bring the bounds of all values nearer, by so much half-way between the stations, (P - 1,)."""
+        self._narrower = narrower
+        self._rounds = []
+        self._linearise(self._motion)
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Largest part of a limit that a unit of each joint's acceleration takes on most of the path, (n,)."""
+        found = [np.zeros(self.path.q.shape[1])]
+        for limit in self._limits:
+            by_qddot = limit.partials(self._motion).qddot
+            if by_qddot is not None:
+                found.append(np.median(np.abs(by_qddot), axis=0).max(axis=0))
+        return np.max(found, axis=0)
+
+    def solve(self, rates: tuple[float, float] = (0.0, 0.0)) -> Timing | None:
+        """Find the fastest timing with dp/dt given at both ends, 1/s; None if the joint path cannot be followed."""
+        best: Timing | None = None
+        for _ in range(_ROUNDS):
+            rate = self.fastest(rates)
+            if rate is None and best is not None:
+                # A linearisation may promise too little far from where it was made.
+                self._linearise(self._pass(best, 0.8))
+                rate = self.fastest(rates)
+            if rate is None:
+                return best
+            timing = Timing.of(self.path, rate)
+            change = np.inf if best is None else abs(timing.t_end / best.t_end - 1.0)
+            best = timing
+            motion = self._pass(timing)
+            error = max((own.error(motion) for own in self._rounds[0]), default=0.0)
+            if change < _AGREE or error < _AGREE:
+                break
+            self._linearise(motion)
+        return best
+
+    def _pass(self, timing: Timing, factor: float = 1.0) -> Passage:
+        """Pass the path half-way between its stations, faster by a factor; nowhere so slow that friction vanishes."""
+        rate = timing.middle_rate
+        rate = factor * np.maximum(rate, _SLOWEST * np.median(rate))
+        return Passage(self._middles, rate, factor**2 * timing.acceleration)
+
+    def times(self, rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray | None:
+        """Find when the stations are passed, (P,), s; see `solve`."""
+        timing = self.solve(rates)
+        return None if timing is None else timing.times
+
+    def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
+        """Largest dp/dt at the stations, (P,), 1/s, within the rows as they are; see `solve`."""
+        first, last = (rate**2 for rate in rates)
+        reach = self._go_backwards(last)
+        if reach is None:
+            return None
+        low, high = reach
+        if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
+            return None
+        x = first
+        found = [x]
+        intervals = zip(self._factor, self._most, low[1:], high[1:], strict=True)
+        for factor, most, lowest, highest in intervals:
+            x = min((factor * x + most).min(initial=np.inf), highest)
+            x = max(x, lowest)
+            found.append(x)
+        squares = np.array(found)
+        if not squares.max() > 0.0:
+            return None
+        # Between stations nothing stops; a station where the grid says so is an artefact of its width.
+        slowest = (_STOPPED * np.median(np.sqrt(squares))) ** 2
+        squares[1:-1] = np.maximum(squares[1:-1], slowest)
+        return np.sqrt(squares)
+
+    def _go_backwards(self, last: float) -> tuple[list[float], list[float]] | None:
+        """Find the intervals of x, (P,), from which the end can be reached with x = `last`; None if one is empty."""
+        if last > self._ceiling[-1] * (1.0 + _ROUNDING):
+            return None
+        rises = self._factor > _TINY
+        inverse = 1.0 / np.where(rises, self._factor, 1.0)
+        # The least x at the next station is not above its highest one, nor the largest below its lowest one.
+        least = np.where(rises, self._least, -np.inf)
+        most = np.where(rises, self._most, np.inf)
+        is_held = bool((self._most >= 0.0).all() and not self._floor.any())
+        low = last
+        high = last
+        lows = [low]
+        highs = [high]
+        for i in range(len(self._steps) - 1, -1, -1):
+            high = ((high - least[i]) * inverse[i]).min(initial=np.inf)
+            high = min(high, self._ceiling[i])
+            if low > 0.0 or not is_held:
+                low = ((low - most[i]) * inverse[i]).max(initial=-np.inf)
+                low = max(low, self._floor[i])
+            if low > high * (1.0 + _ROUNDING) or high < 0.0:
+                return None
+            high = max(high, low)
+            lows.append(low)
+            highs.append(high)
+        return lows[::-1], highs[::-1]
+
+    def speed_factor(
+        self, rate: np.ndarray, acceleration: np.ndarray
+    ) -> tuple[float, float, str]:
+        """Find by how much a motion may be faster, or has to be slower.
+
+        Parameters
+        ----------
+        rate, acceleration : (P,) ndarray
+            dp/dt, 1/s, and d2p/dt2, 1/s^2, at the stations.
+
+        Returns
+        -------
+        tuple of float, float and str
+            The largest factor of its speed; the path coordinate and the label of the limit that allow no more.
+        """
+        rate = np.sqrt(0.5 * (rate[1:] ** 2 + rate[:-1] ** 2))
+        factors = self._factors(rate, 0.5 * (acceleration[1:] + acceleration[:-1]))
+        least = factors.min(axis=1)
+        # The first place of equal ones.
+        number = int(np.argmax(least <= least.min() * (1.0 + _ROUNDING)))
+        column = int(np.argmin(factors[number]))
+        place = float(self.path.s[number])
+        return float(least[number]), place, self._labels[column]
+
+    def _factors(self, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """Largest factor, (P - 1, c), of the speed of a motion half-way between the stations for each limit alone."""
+        x = rate[:, None] ** 2
+        beside = acceleration[:, None] - self._slope * x
+        bound = np.hstack(
+            [np.where(beside > 0.0, self._upper, self._lower), self._levels]
+        )
+        used = np.hstack([beside, np.broadcast_to(x, self._levels.shape)])
+        squares = np.divide(
+            bound, used, out=np.full_like(bound, np.inf), where=used != 0.0
+        )
+        return np.sqrt(np.maximum(squares, 0.0))
+
+    def active_limit(self, rate: np.ndarray) -> str:
+        """Name the limit that a motion, dp/dt (P,), 1/s, as fast as possible, is at for most of its way."""
+        timing = Timing.of(self.path, rate)
+        factors = self._factors(timing.middle_rate, timing.acceleration)
+        columns = np.argmin(factors, axis=1)
+        return self._labels[int(np.argmax(np.bincount(columns, self._steps)))]
+
+    def largest_rate(self, end: int) -> tuple[float, str]:
+        """Find the largest dp/dt, 1/s, that the limits allow beside an end (0 or -1), and which one allows no more."""
+        tilt = self._slope[end][:, None] - self._slope[end]
+        clearance = self._upper[end][:, None] - self._lower[end]
+        falls = tilt < -_TINY
+        squares = np.divide(
+            clearance, -tilt, out=np.full_like(tilt, np.inf), where=falls
+        )
+        highest = np.append(squares.min(axis=1, initial=np.inf), self._levels[end])
+        column = int(np.argmin(highest))
+        return math.sqrt(max(highest[column], 0.0)), self._labels[column]
+
+
+def is_left_out(limit: Limit) -> bool:
+    """Tell whether the phase plane leaves a limit out that a slower timing relieves: jerks, torque rates and means."""
+    return limit.order > 2 or limit.guarantee.is_mean
+
+
+def _as_lines(
+    a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Turn low <= a u + b x <= high, (P, c) each, into slope x + lower <= u <= slope x + upper."""
+    # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
+    a = np.where(np.abs(a) < _TINY, _TINY, a)
+    ends = low / a, high / a
+    return -b / a, np.minimum(*ends), np.maximum(*ends)
+
+
+def _bounds_of_pairs(
+    slope: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the least and the largest x, (P,), at which no lower line, (P, c), is above an upper one."""
+    count, rows = slope.shape
+    floor = np.zeros(count)
+    ceiling = np.full(count, np.inf)
+    if not rows:
+        return floor, ceiling
+    step = max(1, _PAIRS // rows**2)
+    for first in range(0, count, step):
+        part = slice(first, first + step)
+        tilt = slope[part, :, None] - slope[part, None]
+        clearance = upper[part, None] - lower[part, :, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            meet = clearance / tilt
+        above = np.where(tilt > _TINY, meet, np.inf).min(axis=(1, 2))
+        below = np.where(tilt < -_TINY, meet, -np.inf).max(axis=(1, 2))
+        ceiling[part] = above
+        floor[part] = np.maximum(below, 0.0)
+        # Parallel lines that leave nothing between them.
+        is_empty = ((np.abs(tilt) <= _TINY) & (clearance < 0.0)).any(axis=(1, 2))
+        ceiling[part][is_empty] = -1.0
+    return floor, ceiling
