@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from brachis.optimise.bspline import ORDERS, local_basis
 from brachis.path.time_law import TimeLaw
@@ -45,7 +46,7 @@ class BoundarySpline:
     knots : (N + 2 d + 1,) ndarray
     degree : int
         d.
-    matrix : (N + d, free) ndarray
+    matrix : (N + d, free) csr_array
         S.
     given : (1 + k, N + d) ndarray
         Given terms of the control points, by powers of the duration.
@@ -53,7 +54,7 @@ class BoundarySpline:
 
     knots: np.ndarray
     degree: int
-    matrix: np.ndarray
+    matrix: csr_array
     given: np.ndarray
 
     @classmethod
@@ -78,14 +79,16 @@ class BoundarySpline:
                 fading[own] = blossoms[power][own]
                 fading[other] = 0.0
                 given[power] += derivative * fading
-        free = np.unique(group[group >= 0])
-        matrix = (group[:, None] == free).astype(float)
-        return cls(knots, degree, matrix, given)
+        points = np.flatnonzero(group >= 0)
+        variables = np.unique(group[points], return_inverse=True)[1]
+        shape = (count, int(variables.max(initial=-1)) + 1)
+        entries = (np.ones(len(points)), (points, variables))
+        return cls(knots, degree, csr_array(entries, shape=shape), given)
 
     @property
     def free(self) -> int:
         """Number of free variables."""
-        return self.matrix.shape[1]
+        return int(self.matrix.shape[1])
 
     @property
     def greville(self) -> np.ndarray:
@@ -103,10 +106,10 @@ class BoundarySpline:
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
         """Free variables that come nearest to given control points: means over those that are one variable each."""
         own_part = control_points - self.given_points(duration)
-        is_alone = np.count_nonzero(self.matrix, axis=1) == 1
-        is_alone &= self.matrix.max(axis=1, initial=0.0) == 1.0
+        counts = np.diff(self.matrix.indptr)
+        is_alone = (counts == 1) & (self.matrix @ np.ones(self.free) == 1.0)
         own = self.matrix[is_alone]
-        return np.asarray(own_part[is_alone] @ own / own.sum(axis=0))
+        return np.asarray(own.T @ own_part[is_alone] / (own.T @ np.ones(own.shape[0])))
 
 
 def sum_powers(
@@ -180,7 +183,7 @@ def periodic(
     if not np.isnan(start):
         given[0] += start * matrix[:, 0]
         matrix = matrix[:, 1:]
-    return BoundarySpline(knots, degree, matrix, given)
+    return BoundarySpline(knots, degree, csr_array(matrix), given)
 
 
 @dataclass(frozen=True)
@@ -300,11 +303,17 @@ class SparsityPattern:
     @classmethod
     def of(cls, columns: np.ndarray, spline: BoundarySpline) -> SparsityPattern:
         """Find the places of a spline's local basis, whose `columns` are (K, d + 1)."""
-        weights = spline.matrix[columns]
-        point, function, variable = np.nonzero(weights)
+        matrix = spline.matrix
+        points = columns.ravel()
+        counts = np.diff(matrix.indptr)[points]
+        term = np.repeat(np.arange(len(points)), counts)
+        within = np.arange(len(term)) - np.repeat(np.cumsum(counts) - counts, counts)
+        entry = matrix.indptr[points][term] + within
+        variable = matrix.indices[entry]
+        weight = matrix.data[entry]
+        point, function = np.divmod(term, columns.shape[1])
         numbers = point * spline.free + variable
         unique, place = np.unique(numbers, return_inverse=True)
-        weight = weights[point, function, variable]
         own_point, own_variable = np.divmod(unique, max(spline.free, 1))
         return cls(own_point, own_variable, (point, function), place, weight)
 

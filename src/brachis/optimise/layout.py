@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 
 from brachis.limits import Limit
 from brachis.optimise.boundary import BoundarySpline, SparsityPattern, sum_powers
@@ -60,15 +61,18 @@ class Progress:
     def of(cls, spline: BoundarySpline) -> Progress:
         """Take the differences of a spline whose free variables follow the duration, variable 0."""
         given = np.diff(spline.given, axis=1)
-        matrix = np.diff(spline.matrix, axis=0)
+        matrix = csr_array(spline.matrix[1:] - spline.matrix[:-1])
+        matrix.eliminate_zeros()
         depends = np.any(given[1:] != 0.0, axis=0)
-        several = np.count_nonzero(matrix, axis=1) + depends > 1
+        several = np.diff(matrix.indptr) + depends > 1
         several |= np.any(given[2:] != 0.0, axis=0)
-        weights = np.column_stack([np.zeros(several.sum()), matrix[several]])
-        is_entry = weights != 0.0
-        is_entry[:, 0] = depends[several]
-        row, variable = np.nonzero(is_entry)
-        return cls(given[:, several], row, variable, weights[row, variable])
+        chosen = coo_array(matrix[several])
+        by_duration = np.flatnonzero(depends[several])
+        row = np.concatenate([by_duration, chosen.row])
+        variable = np.concatenate([np.zeros_like(by_duration), 1 + chosen.col])
+        weight = np.concatenate([np.zeros(len(by_duration)), chosen.data])
+        order = np.lexsort((variable, row))
+        return cls(given[:, several], row[order], variable[order], weight[order])
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (p,)."""

@@ -345,12 +345,14 @@ class Phase:
         Raises UnreachableError as `evaluate` does.
         """
         every = np.zeros((len(self.t_norm), 1))
-        weights = self.grid.mean_weights(self._h(x))[None]
         ratios = []
         for limit, values in zip(self.limits, self.evaluate(x).by_limit, strict=True):
-            if limit.longer_time == "relieves":
-                own = weights @ values if limit.guarantee.is_mean else values
-                ratios.append(limit.ratio(own) + every)
+            if limit.longer_time != "relieves":
+                continue
+            own = values
+            if limit.guarantee.is_mean:
+                own = self.grid.mean_weights(self._h(x))[None] @ values
+            ratios.append(limit.ratio(own) + every)
         return np.hstack(ratios)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:

@@ -262,12 +262,13 @@ def _zoom(
 def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
     """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
     t_norm = phase.t_norm
-    sides = [
-        np.searchsorted(phase.jumps, times, side="right") for times in (extra, t_norm)
-    ]
-    is_same_side = sides[0][:, None] == sides[1]
-    gaps = np.where(is_same_side, np.abs(extra[:, None] - t_norm), np.inf)
-    return np.union1d(t_norm, extra[gaps.min(axis=1) > 1e-5])
+    before = np.clip(np.searchsorted(t_norm, extra), 1, len(t_norm) - 1) - 1
+    side = np.searchsorted(phase.jumps, extra, side="right")
+    gaps = []
+    for neighbour in (t_norm[before], t_norm[before + 1]):
+        is_same_side = np.searchsorted(phase.jumps, neighbour, side="right") == side
+        gaps.append(np.where(is_same_side, np.abs(extra - neighbour), np.inf))
+    return np.union1d(t_norm, extra[np.min(gaps, axis=0) > 1e-5])
 
 
 _LONGEST = 0.01

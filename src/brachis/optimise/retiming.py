@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.boundary import greville
@@ -26,12 +27,16 @@ from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
-from brachis.timing import Course, TimedCourse, Timing, is_left_out
+from brachis.timing import Course, TimedCourse, Timing, divide_turns, is_left_out
 
 SOLVER = "phase plane"
 """Name of what solves a program by its timing alone."""
 PLACES = 2000
 """Places at which a joint path is timed, about, and no fewer."""
+_PLACES_A_PIECE = 24
+"""Places in every piece of a path, unless there are very many of these."""
+_MOST_PLACES = 40_000
+"""Places in all pieces together, about."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
 _ROUNDS = 10
@@ -44,8 +49,8 @@ _SHORTEST = 0.2
 """Shortest interval that is halved: this part of the tolerance, for each of the first intervals."""
 _LOOKS = 12
 """Times in each interval at which limits are looked at."""
-_LESS = 3.0
-"""Intervals lose less than is estimated, by about this factor."""
+_FINENESS = (3.0, 1.0, 0.3)
+"""What intervals may lose together, in tolerances: less where splines had to be much slower than the timing."""
 _ANCHORED = 100
 """Intervals after which the splines are where the timing is."""
 _ENOUGH = 5e-5
@@ -61,15 +66,12 @@ class PhaseTiming:
     course : TimedCourse
     rates : tuple of float
         Of the path's length at both ends, 1/s.
-    times : (P,) ndarray
-        When the motion passes the stations, s.
     timing : Timing or None
         None where the limits allow none, not even the motion's own, within rounding.
     """
 
     course: TimedCourse
     rates: tuple[float, float]
-    times: np.ndarray
     timing: Timing | None
 
     @classmethod
@@ -80,8 +82,10 @@ class PhaseTiming:
         motion = phase.motion(x)
         count = max(_LEAST_PLACES, -(-PLACES // phase.intervals))
         t = spread(motion.breaks / motion.t_end, count) * motion.t_end
-        y, ydot, yddot, _ = motion.at(t)
         try:
+            before = phase.joint_map.state(*motion.at(t), t=t)
+            t = divide_turns(t, before.qdot)
+            y, ydot, yddot, _ = motion.at(t)
             course = TimedCourse(
                 Course(t, y, ydot, yddot), phase.joint_map, phase.limits
             )
@@ -89,7 +93,37 @@ class PhaseTiming:
             return None
         speeds = course.speeds
         rates = float(speeds[0]), float(speeds[-1])
-        return cls(course, rates, t[course.kept], course.solve(rates))
+        return cls(course, rates, course.solve(rates))
+
+    @classmethod
+    def along(
+        cls, phase: Phase, curves: np.ndarray, rates: tuple[float, float]
+    ) -> PhaseTiming:
+        """Time a joint path between rates ds/dt at its ends, 1/s; raise UnreachableError if it leaves the map.
+
+        Parameters
+        ----------
+        phase : Phase
+        curves : (S, c) ndarray
+            Values along it: s, ascending, and the redundant curves.
+        rates : tuple of float
+        """
+        path = phase.joint_map.path
+        assert path is not None
+        begin, end = curves[[0, -1], 0]
+        knots = path.knots[(path.knots > begin) & (path.knots < end)]
+        ends = np.concatenate([[begin], knots, [end]])
+        ends = ends[np.append(np.diff(ends) > tolerances.PATH, True)]
+        least = np.clip(_MOST_PLACES // (len(ends) - 1), 4, _PLACES_A_PIECE)
+        even = np.ceil(PLACES * np.diff(ends) / (end - begin))
+        s = spread(ends, np.maximum(even, least).astype(int))
+        coarse = Course.through(curves, s)
+        derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
+        state = phase.joint_map.state(*derivatives, t=s - begin)
+        s = divide_turns(s, state.qdot)
+        course = TimedCourse(Course.through(curves, s), phase.joint_map, phase.limits)
+        by_length = tuple(course.speeds[[0, -1]] * rates)
+        return cls(course, by_length, course.solve(by_length))
 
 
 def time_phases(solved: SolvedProgram) -> list[PhaseTiming | None]:
@@ -134,8 +168,9 @@ def breaks_for(
     t = 0.5 * (timing.times[1:] + timing.times[:-1]) / timing.t_end
     if from_rest:
         # Accelerations begin and end at zero.
+        values = np.pad(values, ((1, 1), (0, 0)), mode="edge")
         values = np.pad(values, ((1, 1), (0, 0)))
-        t = np.concatenate([[0.0], t, [1.0]])
+        t = np.concatenate([[0.0, tolerances.TIME], t, [1.0 - tolerances.TIME, 1.0]])
 
     def loss(low: float, high: float) -> float:
         first, last = np.searchsorted(t, [low, high])
@@ -165,8 +200,8 @@ def breaks_for(
             own = loss(*part)
             lost += own
             heapq.heappush(queue, (-own, *part))
-    begins = [*done, *(low for _, low, _ in queue)]
-    return np.append(np.sort(begins), 1.0)
+    begins = np.sort([*done, *(low for _, low, _ in queue)])
+    return np.append(begins, 1.0)
 
 
 def spline_along(
@@ -316,7 +351,7 @@ def follow(
         With another grid.
     own : PhaseTiming
     tolerance : float
-        See `breaks_for`.
+        Part of the time by which they should not be slower.
     points : int
         Collocation points an interval.
 
@@ -327,43 +362,61 @@ def follow(
     x : (v,) ndarray
         Its motion, which may still exceed limits by a little; None where the limits allow no timing.
     """
+    if own.timing is None:
+        return None
+    best: tuple[Phase, np.ndarray] | None = None
+    least = np.inf
+    for fineness in _FINENESS:
+        finer = _over_knots(phase, own, fineness * tolerance, points)
+        followed = _follow_within_limits(finer, own)
+        if followed is not None and followed[0] < least:
+            least, x = followed
+            best = finer, x
+        if least < own.timing.t_end * (1.0 + tolerance):
+            break
+    return best
+
+
+def _over_knots(phase: Phase, own: PhaseTiming, tolerance: float, points: int) -> Phase:
+    """Return a phase over the knots that its timing needs."""
+    assert own.timing is not None
+    ends = (phase.boundary.start, phase.boundary.end)
+    from_rest = max(len(end[0].derivatives) for end in ends) > 1
+    breaks = breaks_for(own.course, own.timing, tolerance, from_rest=from_rest)
+    knots = clamped_knots(phase.degree, breaks)
+    return phase.with_grid(FixedGrid(knots, phase.degree, spread(breaks, points)))
+
+
+def _follow_within_limits(
+    phase: Phase, own: PhaseTiming
+) -> tuple[float, np.ndarray] | None:
+    """Find the point x, (v,), that follows the timing, and its time, s, with what is needed to hold the limits."""
     course = own.course
     timing = own.timing
-    if timing is None:
-        return None
-    tolerance *= _LESS
-    from_rest = (
-        max(
-            len(end[0].derivatives)
-            for end in (phase.boundary.start, phase.boundary.end)
-        )
-        > 1
-    )
-    breaks = breaks_for(course, timing, tolerance, from_rest=from_rest)
-    knots = clamped_knots(phase.degree, breaks)
-    target = phase.with_grid(FixedGrid(knots, phase.degree, spread(breaks, points)))
-    dense = target.with_points(spread(breaks, _LOOKS))
+    assert timing is not None
+    dense = phase.with_points(spread(phase.breaks, _LOOKS))
     narrower = np.zeros(len(timing.acceleration))
     best: tuple[float, np.ndarray] | None = None
     for _ in range(_ROUNDS):
-        x = fit(target, course, timing)
         try:
+            x = fit(phase, course, timing)
             worst = dense.violation(x).max(axis=1, initial=0.0)
         except UnreachableError:
             break
         largest = float(worst.max())
-        if best is None or timing.t_end * (1.0 + largest) < best[0]:
-            best = timing.t_end * (1.0 + largest), x
+        needed = timing.t_end * (1.0 + largest)
+        if best is None or needed < best[0]:
+            best = needed, x
         if largest <= _ENOUGH:
             break
         each = worst[:-1].reshape(-1, _LOOKS).max(axis=1)
         each[-1] = max(each[-1], worst[-1])
-        narrower = narrower + _spread_excess(each, breaks, timing)
+        narrower = narrower + _spread_excess(each, phase.breaks, timing)
         slower = course.solve(own.rates, narrower)
-        if slower is None:
+        if slower is None or slower.t_end > best[0]:
             break
         timing = slower
-    return None if best is None else (target, best[1])
+    return best
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:
@@ -388,6 +441,61 @@ def _report(
     )
 
 
+def time_guess(
+    program: Program,
+    joint_paths: Sequence[np.ndarray],
+    rates: Sequence[tuple[float, float]],
+    tolerance: float,
+    points: int,
+) -> SolvedProgram | None:
+    """Give joint paths without redundancy their fastest timing, which is all that is to be decided.
+
+    Parameters
+    ----------
+    program : Program
+        Over any knots.
+    joint_paths : sequence of (S, c) ndarray
+        Of every phase, s and other curves.
+    rates : sequence of tuple of float
+        ds/dt at both ends of each, 1/s.
+    tolerance, points
+        As of `retime`.
+
+    Returns
+    -------
+    SolvedProgram or None
+        As of `retime`; or where the phase plane finds no timing.
+    """
+    began = time.perf_counter()
+    if not _is_timing_all(program):
+        return None
+    phases = []
+    parts = []
+    for phase, curves, ends in zip(program.phases, joint_paths, rates, strict=True):
+        try:
+            own = PhaseTiming.along(phase, curves, ends)
+        except UnreachableError:
+            return None
+        followed = follow(phase, own, tolerance, points)
+        if followed is None:
+            return None
+        phases.append(followed[0])
+        parts.append(followed[1])
+    finer = program.with_phases(phases)
+    x = np.concatenate(parts)
+    seconds = time.perf_counter() - began
+    return SolvedProgram(finer, (_report(finer, x, SolveStatus.ACCEPTABLE, seconds),))
+
+
+def _is_timing_all(program: Program) -> bool:
+    """Tell whether the phase plane knows all limits, and phases meet at rest."""
+    is_linked = any(max(link.orders) for link in program.links)
+    is_periodic = any(phase.boundary.periodic for phase in program.phases)
+    has_laws = any(phase.time_law is not None for phase in program.phases)
+    left_out = any(map(is_left_out, program.limits))
+    return not (is_linked or is_periodic or has_laws or left_out)
+
+
 def retime(
     solved: SolvedProgram, tolerance: float, points: int
 ) -> SolvedProgram | None:
@@ -410,9 +518,7 @@ def retime(
     """
     began = time.perf_counter()
     program = solved.program
-    is_linked = any(max(link.orders) for link in program.links)
-    is_periodic = any(phase.boundary.periodic for phase in program.phases)
-    if is_linked or is_periodic or any(map(is_left_out, program.limits)):
+    if not _is_timing_all(program):
         return None
     timings = time_phases(solved)
     least = least_time_of(program, solved.x, timings)

@@ -53,7 +53,8 @@ from brachis.optimise.improve import (
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.optimise.retiming import keep, retime
+from brachis.optimise.retiming import SOLVER as TIMING
+from brachis.optimise.retiming import keep, retime, time_guess
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
@@ -95,6 +96,16 @@ def solve_candidate(
         target = program_of(problem, start.maps_by_leg(), initial_breaks(start))
     except UnreachableError as error:
         return Candidate.of(start, str(error))
+    timed = _time_alone(start, target)
+    if timed is not None:
+        return Candidate.of(
+            start,
+            "planned",
+            program=timed.program,
+            target=timed.program,
+            reports=timed.reports,
+            coarse=timed.t_end,
+        )
     # With more variables a cold solve takes seconds: it is first solved over some of its knots.
     program = coarsest(target) if target.variables > 150 else target
     x = initial_guess(program, start)
@@ -130,6 +141,22 @@ def solve_candidate(
     )
 
 
+def _time_alone(start: InitialGuess, program: Program) -> SolvedProgram | None:
+    """Time a joint path where nothing else is to be decided, over the knots that this needs."""
+    spline = start.problem.task.spline
+    if start.joint_map.r or spline.intervals != "auto" or spline.knots == "free":
+        return None
+    if start.solver != solvers_of(start.problem)[0]:  # as a fallback others solve
+        return None
+    return time_guess(
+        program,
+        start.legs,
+        start.problem.leg_rates,
+        spline.tolerance,
+        spline.points_per_interval,
+    )
+
+
 def finish_candidate(
     candidate: Candidate, deadline: Deadline, listener: Listener
 ) -> Candidate:
@@ -156,6 +183,9 @@ def finish_candidate(
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
+    if candidate.reports[-1].solver == TIMING:
+        options = dataclasses.replace(options, deadline=deadline)
+        return refine_and_verify(candidate, program, candidate.reports, keep, options)
     session = _open_session(start, soon, listener)
     target = candidate.target
     solved = SolvedProgram(program, candidate.reports)

@@ -2,7 +2,7 @@
 
 from brachis.timing.course import Course, TimedCourse
 from brachis.timing.gap import TimingGap, find_timing_gap
-from brachis.timing.joint_path import JointPath, Passage
+from brachis.timing.joint_path import JointPath, Passage, divide_turns
 from brachis.timing.phase_plane import PhasePlane, Timing, is_left_out
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "TimedCourse",
     "Timing",
     "TimingGap",
+    "divide_turns",
     "find_timing_gap",
     "is_left_out",
 ]

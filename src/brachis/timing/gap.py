@@ -11,7 +11,7 @@ import numpy as np
 from brachis.common.summary import Summary
 from brachis.limits import Limit
 from brachis.robot.plausibility import Issue
-from brachis.timing.joint_path import JointPath
+from brachis.timing.joint_path import JointPath, divide_turns
 from brachis.timing.phase_plane import PhasePlane, is_left_out
 from brachis.trajectory import MotionPhase, Trajectory
 
@@ -152,8 +152,11 @@ def _time_phase(
     inner = trajectory.times[
         (trajectory.times > phase.begin) & (trajectory.times < phase.end)
     ]
-    t = np.union1d(np.linspace(phase.begin, phase.end, count + 1), inner)
-    t = t[np.append(np.diff(t) > 1e-9 * phase.duration, True)]
+    ends = np.concatenate([[phase.begin], inner, [phase.end]])
+    ends = ends[np.append(np.diff(ends) > _STILL * phase.duration, True)]
+    steps = np.ceil(count * np.diff(ends) / phase.duration).astype(int)
+    t = np.concatenate([ends[:1], *map(_divide, ends[:-1], ends[1:], steps)])
+    t = divide_turns(t, trajectory.velocity(t))
     motion = trajectory.at(t)
     path, kept = JointPath(t, motion.s, motion.q, motion.qdot, motion.qddot).by_length()
     speeds = np.linalg.norm(motion.qdot, axis=1)
@@ -162,6 +165,11 @@ def _time_phase(
     if timing is None:
         return None
     return path, t[kept], timing.times
+
+
+def _divide(low: float, high: float, steps: int) -> np.ndarray:
+    """Divide an interval evenly: the ends of its parts, without the first one."""
+    return np.linspace(low, high, steps + 1)[1:]
 
 
 def _narrowest(s: np.ndarray, lost: np.ndarray) -> tuple[float, float]:

@@ -18,6 +18,23 @@ _STANDING = 1e-7
 """Part of the largest speed below which a motion is taken to stand still."""
 
 
+_TURN = 0.02
+"""Largest change of a unit tangent between stations, rad: a path that turns may speed up or brake at once."""
+_MOST_PARTS = 64
+"""Parts of one step, no more."""
+
+
+def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
+    """Divide the steps between stations p, (P,), in which a joint path turns, by its derivatives there, (P, n)."""
+    speed = np.linalg.norm(q_dp, axis=1)[:, None]
+    tangent = np.divide(q_dp, speed, out=np.zeros_like(q_dp), where=speed > 0.0)
+    turn = np.linalg.norm(np.diff(tangent, axis=0), axis=1)
+    is_known = (speed[1:, 0] > 0.0) & (speed[:-1, 0] > 0.0)
+    parts = np.where(is_known, np.ceil(turn / _TURN), 1.0).clip(1, _MOST_PARTS)
+    numbers = np.append(0.0, np.cumsum(parts))
+    return np.interp(np.arange(numbers[-1] + 1.0), numbers, p)
+
+
 @dataclass(frozen=True)
 class JointPath:
     """A joint path at stations.

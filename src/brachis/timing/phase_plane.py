@@ -203,15 +203,23 @@ class PhasePlane:
         step = self._steps[:, None]
         slope, lower, upper = _as_lines(a + step * b, b, low, high)
         self._floor, ceiling = _bounds_of_pairs(slope, lower, upper)
-        highest = self._levels.min(axis=1, initial=np.inf)
-        with np.errstate(invalid="ignore"):
-            between = 0.5 * (highest[1:] + highest[:-1])
-        at_stations = np.concatenate([highest[:1], between, highest[-1:]])
-        self._ceiling = np.minimum(np.append(ceiling, np.inf), at_stations)
+        highest = self._at_stations(self._levels.min(axis=1, initial=np.inf)[:, None])
+        ceilings = [np.append(ceiling, np.inf), highest[:, 0]]
+        # The rows at the stations themselves keep u from swinging between its neighbours.
+        lines = _as_lines(*map(self._at_stations, (a, b, low, high)))
+        ceilings.append(_bounds_of_pairs(*lines)[1])
+        self._ceiling = np.min(ceilings, axis=0)
         # x + 2 step u is x at the next station.
         self._factor = 1.0 + 2.0 * step * slope
         self._least = 2.0 * step * lower
         self._most = 2.0 * step * upper
+
+    def _at_stations(self, values: np.ndarray) -> np.ndarray:
+        """Interpolate values known half-way between the stations, (P - 1, c), at the stations, (P, c)."""
+        share = (self._steps[1:] / (self._steps[1:] + self._steps[:-1]))[:, None]
+        with np.errstate(invalid="ignore"):
+            between = share * values[:-1] + (1.0 - share) * values[1:]
+        return np.concatenate([values[:1], between, values[-1:]])
 
     def narrow(self, narrower: np.ndarray) -> None:
         """Bring the bounds of all values nearer, by so much half-way between the stations, (P - 1,)."""
