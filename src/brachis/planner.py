@@ -182,7 +182,7 @@ def plan(
             assert best.trajectory is not None
             gap = find_timing_gap(best.trajectory, problem.limits)
             is_given = asked.spline.intervals != "auto"
-            if gap is not None:
+            if gap is not None and not end_time:
                 remarks += gap.issues(intervals_are_given=is_given)
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)

@@ -17,7 +17,7 @@ from brachis.trajectory import MotionPhase, Trajectory
 
 PLACES = 2000
 """Places at which the joint path of a motion is timed, no fewer."""
-_LEAST_PLACES = 12
+_LEAST_PLACES = 4
 """Places in every knot interval, no fewer."""
 WORTH_A_WARNING = 0.02
 """Gap from which on a plan warns."""

@@ -87,17 +87,17 @@ class JointPath:
         speed = speed[kept]
         with np.errstate(divide="ignore", invalid="ignore"):
             tangent = self.q_dp[kept] / speed[:, None]
-            along = np.sum(self.q_ddp[kept] * tangent, axis=1)
+            along = np.nan_to_num(np.sum(self.q_ddp[kept] * tangent, axis=1))
             bend = (self.q_ddp[kept] - tangent * along[:, None]) / speed[:, None] ** 2
         for end, beside in ((0, 1), (-1, -2)):
             if not moves[kept[end]]:
+                along[end] = np.linalg.norm(self.q_ddp[kept[end]]) * (1 + 2 * end)
                 tangent[end] = tangent[beside]
                 bend[end] = bend[beside]
-        chords = np.linalg.norm(np.diff(q, axis=0), axis=1)
-        # The arc over a chord of a circle; both ends may bend differently.
-        bends = np.linalg.norm(bend, axis=1)
-        half = 0.25 * (bends[1:] + bends[:-1]) * chords
-        lengths = chords * (1.0 + np.minimum(half, 1.0) ** 2 / 6.0)
+        # The integral of the speed, by its values and slopes at the stations.
+        step = np.diff(self.p[kept])
+        lengths = 0.5 * step * (speed[1:] + speed[:-1])
+        lengths += step**2 / 12.0 * (along[:-1] - along[1:])
         length = np.append(0.0, np.cumsum(np.maximum(lengths, 1e-300)))
         return JointPath(length, self.s[kept], q, tangent, bend), kept
 

@@ -39,8 +39,10 @@ _SLOWEST = 1e-3
 """Part of the median rate below which rows are not linearised."""
 _STOPPED = 1e-6
 """Part of the median rate below which no station but the ends is passed."""
-_ROUNDS = 12
+_ROUNDS = 20
 """Linearisations, no more."""
+_CREDIBLE = 1e-2
+"""Difference of rows from values, as a part of the limit, above which a timing is not believed."""
 _AGREE = 1e-6
 """Change of the time, as a part of it, with which linearisations end."""
 _PAIRS = 4_000_000
@@ -140,19 +142,28 @@ class _Rows:
         """Names of the values."""
         return [str(label) for label in self.limit.labels]
 
-    @property
-    def is_convex(self) -> bool:
-        """Whether its tangents at other motions may be kept: sizes of vectors, which have no lower bound."""
-        return self.by_u is not None and not np.isfinite(self.limit.lower).any()
+    def is_tangent_below(self, motion: Passage) -> bool:
+        """Tell whether the rows, from another motion, may be kept: those of sizes of vectors, which are convex."""
+        if self.by_u is None or np.isfinite(self.limit.lower).any():
+            return False
+        values = self.limit.values(motion)
+        return bool((self._predict(motion) <= values + _TINY).all())
 
     def error(self, motion: Passage) -> float:
         """How far the rows are from the values along a motion."""
         values = self.limit.values(motion)
-        if self.by_u is None or self.by_x is None or self.constant is None:
+        if self.by_u is None:
             return float((values - self.limit.upper).max(initial=0.0))
+        return float(np.abs(values - self._predict(motion)).max(initial=0.0))
+
+    def _predict(self, motion: Passage) -> np.ndarray:
+        """Values along a motion by the rows, (P, c)."""
+        assert self.by_u is not None
+        assert self.by_x is not None
+        assert self.constant is not None
         rate = motion.rate[:, None]
-        rows = self.by_u * motion.acceleration[:, None] + self.by_x * rate**2
-        return float(np.abs(values - rows - self.constant).max(initial=0.0))
+        of_acceleration = self.by_u * motion.acceleration[:, None]
+        return np.asarray(of_acceleration + self.by_x * rate**2 + self.constant)
 
 
 class PhasePlane:
@@ -187,12 +198,13 @@ class PhasePlane:
         ]
         rows = [own for own in found if own is not None]
         self._motion = motion
+        self._levels = self._levels_at_stations(rows, motion.rate)
         self._rounds = [rows, *self._rounds[:2]]
-        earlier = [own for older in self._rounds[1:] for own in older if own.is_convex]
+        older = [own for rows in self._rounds[1:] for own in rows]
+        earlier = [own for own in older if own.is_tangent_below(motion)]
         sloped = [own for own in rows + earlier if own.by_u is not None]
         levels = [own for own in rows if own.by_u is None]
         blank = [np.empty((len(self._steps), 0))]
-        self._levels = np.hstack(blank + [own.upper for own in levels])
         self._labels = [name for own in sloped + levels for name in own.names]
         a, b, low, high = (
             np.hstack(blank + [getattr(own, part) for own in sloped])
@@ -203,8 +215,8 @@ class PhasePlane:
         step = self._steps[:, None]
         slope, lower, upper = _as_lines(a + step * b, b, low, high)
         self._floor, ceiling = _bounds_of_pairs(slope, lower, upper)
-        highest = self._at_stations(self._levels.min(axis=1, initial=np.inf)[:, None])
-        ceilings = [np.append(ceiling, np.inf), highest[:, 0]]
+        highest = self._levels.min(axis=1, initial=np.inf)
+        ceilings = [np.append(ceiling, np.inf), highest]
         # The rows at the stations themselves keep u from swinging between its neighbours.
         lines = _as_lines(*map(self._at_stations, (a, b, low, high)))
         ceilings.append(_bounds_of_pairs(*lines)[1])
@@ -213,6 +225,24 @@ class PhasePlane:
         self._factor = 1.0 + 2.0 * step * slope
         self._least = 2.0 * step * lower
         self._most = 2.0 * step * upper
+
+    def _levels_at_stations(
+        self, rows: Sequence[_Rows], rate: np.ndarray
+    ) -> np.ndarray:
+        """Largest x at the stations, (P, c), by limits without acceleration."""
+        rates = np.concatenate([rate[:1], 0.5 * (rate[1:] + rate[:-1]), rate[-1:]])
+        motion = Passage(self.path, rates, np.zeros_like(rates))
+        narrower = self._narrower
+        narrower = np.maximum(
+            np.append(narrower[:1], narrower), np.append(narrower, 0.0)
+        )
+        levels = [np.empty((len(self.path.p), 0))]
+        for own in rows:
+            if own.by_u is None:
+                level = _Rows.of(own.limit, self.path, motion, narrower)
+                assert level is not None
+                levels.append(level.upper)
+        return np.hstack(levels)
 
     def _at_stations(self, values: np.ndarray) -> np.ndarray:
         """Interpolate values known half-way between the stations, (P - 1, c), at the stations, (P, c)."""
@@ -240,14 +270,18 @@ class PhasePlane:
     def solve(self, rates: tuple[float, float] = (0.0, 0.0)) -> Timing | None:
         """Find the fastest timing with dp/dt given at both ends, 1/s; None if the joint path cannot be followed."""
         best: Timing | None = None
+        error = np.inf
+        factor = 1.0
         for _ in range(_ROUNDS):
             rate = self.fastest(rates)
-            if rate is None and best is not None:
-                # A linearisation may promise too little far from where it was made.
-                self._linearise(self._pass(best, 0.8))
-                rate = self.fastest(rates)
             if rate is None:
-                return best
+                # Rows that are linearised at too fast a motion may allow none.
+                if not self._is_curved:
+                    return None
+                factor *= 0.5 if best is None else 0.8
+                slower = self._motion if best is None else self._pass(best)
+                self._linearise(self._slow_down(slower, factor))
+                continue
             timing = Timing.of(self.path, rate)
             change = np.inf if best is None else abs(timing.t_end / best.t_end - 1.0)
             best = timing
@@ -255,14 +289,27 @@ class PhasePlane:
             error = max((own.error(motion) for own in self._rounds[0]), default=0.0)
             if change < _AGREE or error < _AGREE:
                 break
+            factor = 1.0
             self._linearise(motion)
-        return best
+        return best if error < _CREDIBLE else None
 
-    def _pass(self, timing: Timing, factor: float = 1.0) -> Passage:
-        """Pass the path half-way between its stations, faster by a factor; nowhere so slow that friction vanishes."""
+    def _pass(self, timing: Timing) -> Passage:
+        """Pass the path half-way between its stations; nowhere so slow that friction vanishes."""
         rate = timing.middle_rate
-        rate = factor * np.maximum(rate, _SLOWEST * np.median(rate))
-        return Passage(self._middles, rate, factor**2 * timing.acceleration)
+        rate = np.maximum(rate, _SLOWEST * np.median(rate))
+        return Passage(self._middles, rate, timing.acceleration)
+
+    def _slow_down(self, motion: Passage, factor: float) -> Passage:
+        """Pass the path more slowly, by a factor below 1."""
+        acceleration = factor**2 * motion.acceleration
+        return Passage(self._middles, factor * motion.rate, acceleration)
+
+    @cached_property
+    def _is_curved(self) -> bool:
+        """Whether another linearisation would give other rows."""
+        motion = self._slow_down(self._motion, 0.5)
+        rows = (own for own in self._rounds[0] if own.by_u is not None)
+        return any(own.error(motion) > _AGREE for own in rows)
 
     def times(self, rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray | None:
         """Find when the stations are passed, (P,), s; see `solve`."""
@@ -348,10 +395,9 @@ class PhasePlane:
         """Largest factor, (P - 1, c), of the speed of a motion half-way between the stations for each limit alone."""
         x = rate[:, None] ** 2
         beside = acceleration[:, None] - self._slope * x
-        bound = np.hstack(
-            [np.where(beside > 0.0, self._upper, self._lower), self._levels]
-        )
-        used = np.hstack([beside, np.broadcast_to(x, self._levels.shape)])
+        levels = np.minimum(self._levels[1:], self._levels[:-1])
+        bound = np.hstack([np.where(beside > 0.0, self._upper, self._lower), levels])
+        used = np.hstack([beside, np.broadcast_to(x, levels.shape)])
         squares = np.divide(
             bound, used, out=np.full_like(bound, np.inf), where=used != 0.0
         )
@@ -406,13 +452,13 @@ def _bounds_of_pairs(
         part = slice(first, first + step)
         tilt = slope[part, :, None] - slope[part, None]
         clearance = upper[part, None] - lower[part, :, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            meet = clearance / tilt
+        is_tilted = np.abs(tilt) > _TINY
+        meet = np.divide(clearance, tilt, out=np.zeros_like(tilt), where=is_tilted)
         above = np.where(tilt > _TINY, meet, np.inf).min(axis=(1, 2))
         below = np.where(tilt < -_TINY, meet, -np.inf).max(axis=(1, 2))
         ceiling[part] = above
         floor[part] = np.maximum(below, 0.0)
         # Parallel lines that leave nothing between them.
-        is_empty = ((np.abs(tilt) <= _TINY) & (clearance < 0.0)).any(axis=(1, 2))
+        is_empty = (~is_tilted & (clearance < 0.0)).any(axis=(1, 2))
         ceiling[part][is_empty] = -1.0
     return floor, ceiling

@@ -1,0 +1,75 @@
+"""The timing gap of plans: never much below zero, whatever limits there are, and small with ``intervals: auto``."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from support.effort import QUICK
+
+LIMITS = {
+    "torque": {},
+    "friction": {"friction": {"viscous": 0.5, "coulomb": 0.3}},
+    "power": {"limits": {"torque": 10, "power": 15}},
+    "total power": {"limits": {"torque": 10, "total_power": 20}},
+    "acceleration": {"limits": {"torque": 10, "acceleration": 6}},
+    "tool speed": {"tool_limits": {"speed": 0.6}},
+    "tool acceleration": {"tool_limits": {"acceleration": 1.5}},
+    "torque at speed": {
+        "limits": {"torque": 10, "torque_speed": {"j2": [[0, 10], [2, 4]]}}
+    },
+}
+
+
+def plan(**keywords):
+    return brachis.plan(
+        brachis.examples.scara_line, redundant_joints=["j1"], **keywords, **QUICK
+    )
+
+
+@pytest.mark.parametrize("kind", LIMITS)
+def test_every_limit_is_known_to_the_phase_plane(kind):
+    result = plan(intervals="auto", rest="velocity", **LIMITS[kind])
+    assert result.verified
+    gap = result.timing_gap
+    assert gap.left_out == ()
+    assert -1e-3 < gap.gap < 3e-3
+    assert gap.t_end == result.trajectory.t_end
+    assert not [each for each in result.warnings if each.where == "spline.intervals"]
+
+
+def test_a_slow_plan_says_where_and_what_would_do():
+    result = plan(intervals=8)
+    (issue,) = result.warnings
+    assert issue.where == "spline.intervals"
+    assert "spline.intervals: auto" in issue.message
+    assert f"{result.timing_gap.least_time:.4g} s" in issue.message
+    assert result.to_dict()["timing_gap"]["gap"] == result.timing_gap.gap
+    assert "no timing of this joint path is more than" in str(result)
+
+
+def test_a_joint_path_without_redundancy_needs_only_its_timing():
+    rng = np.random.default_rng(1)
+    points = np.cumsum(rng.normal(0.0, 0.4, (6, 3)), axis=0)
+    result = brachis.plan(
+        brachis.examples.scara_line,
+        start=points[0].tolist(),
+        task_space="joints",
+        redundant_joints="auto",
+        path=[{"spline": {"through": points[1:].tolist()}}],
+        intervals="auto",
+        **QUICK,
+    )
+    assert result.verified
+    assert result.candidate.reports[0].solver == "phase plane"
+    assert 0.0 < result.timing_gap.gap < 1e-2
+
+
+def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch):
+    """A mesh that is not refined far enough is retimed."""
+    monkeypatch.setattr("brachis.optimise.mesh._MOST_VARIABLES", 40)
+    result = plan(intervals="auto")
+    assert result.verified
+    assert result.candidate.reports[-1].solver == "phase plane"
+    assert -1e-3 < result.timing_gap.gap < 1e-3

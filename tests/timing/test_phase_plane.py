@@ -1,0 +1,144 @@
+"""The fastest timing of joint paths, against formulas, and against the same path by another parameter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.limits.joint import (
+    AccelerationLimit,
+    JerkLimit,
+    PowerLimit,
+    TorqueLimit,
+    VelocityLimit,
+)
+from brachis.robot import dynamics
+from brachis.timing import JointPath, PhasePlane, divide_turns, is_left_out
+
+GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
+LENGTH = 0.4  # m
+P = np.linspace(0.0, 1.0, 2001)
+
+
+def gantry(friction=None, **limits):
+    spec = {"torque": None, "velocity": None, "acceleration": None} | limits
+    return brachis.Robot.from_urdf(
+        GANTRY, gravity=[0, 0, 0], limits=brachis.LimitSpec(**spec), friction=friction
+    )
+
+
+def limits_of(robot):
+    kinds = (TorqueLimit, VelocityLimit, AccelerationLimit, PowerLimit)
+    built = (kind.build(robot, None) for kind in kinds)
+    return [limit for limit in built if limit is not None]
+
+
+def least_time(robot, path=None):
+    if path is None:
+        path = JointPath.through(P, np.outer(P, [LENGTH, 0.0]))
+    return PhasePlane(limits_of(robot), path).solve().t_end
+
+
+def mass_of(robot):
+    return float(dynamics.mass_matrices(robot, np.zeros((1, 2)))[0, 0, 0])
+
+
+def test_trapezoid_to_five_digits():
+    found = least_time(gantry(acceleration=3.0, velocity=0.5))
+    assert found == pytest.approx(LENGTH / 0.5 + 0.5 / 3.0, rel=1e-5)
+
+
+def test_coulomb_friction_helps_to_brake():
+    robot = gantry(torque=20.0, friction={"coulomb": 5.0, "coulomb_velocity": 1e-4})
+    ways = mass_of(robot) / np.array([20.0 - 5.0, 20.0 + 5.0])
+    speed = np.sqrt(2.0 * LENGTH / ways.sum())
+    assert least_time(robot) == pytest.approx(speed * ways.sum(), rel=1e-3)
+    assert least_time(gantry(torque=20.0)) < 0.999 * least_time(robot)
+
+
+def test_viscous_friction_by_its_differential_equation():
+    force, drag = 20.0, 30.0
+    robot = gantry(torque=force, friction={"viscous": drag, "coulomb": 0.0})
+    mass = mass_of(robot)
+    # dx/dp = 2 L (+-F - d v) / m with v = L sqrt(x): both sides by fine steps until they meet.
+    way = np.linspace(0.0, LENGTH, 200_001)
+    speeds = []
+    for sign in (-1.0, 1.0):
+        v = np.zeros_like(way)
+        v[1] = np.sqrt(2.0 * (force / mass) * way[1])
+        for i in range(1, len(way) - 1):
+            v[i + 1] = v[i] + (force + sign * drag * v[i]) / mass / v[i] * way[1]
+        speeds.append(v)
+    speed = np.minimum(speeds[0], speeds[1][::-1])
+    inner = 0.5 * (speed[1:] + speed[:-1])
+    known = float((way[1] / inner).sum())
+    assert least_time(robot) == pytest.approx(known, rel=2e-3)
+
+
+def test_power_by_its_formula():
+    """At constant power v = sqrt(2 P t / m) after the force's own part, and the same backwards."""
+    robot = gantry(power=5.0, torque=50.0)
+    mass = mass_of(robot)
+    force, power = 50.0, 5.0
+    switch = power / force  # m/s, at which the power takes over
+    time = np.linspace(mass * switch / force, 10.0, 400_001)
+    speed = np.sqrt(switch**2 + 2.0 * power / mass * (time - time[0]))
+    way = 0.5 * mass * switch**2 / force + np.append(
+        0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))
+    )
+    half = float(np.interp(0.5 * LENGTH, way, time))
+    assert least_time(robot) == pytest.approx(2.0 * half, rel=1e-3)
+
+
+def curved(p):
+    """A joint path with its derivatives."""
+    q = np.column_stack([np.sin(2.0 * p), 0.3 * p**2])
+    q_dp = np.column_stack([2.0 * np.cos(2.0 * p), 0.6 * p])
+    q_ddp = np.column_stack([-4.0 * np.sin(2.0 * p), np.full_like(p, 0.6)])
+    return q, q_dp, q_ddp
+
+
+def test_the_parameter_does_not_matter():
+    robot = gantry(acceleration=[3.0, 2.0], velocity=[1.0, 0.4])
+    q, q_dp, q_ddp = curved(P)
+    exact = JointPath(P, P, q, q_dp, q_ddp)
+    by_length, kept = exact.by_length()
+    assert len(kept) == len(P)
+    np.testing.assert_allclose(np.linalg.norm(by_length.q_dp, axis=1), 1.0, rtol=1e-12)
+    times = [
+        least_time(robot, path) for path in (exact, by_length, JointPath.through(P, q))
+    ]
+    assert times == pytest.approx([times[0]] * 3, rel=2e-5)
+
+
+def test_a_path_in_time_is_regular_by_its_length_where_it_rests():
+    t = np.linspace(0.0, 1.0, 1001)
+    part = 3.0 * t**2 - 2.0 * t**3
+    rate = 6.0 * t * (1.0 - t)
+    q, q_dp, q_ddp = curved(part)
+    qddot = q_dp * (6.0 - 12.0 * t)[:, None] + q_ddp * rate[:, None] ** 2
+    path, _ = JointPath(t, part, q, q_dp * rate[:, None], qddot).by_length()
+    robot = gantry(acceleration=[3.0, 2.0])
+    exact = JointPath(P, P, *curved(P))
+    assert least_time(robot, path) == pytest.approx(least_time(robot, exact), rel=1e-4)
+
+
+def test_steps_are_divided_where_the_path_turns():
+    p = np.linspace(0.0, 1.0, 11)
+    tangent = np.column_stack(
+        [np.where(p < 0.45, 1.0, 0.0), np.where(p < 0.45, 0.0, 1.0)]
+    )
+    found = divide_turns(p, tangent)
+    inside = (found > 0.4) & (found < 0.5)
+    assert inside.sum() > 20
+    assert len(found) == len(p) + inside.sum()
+
+
+def test_what_the_phase_plane_leaves_out():
+    robot = gantry(acceleration=3.0, jerk=10.0)
+    jerk = JerkLimit.build(robot, None)
+    assert is_left_out(jerk)
+    assert not is_left_out(AccelerationLimit.build(robot, None))
