@@ -327,10 +327,12 @@ class PhasePlane:
             return None
         x = first
         found = [x]
-        intervals = zip(self._factor, self._most, low[1:], high[1:], strict=True)
-        for factor, most, lowest, highest in intervals:
-            x = min((factor * x + most).min(initial=np.inf), highest)
-            x = max(x, lowest)
+        rows = zip(self._factor.tolist(), self._most.tolist(), strict=True)
+        for (factors, mosts), lowest, highest in zip(
+            rows, low[1:], high[1:], strict=True
+        ):
+            reached = [f * x + m for f, m in zip(factors, mosts, strict=True)]
+            x = max(min([highest, *reached]), lowest)
             found.append(x)
         squares = np.array(found)
         if not squares.max() > 0.0:
@@ -354,12 +356,17 @@ class PhasePlane:
         high = last
         lows = [low]
         highs = [high]
-        for i in range(len(self._steps) - 1, -1, -1):
-            high = ((high - least[i]) * inverse[i]).min(initial=np.inf)
-            high = min(high, self._ceiling[i])
+        rows = zip(least.tolist(), most.tolist(), inverse.tolist(), strict=True)
+        levels = zip(self._floor.tolist(), self._ceiling[:-1].tolist(), strict=True)
+        # Plain numbers: arrays of a few rows cost more than what they hold.
+        for (down, up, factor), (floor, ceiling) in reversed(
+            [*zip(rows, levels, strict=True)]
+        ):
+            found = [(high - own) * by for own, by in zip(down, factor, strict=True)]
+            high = min([ceiling, *found])
             if low > 0.0 or not is_held:
-                low = ((low - most[i]) * inverse[i]).max(initial=-np.inf)
-                low = max(low, self._floor[i])
+                found = [(low - own) * by for own, by in zip(up, factor, strict=True)]
+                low = max([floor, *found])
             if low > high * (1.0 + _ROUNDING) or high < 0.0:
                 return None
             high = max(high, low)
