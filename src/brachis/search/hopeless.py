@@ -280,7 +280,8 @@ class _SpeedCheck:
         first, last = rates
         key = (leg, first, last)
         if key not in self._known:
-            self._known[key] = self._planes[leg].fastest((first, last))
+            timing = self._planes[leg].solve((first, last))
+            self._known[key] = None if timing is None else timing.rate
         return self._known[key]
 
     def limit_on(self, leg: int, shares: np.ndarray) -> str:

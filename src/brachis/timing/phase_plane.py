@@ -41,6 +41,8 @@ _STOPPED = 1e-6
 """Part of the median rate below which no station but the ends is passed."""
 _ROUNDS = 20
 """Linearisations, no more."""
+_LOOKS_AT_END = 4
+"""Linearisations for the largest rate at an end."""
 _CREDIBLE = 1e-2
 """Difference of rows from values, as a part of the limit, above which a timing is not believed."""
 _AGREE = 1e-6
@@ -390,7 +392,9 @@ class PhasePlane:
             The largest factor of its speed; the path coordinate and the label of the limit that allow no more.
         """
         rate = np.sqrt(0.5 * (rate[1:] ** 2 + rate[:-1] ** 2))
-        factors = self._factors(rate, 0.5 * (acceleration[1:] + acceleration[:-1]))
+        acceleration = 0.5 * (acceleration[1:] + acceleration[:-1])
+        self._linearise(Passage(self._middles, rate, acceleration))
+        factors = self._factors(rate, acceleration)
         least = factors.min(axis=1)
         # The first place of equal ones.
         number = int(np.argmax(least <= least.min() * (1.0 + _ROUNDING)))
@@ -419,15 +423,22 @@ class PhasePlane:
 
     def largest_rate(self, end: int) -> tuple[float, str]:
         """Find the largest dp/dt, 1/s, that the limits allow beside an end (0 or -1), and which one allows no more."""
-        tilt = self._slope[end][:, None] - self._slope[end]
-        clearance = self._upper[end][:, None] - self._lower[end]
-        falls = tilt < -_TINY
-        squares = np.divide(
-            clearance, -tilt, out=np.full_like(tilt, np.inf), where=falls
-        )
-        highest = np.append(squares.min(axis=1, initial=np.inf), self._levels[end])
-        column = int(np.argmin(highest))
-        return math.sqrt(max(highest[column], 0.0)), self._labels[column]
+        for _ in range(_LOOKS_AT_END):
+            tilt = self._slope[end][:, None] - self._slope[end]
+            clearance = self._upper[end][:, None] - self._lower[end]
+            falls = tilt < -_TINY
+            squares = np.divide(
+                clearance, -tilt, out=np.full_like(tilt, np.inf), where=falls
+            )
+            highest = np.append(squares.min(axis=1, initial=np.inf), self._levels[end])
+            column = int(np.argmin(highest))
+            rate = math.sqrt(max(highest[column], 0.0))
+            label = self._labels[column]
+            if not (self._is_curved and 0.0 < rate < np.inf):
+                break
+            rates = np.full(len(self._steps), rate)
+            self._linearise(Passage(self._middles, rates, np.zeros_like(rates)))
+        return rate, label
 
 
 def is_left_out(limit: Limit) -> bool:
