@@ -313,7 +313,7 @@ def retime(
     Returns
     -------
     SolvedProgram or None
-        None if that is no faster, or where timing is not all: with limits on jerk, torque rate or means, in periodic
+        None if that is as fast, or where timing is not all: with limits on jerk, torque rate or means, in periodic
         motions, and where a phase goes on in motion from another one.
     """
     began = time.perf_counter()
@@ -322,6 +322,7 @@ def retime(
         return None
     timings = time_phases(solved)
     least = least_time_of(program, solved.x, timings)
+    # A motion that is faster exceeds limits between its collocation points.
     if solved.t_end < least * (1.0 + tolerance):
         return None
     phases = []
