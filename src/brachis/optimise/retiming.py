@@ -37,6 +37,10 @@ _ROUNDS = 10
 """Timings with limits that are narrowed, no more."""
 _LOOKS = 12
 """Times in each interval at which limits are looked at."""
+_MOST_INTERVALS = 4000
+"""Intervals of a phase: the verification looks at some 40 instants in each, and at no more than 200,000."""
+_COARSE = (100.0, 30.0, 10.0)
+"""As `_FINENESS`, along paths so long that there would be too many intervals."""
 _FINENESS = (3.0, 1.0, 0.3)
 """What intervals may lose together, in tolerances: less where splines had to be much slower than the timing."""
 _ENOUGH = 5e-5
@@ -166,8 +170,12 @@ def follow(
         return None
     best: tuple[Phase, np.ndarray] | None = None
     least = np.inf
-    for fineness in _FINENESS:
+    finest = _over_knots(phase, own, _FINENESS[0] * tolerance, points)
+    is_long = finest.intervals > _MOST_INTERVALS
+    for fineness in _COARSE if is_long else _FINENESS:
         finer = _over_knots(phase, own, fineness * tolerance, points)
+        if finer.intervals > _MOST_INTERVALS:
+            break
         followed = _follow_within_limits(finer, own)
         if followed is not None and followed[0] < least:
             least, x = followed

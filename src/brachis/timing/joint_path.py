@@ -18,6 +18,8 @@ _STANDING = 1e-7
 """Part of the largest speed below which a motion is taken to stand still."""
 
 
+_SHORTEST = 1e-13
+"""Shortest step between stations, as a part of the path."""
 _TURN = 0.02
 """Largest change of a unit tangent between stations, rad: a path that turns may speed up or brake at once."""
 _MOST_PARTS = 64
@@ -98,7 +100,9 @@ class JointPath:
         step = np.diff(self.p[kept])
         lengths = 0.5 * step * (speed[1:] + speed[:-1])
         lengths += step**2 / 12.0 * (along[:-1] - along[1:])
-        length = np.append(0.0, np.cumsum(np.maximum(lengths, 1e-300)))
+        # Stations of their own, also where a path all but stands still.
+        lengths = np.maximum(lengths, _SHORTEST * lengths.sum())
+        length = np.append(0.0, np.cumsum(lengths))
         return JointPath(length, self.s[kept], q, tangent, bend), kept
 
     def middles(self) -> JointPath:
