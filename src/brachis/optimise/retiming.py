@@ -170,10 +170,11 @@ def follow(
         return None
     best: tuple[Phase, np.ndarray] | None = None
     least = np.inf
-    finest = _over_knots(phase, own, _FINENESS[0] * tolerance, points)
-    is_long = finest.intervals > _MOST_INTERVALS
+    finer = _over_knots(phase, own, _FINENESS[0] * tolerance, points)
+    is_long = finer.intervals > _MOST_INTERVALS
     for fineness in _COARSE if is_long else _FINENESS:
-        finer = _over_knots(phase, own, fineness * tolerance, points)
+        if fineness != _FINENESS[0]:
+            finer = _over_knots(phase, own, fineness * tolerance, points)
         if finer.intervals > _MOST_INTERVALS:
             break
         followed = _follow_within_limits(finer, own)

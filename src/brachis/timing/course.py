@@ -58,8 +58,8 @@ class TimedCourse:
     ----------
     path : JointPath
         By its length, at the stations at which the joints move.
-    kept : (P,) int ndarray
-        Their numbers among the stations of the course.
+    speeds : (P,) ndarray
+        How fast its length grows with the parameter of the course, at all stations of this.
 
     Raises
     ------
@@ -73,18 +73,15 @@ class TimedCourse:
         still = np.zeros_like(course.y)
         curves = (course.y, course.y_dp, course.y_ddp, still)
         state = joint_map.state(*curves, t=course.p - course.p[0])
-        along = JointPath(course.p, state.s, state.q, state.qdot, state.qddot)
-        self.course = course
-        self.path, self.kept = along.by_length()
+        self.path, kept = JointPath.of_state(course.p, state).by_length()
         self.speeds = np.linalg.norm(state.qdot, axis=1)
-        self._limits = limits
         self._plane = PhasePlane(limits, self.path)
-        y_dp = course.y_dp[self.kept]
-        slopes = y_dp / np.maximum(self.speeds[self.kept], 1e-300)[:, None]
+        y_dp = course.y_dp[kept]
+        slopes = y_dp / np.maximum(self.speeds[kept], 1e-300)[:, None]
         for end, beside in ((0, 1), (-1, -2)):
-            if not self.speeds[self.kept[end]] > 0.0:
+            if not self.speeds[kept[end]] > 0.0:
                 slopes[end] = slopes[beside]
-        self._y = course.y[self.kept]
+        self._y = course.y[kept]
         self._slopes = slopes
 
     def solve(
