@@ -30,7 +30,7 @@ import numpy as np
 import mixed_cases
 from brachis import plan
 from brachis.errors import BrachisError
-from brachis.robot.plausibility import PlausibilityWarning
+from brachis.errors import BrachisWarning
 from brachis.task import load_task
 from committed import save
 from mixed_robots import ROBOTS, ROOT
@@ -50,9 +50,7 @@ def planned(case: mixed_cases.Case, time_limit: float | None) -> dict[str, objec
     t_end, message, search = None, "", {}
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", PlausibilityWarning
-            )  # limits are scaled at will
+            warnings.simplefilter("ignore", BrachisWarning)  # limits are scaled at will
             result = plan(task, strict=False)
         t_end = result.t_end
         search = {"attempts": len(result.candidates), "interrupted": result.interrupted}

@@ -31,8 +31,8 @@ import numpy as np
 import pinocchio as pin
 
 import random_poses
-from brachis import PlausibilityWarning, Robot, ik, plan
-from brachis.errors import BrachisError
+from brachis import Robot, ik, plan
+from brachis.errors import BrachisError, BrachisWarning
 from brachis.robot import task_map_of
 
 ROOT = Path(__file__).parents[1]
@@ -525,7 +525,7 @@ def planned(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter(
-                "ignore", PlausibilityWarning
+                "ignore", BrachisWarning
             )  # far ranges look like mm and degrees
             result = plan(
                 random_task(name, seed, number, folder, time_limit), strict=False

@@ -25,7 +25,7 @@ from brachis.errors import BrachisError
 from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
-from brachis.robot.plausibility import PlausibilityWarning
+from brachis.errors import BrachisWarning
 from brachis.task import load_task
 from full_space import FullSpace
 from mixed_robots import ROBOTS
@@ -87,7 +87,7 @@ def main() -> None:
     folder = given.folder or Path(tempfile.mkdtemp(prefix="mixed-tasks-"))
     case = mixed_cases.case(given.robot, given.seed, given.number, folder)
     print(f"{case.name} ({case.kind}): {case.task}", flush=True)
-    warnings.simplefilter("ignore", PlausibilityWarning)
+    warnings.simplefilter("ignore", BrachisWarning)
     task = load_task(case.task)
     problem = Problem.of(robot_for(None, task.robot), task)
     program, rng = (

@@ -28,7 +28,7 @@ import joint_paths
 import mixed_cases
 from brachis.common import deadline
 from brachis.optimise.backends import monitor
-from brachis.robot.plausibility import PlausibilityWarning
+from brachis.errors import BrachisWarning
 from mixed_robots import ROOT
 
 ALLOWED = 1.5
@@ -131,7 +131,7 @@ def planned(task: Any, limit: float, jobs: int) -> str:
     search = task.search.model_copy(update={"time_limit": limit, "jobs": jobs})
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlausibilityWarning)
+            warnings.simplefilter("ignore", BrachisWarning)
             result = brachis.plan(task.model_copy(update={"search": search}))
     except brachis.PlanningError as error:
         return (

@@ -15,7 +15,7 @@ A task             Task, load_task; examples (task files that come along)
 What comes out     Result, Trajectory, Samples, Candidate, Verification, BottleneckReport
 Recorded motions   import_motion, from a CSV file; compare it with a plan along its path: Comparison
 To look at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
-What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning
+What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning
 To extend it       ik (closed forms), limits, compose (arms on rails), TaskMap, task_map_of
 
 All units are SI: m, rad, kg, s, N, Nm. ``help(brachis.plan)`` has the details, as have the files in ``docs/``.
@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from brachis.task.constructors import Helix as Helix
     from brachis.task.constructors import Line as Line
     from brachis.task.constructors import Spline as Spline
+    from brachis.timing import SlowTimingWarning as SlowTimingWarning
     from brachis.trajectory import Samples as Samples
     from brachis.trajectory import Trajectory as Trajectory
     from brachis.verify import Verification as Verification
@@ -100,6 +101,7 @@ _NAMES = {
     "result": "Result",
     "robot": "Robot TaskMap task_map_of",
     "robot.plausibility": "PlausibilityWarning",
+    "timing": "SlowTimingWarning",
     "task": "LimitSpec Task fit_path load_task read_limits",
     "task.constructors": "Arc Circle Helix Line Spline",
     "trajectory": "Samples Trajectory",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -41,7 +42,7 @@ from brachis.robots import is_robot, locate
 from brachis.search import Search, first_maps, try_remedies
 from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
-from brachis.timing import find_timing_gap
+from brachis.timing import SlowTimingWarning, find_timing_gap
 from brachis.trajectory import Motion, motion_of
 
 Given = Source | Robot | None
@@ -122,6 +123,8 @@ def plan(
     -----
     PlausibilityWarning
         A figure is implausible.
+    SlowTimingWarning
+        Another timing of the same joint path is more than 2 % faster.
 
     Examples
     --------
@@ -183,7 +186,10 @@ def plan(
             gap = find_timing_gap(best.trajectory, problem.limits)
             is_given = asked.spline.intervals != "auto"
             if gap is not None and not end_time:
-                remarks += gap.issues(intervals_are_given=is_given)
+                slow = gap.issues(intervals_are_given=is_given)
+                for issue in slow:
+                    warnings.warn(str(issue), SlowTimingWarning, stacklevel=2)
+                remarks += slow
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)
             try_remedies(error, robot, asked, families, own_limits, until)

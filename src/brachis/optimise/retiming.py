@@ -33,16 +33,18 @@ _MOST_PLACES = 40_000
 """Places in all pieces together, about."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
-_ROUNDS = 10
+_ROUNDS = 12
 """Timings with limits that are narrowed, no more."""
 _LOOKS = 12
 """Times in each interval at which limits are looked at."""
-_MOST_INTERVALS = 4000
-"""Intervals of a phase: the verification looks at some 40 instants in each, and at no more than 200,000."""
-_COARSE = (100.0, 30.0, 10.0)
-"""As `_FINENESS`, along paths so long that there would be too many intervals."""
-_FINENESS = (3.0, 1.0, 0.3)
+_MOST_INTERVALS = 20_000
+"""Intervals of a phase: the verification looks at some 16 instants in each, and at no more than 400,000."""
+_FINENESS = (0.01, 0.0003)
 """What intervals may lose together, in tolerances: less where splines had to be much slower than the timing."""
+_COARSE = (0.3, 3.0, 30.0)
+"""As `_FINENESS`, along paths so long that there would be too many intervals."""
+_BESIDE = 0.5
+"""Part of what exceeds a limit by which limits are narrowed in the intervals beside it."""
 _ENOUGH = 5e-5
 """Violation of a limit, as a part of it, that is small enough."""
 
@@ -104,15 +106,30 @@ class PhaseTiming:
         knots = path.knots[(path.knots > begin) & (path.knots < end)]
         ends = np.concatenate([[begin], knots, [end]])
         ends = ends[np.append(np.diff(ends) > tolerances.PATH, True)]
-        least = np.clip(_MOST_PLACES // (len(ends) - 1), 4, _PLACES_A_PIECE)
-        even = np.ceil(PLACES * np.diff(ends) / (end - begin))
-        s = spread(ends, np.maximum(even, least).astype(int))
-        coarse = Course.through(curves, s)
-        derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
-        state = phase.joint_map.state(*derivatives, t=s - begin)
-        s = divide_turns(s, state.qdot)
-        course = TimedCourse(Course.through(curves, s), phase.joint_map, phase.limits)
-        by_length = tuple(course.speeds[[0, -1]] * rates)
+        pieces = len(ends) - 1
+        count = max(PLACES, min(_PLACES_A_PIECE * pieces, _MOST_PLACES))
+
+        def lay(s: np.ndarray) -> tuple[TimedCourse, tuple[float, float]]:
+            coarse = Course.through(curves, s)
+            derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
+            state = phase.joint_map.state(*derivatives, t=s - begin)
+            s = divide_turns(s, state.qdot)
+            course = Course.through(curves, s)
+            timed = TimedCourse(course, phase.joint_map, phase.limits)
+            return timed, tuple(timed.speeds[[0, -1]] * rates)
+
+        course, by_length = lay(
+            spread(ends, np.full(pieces, -(-count // (3 * pieces))))
+        )
+        timing = course.solve(by_length)
+        if timing is None:
+            return cls(course, by_length, None)
+        # Stations where the motion takes its time.
+        t = np.linspace(0.0, timing.t_end, count)
+        s = np.union1d(course.curves(timing, t)[0][:, 0].clip(begin, end), ends)
+        s = s[np.append(np.diff(s) > tolerances.PATH, True)]
+        s[0] = begin
+        course, by_length = lay(s)
         return cls(course, by_length, course.solve(by_length))
 
 
@@ -135,7 +152,8 @@ def least_time_of(
 def _spread_excess(worst: np.ndarray, breaks: np.ndarray, timing: Timing) -> np.ndarray:
     """Spread what exceeds limits in knot intervals, (N,), over these and those beside them, (P - 1,)."""
     padded = np.pad(np.maximum(worst - 0.5 * _ENOUGH, 0.0), 1)
-    around = np.max([padded[:-2], padded[1:-1], padded[2:]], axis=0)
+    beside = np.maximum(padded[:-2], padded[2:])
+    around = np.maximum(padded[1:-1], _BESIDE * beside)
     t_norm = timing.times / timing.t_end
     first = np.searchsorted(breaks, t_norm[:-1], side="right") - 1
     last = np.searchsorted(breaks, t_norm[1:], side="left")
@@ -170,13 +188,12 @@ def follow(
         return None
     best: tuple[Phase, np.ndarray] | None = None
     least = np.inf
-    finer = _over_knots(phase, own, _FINENESS[0] * tolerance, points)
-    is_long = finer.intervals > _MOST_INTERVALS
-    for fineness in _COARSE if is_long else _FINENESS:
-        if fineness != _FINENESS[0]:
-            finer = _over_knots(phase, own, fineness * tolerance, points)
-        if finer.intervals > _MOST_INTERVALS:
+    for fineness in (*_FINENESS, *_COARSE):
+        if best is not None and fineness in _COARSE:
             break
+        finer = _over_knots(phase, own, fineness * tolerance, points)
+        if finer.intervals > _MOST_INTERVALS:
+            continue
         followed = _follow_within_limits(finer, own)
         if followed is not None and followed[0] < least:
             least, x = followed

@@ -2,13 +2,15 @@
 
 Accelerations of the fastest timing jump, and splines can only ramp: so knots stand close together where accelerations
 jump, and far apart where they are nearly linear. The control points of the splines' rates are means of the curves'
-rates: no such spline accelerates more than the curve that it follows does near by.
+rates, and are sharpened where these change smoothly: so no spline accelerates much more than its curve does near by.
 """
 
 from __future__ import annotations
 
 import heapq
 import itertools
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -22,8 +24,14 @@ _FIRST_INTERVALS = 8
 """Intervals that are halved, no fewer."""
 _PLACES_AN_INTERVAL = 250
 """Places for each of these."""
-_SHORTEST = 0.2
-"""Shortest interval that is halved: this part of the tolerance, for each of the first intervals."""
+_SHORTEST = 2e-6
+"""Shortest interval that is halved, as a part of the time: differences of differences are rough over shorter ones."""
+_LONGER = 2.5
+"""Times the length of an interval that those beside it may have."""
+_SHARPER = 0.5
+"""Part of the smaller step of the acceleration by which splines are sharpened, no more."""
+_POINT = 1e-12
+"""Half a chord below which it is a point, as a part of the time."""
 _ANCHORED = 100
 """Intervals after which the splines are where the timing is."""
 
@@ -33,8 +41,9 @@ def breaks_for(
 ) -> np.ndarray:
     """Choose knots over which splines follow a timing.
 
-    Intervals are halved, those first that lose most: their length times how far accelerations are from linear within
-    them, as a part of the limits.
+    Intervals are halved, those first that lose most. An interval of length h loses h times how far accelerations are
+    from linear within it, as a part of the limits. A jump of d2p/dt2 costs less: a ramp in its place takes the motion
+    less far by the jump's height times h^2 / 24.
 
     Parameters
     ----------
@@ -51,25 +60,39 @@ def breaks_for(
         In normalised time.
     """
     values = course.accelerations(timing)
+    rate = timing.middle_rate
+    acceleration = timing.acceleration
     t = 0.5 * (timing.times[1:] + timing.times[:-1]) / timing.t_end
     if from_rest:
-        # Accelerations begin and end at zero.
-        values = np.pad(values, ((1, 1), (0, 0)), mode="edge")
-        values = np.pad(values, ((1, 1), (0, 0)))
+        # Accelerations begin and end at zero, and are linear beside it.
+        parts = t[0] / (t[1] - t[0]), (1.0 - t[-1]) / (t[-1] - t[-2])
+        first = values[0] + parts[0] * (values[0] - values[1])
+        last = values[-1] + parts[1] * (values[-1] - values[-2])
+        values = np.pad(np.vstack([first, values, last]), ((1, 1), (0, 0)))
+        acceleration = np.pad(np.pad(acceleration, 1, mode="edge"), 1)
+        rate = np.pad(rate, 2)
         t = np.concatenate([[0.0, tolerances.TIME], t, [1.0 - tolerances.TIME, 1.0]])
+    jumps = np.abs(np.diff(values, axis=0)).max(axis=1)
+    ramps = timing.t_end / 24.0 * np.abs(np.diff(acceleration))
 
     def loss(low: float, high: float) -> float:
         first, last = np.searchsorted(t, [low, high])
-        inside = values[max(first - 1, 0) : last + 1]
-        at = t[max(first - 1, 0) : last + 1]
+        first = max(first - 1, 0)
+        at = t[first : last + 1]
         if len(at) < 3:
             return 0.0
+        inside = values[first : last + 1]
         part = (at - at[0]) / (at[-1] - at[0])
         line = inside[0] + part[:, None] * (inside[-1] - inside[0])
-        return float(np.abs(inside - line).max() * (high - low))
+        off = np.abs(inside - line).max()
+        length = high - low
+        slowest = rate[first : last + 1].min()
+        late = ramps[first:last].max() * length
+        part_lost = late / slowest if late < slowest else 1.0
+        smooth = off - jumps[first:last].max()
+        return float(length * max(smooth, off * part_lost))
 
     pieces = max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL)
-    shortest = _SHORTEST * tolerance / pieces
     evenly = np.linspace(0.0, 1.0, pieces + 1)
     queue = [(-loss(*pair), *pair) for pair in itertools.pairwise(evenly)]
     heapq.heapify(queue)
@@ -78,7 +101,7 @@ def breaks_for(
     while lost > tolerance and queue:
         worst, low, high = heapq.heappop(queue)
         lost += worst
-        if high - low < shortest:
+        if high - low < _SHORTEST:
             done.append(low)
             continue
         middle = 0.5 * (low + high)
@@ -87,7 +110,19 @@ def breaks_for(
             lost += own
             heapq.heappush(queue, (-own, *part))
     begins = np.sort([*done, *(low for _, low, _ in queue)])
-    return np.append(begins, 1.0)
+    return _with_even_steps(np.append(begins, 1.0))
+
+
+def _with_even_steps(breaks: np.ndarray) -> np.ndarray:
+    """Halve intervals, (N + 1,), that are much longer than those beside them."""
+    while True:
+        steps = np.diff(breaks)
+        beside = np.pad(steps, 1, constant_values=1.0)
+        is_long = steps > _LONGER * np.minimum(beside[:-2], beside[2:])
+        if not is_long.any():
+            return breaks
+        middles = 0.5 * (breaks[1:] + breaks[:-1])
+        breaks = np.sort(np.append(breaks, middles[is_long]))
 
 
 def spline_along(
@@ -101,27 +136,62 @@ def spline_along(
 
     At the ends so many derivatives, from the acceleration on, vanish.
 
-    A control point of the rate belongs to d - 1 knots. Its mean is weighted by the B-spline over these; for cubics this
-    is the chord over an interval. Curves of degree 2 are met exactly, and accelerations stay among those near by.
+    A control point of the rate belongs to d - 1 knots. Its mean is the chord over as many of these as are even beside
+    their mean. Curves of degree 2 are met exactly, and accelerations stay among those near by. Means of means are
+    flatter than the curve; what is missing is added where it changes smoothly.
     """
     t_end = timing.t_end
-    windows = np.lib.stride_tricks.sliding_window_view(knots[2:-2], degree - 1)
-    widths = windows[:, -1] - windows[:, 0]
-    is_point = widths <= 0.0
-    if degree == 3:
-        y = course.curves(timing, windows.ravel() * t_end)[0]
-        y = y.reshape(len(windows), 2, -1)
-        rates = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths * t_end)[:, None]
-    else:
-        rates = _weighted_rates(course, timing, windows)
-    rates[is_point] = course.curves(timing, windows[is_point, 0] * t_end)[1]
+    windows = _windows(knots[2:-2], degree - 1)
+    places = windows.mean(axis=1)
+    half = np.minimum(places - windows[:, 0], windows[:, -1] - places)
+    half[half < _POINT] = 0.0
+    ends = np.column_stack([places - half, places + half]) * t_end
+    widths = ends[:, 1] - ends[:, 0]
+    is_point = half <= 0.0
+
+    def means(curves: Callable[[np.ndarray], tuple[np.ndarray, ...]]) -> np.ndarray:
+        y = curves(ends.ravel())[0].reshape(len(ends), 2, -1)
+        rates = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths)[:, None]
+        rates[is_point] = curves(ends[is_point, 0])[1]
+        return np.asarray(rates)
+
     first = course.curves(timing, np.zeros(1))[0]
-    rates = _without_bias(rates, knots, degree, vanishing)
-    # What that takes from the rates is spread over all.
-    places = _windows(knots[2:-2], degree - 1).mean(axis=1)
     end = course.curves(timing, np.array([t_end]))[1]
+
+    def splines(rates: np.ndarray) -> np.ndarray:
+        points = _integrate(first, rates, knots[1:-1], t_end)
+        return np.concatenate([first, points]).T
+
+    wanted = means(partial(course.curves, timing))
+    rates = _without_bias(wanted, half, knots, degree, vanishing)
+    # What that takes from the rates is spread over all.
     rates = rates + (places**2 * (3.0 - 2.0 * places))[:, None] * (end - rates[-1])
-    return np.concatenate([first, _integrate(first, rates, knots[1:-1], t_end)]).T
+    motion = Motion(t_end, knots, degree, splines(rates))
+    missing = wanted - means(motion.at)
+    return splines(rates + _smooth_part(missing, rates, knots, degree))
+
+
+def _smooth_part(
+    missing: np.ndarray, rates: np.ndarray, knots: np.ndarray, degree: int
+) -> np.ndarray:
+    """Part of what is missing at control points of the rate, (w, c), that may be added without swinging beside jumps.
+
+    It is no more than what is missing beside, and accelerations change by no more than half of their smaller step.
+    """
+    beside = np.pad(missing, ((1, 1), (0, 0)), mode="edge")
+    three = np.stack([beside[:-2], missing, beside[2:]])
+    is_same = (np.sign(three) == np.sign(missing)).all(axis=0)
+    size = np.where(is_same, np.abs(three).min(axis=0), 0.0)
+    size[[0, -1]] = 0.0
+    widths = np.diff(_windows(knots[2:-2], degree - 1).mean(axis=1))[:, None]
+    means = np.diff(rates, axis=0) / widths
+    steps = np.abs(np.diff(np.pad(means, ((1, 1), (0, 0)), mode="edge"), axis=0))
+    most = _SHARPER * widths * np.minimum(steps[1:], steps[:-1])
+    way = np.concatenate([np.zeros_like(size[:1]), np.cumsum(most, axis=0)])
+    from_left = np.minimum.accumulate(size - way) + way
+    from_right = np.minimum.accumulate((size + way)[::-1])[::-1] - way
+    size = np.maximum(np.minimum(from_left, from_right), 0.0)
+    return np.asarray(np.sign(missing) * size)
 
 
 def _windows(knots: np.ndarray, count: int) -> np.ndarray:
@@ -139,17 +209,22 @@ def _integrate(
 
 
 def _without_bias(
-    rates: np.ndarray, knots: np.ndarray, degree: int, vanishing: tuple[int, int]
+    rates: np.ndarray,
+    half: np.ndarray,
+    knots: np.ndarray,
+    degree: int,
+    vanishing: tuple[int, int],
 ) -> np.ndarray:
-    """Move the accelerations from where their means are taken to where they belong.
+    """Move the accelerations of means, (w, c), over so much to both sides, (w,), to where they belong.
 
     Where intervals of different length meet these places differ. Slopes are the smaller ones of both sides, so that
     nothing swings beside a jump.
     """
-    inner = _windows(knots[2:-2], degree)
-    widths = (inner[:, -1] - inner[:, 0])[:, None] / (degree - 1)
+    places = _windows(knots[2:-2], degree - 1).mean(axis=1)
+    widths = np.diff(places)[:, None]
     means = np.diff(rates, axis=0) / widths
-    taken = inner.mean(axis=1)
+    taken = 0.5 * (places[1:] + places[:-1]) + np.diff(half**2) / (6.0 * widths[:, 0])
+    inner = _windows(knots[2:-2], degree)
     belong = inner[:, 1:-1].mean(axis=1) if degree > 2 else taken
     slopes = np.diff(means, axis=0) / np.diff(taken)[:, None]
     before = np.concatenate([slopes[:1], slopes])
@@ -160,31 +235,6 @@ def _without_bias(
     moved[: vanishing[0]] = 0.0
     moved[len(moved) - vanishing[1] :] = 0.0
     return np.concatenate([rates[:1], rates[:1] + np.cumsum(moved * widths, axis=0)])
-
-
-def _weighted_rates(
-    course: TimedCourse, timing: Timing, windows: np.ndarray
-) -> np.ndarray:
-    """Means of the curves' rates, (w, c), weighted by the B-splines over windows of knots, (w, k)."""
-    from scipy.interpolate import BSpline
-
-    count = windows.shape[1]
-    if count == 1:
-        return course.curves(timing, windows[:, 0] * timing.t_end)[1]
-    nodes, weights = np.polynomial.legendre.leggauss(16)
-    found = []
-    for knots in windows:
-        if knots[-1] <= knots[0]:
-            found.append(np.zeros(course.curves(timing, np.zeros(1))[1].shape[1]))
-            continue
-        basis = BSpline.basis_element(knots)
-        inner = np.unique(knots)
-        half = 0.5 * np.diff(inner)
-        t = (0.5 * (inner[1:] + inner[:-1])[:, None] + half[:, None] * nodes).ravel()
-        share = (half[:, None] * weights).ravel() * basis(t)
-        rates = course.curves(timing, t * timing.t_end)[1]
-        found.append(share @ rates / share.sum())
-    return np.array(found)
 
 
 def fit(phase: Phase, course: TimedCourse, timing: Timing) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The fastest timing of a joint path that is given: the phase plane."""
 
 from brachis.timing.course import Course, TimedCourse
-from brachis.timing.gap import TimingGap, find_timing_gap
+from brachis.timing.gap import SlowTimingWarning, TimingGap, find_timing_gap
 from brachis.timing.joint_path import JointPath, Passage, divide_turns
 from brachis.timing.phase_plane import PhasePlane, Timing, is_left_out
 
@@ -10,6 +10,7 @@ __all__ = [
     "JointPath",
     "Passage",
     "PhasePlane",
+    "SlowTimingWarning",
     "TimedCourse",
     "Timing",
     "TimingGap",

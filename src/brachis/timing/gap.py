@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from brachis.common.summary import Summary
+from brachis.errors import BrachisWarning
 from brachis.limits import Limit
 from brachis.robot.plausibility import Issue
 from brachis.timing.joint_path import JointPath, divide_turns
@@ -25,6 +26,14 @@ _STILL = 1e-9
 """Part of the largest speed below which a phase begins or ends at rest."""
 _SHARE = 0.8
 """Part of the lost time that lies in the s-interval that is named."""
+
+
+class SlowTimingWarning(BrachisWarning):
+    """Another timing of the same joint path is much faster than the plan.
+
+    The message says how much, where on the path the time is lost, and what would do. The same stands in
+    ``result.warnings``, and the figures in ``result.timing_gap``.
+    """
 
 
 @dataclass(frozen=True, repr=False)

@@ -98,16 +98,20 @@ class _Rows:
     Attributes
     ----------
     limit : Limit
-    by_u, by_x, constant : (P, c) ndarray or None
-        a, b and the value at u = x = 0; None without acceleration.
+    by_u : (P, c) ndarray or None
+        a; None without acceleration.
+    by_x : (P, c) ndarray
+        b; without acceleration the slope by dp/dt.
+    constant : (P, c) ndarray
+        The value at u = x = 0.
     lower, upper : (P, c) ndarray
         Bounds; without acceleration of x.
     """
 
     limit: Limit
     by_u: np.ndarray | None
-    by_x: np.ndarray | None
-    constant: np.ndarray | None
+    by_x: np.ndarray
+    constant: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
 
@@ -132,7 +136,9 @@ class _Rows:
                 largest = rate + (bound - values) / by_rate
             largest = np.where(np.abs(by_rate) > _TINY, largest, np.inf)
             squares = np.maximum(largest, 0.0) ** 2
-            return cls(limit, None, None, None, np.zeros_like(squares), squares)
+            constant = values - by_rate * rate
+            lowest = np.zeros_like(squares)
+            return cls(limit, None, by_rate, constant, lowest, squares)
         by_u = np.einsum("kcn,kn->kc", partials.qddot, path.q_dp)
         by_x = np.einsum("kcn,kn->kc", partials.qddot, path.q_ddp)
         by_x += by_rate / (2.0 * rate)
@@ -154,16 +160,13 @@ class _Rows:
     def error(self, motion: Passage) -> float:
         """How far the rows are from the values along a motion."""
         values = self.limit.values(motion)
-        if self.by_u is None:
-            return float((values - self.limit.upper).max(initial=0.0))
         return float(np.abs(values - self._predict(motion)).max(initial=0.0))
 
     def _predict(self, motion: Passage) -> np.ndarray:
         """Values along a motion by the rows, (P, c)."""
-        assert self.by_u is not None
-        assert self.by_x is not None
-        assert self.constant is not None
         rate = motion.rate[:, None]
+        if self.by_u is None:
+            return np.asarray(self.by_x * rate + self.constant)
         of_acceleration = self.by_u * motion.acceleration[:, None]
         return np.asarray(of_acceleration + self.by_x * rate**2 + self.constant)
 

@@ -273,8 +273,10 @@ class Given:
         return replace(self, states=self.states.only(inside))
 
 
-MOST_INSTANTS = 200_000
-"""Instants at which a motion is checked before limits ask for more: some seconds' work, and 1 GB."""
+MOST_INSTANTS = 400_000
+"""Instants at which a motion is checked before limits ask for more: some seconds' work, and 2 GB."""
+_FEWEST = 8
+"""Steps in a knot interval, no fewer, however many intervals there are; accelerations are polynomials within it."""
 _LEAST_STEPS = 3
 """Steps in every piece: their ends tell a cubic acceleration from any other."""
 _TRAVEL = 0.05
@@ -315,7 +317,8 @@ def _spread(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> P
     middle = 0.5 * (edges[1:] + edges[:-1])
     interval = np.searchsorted(knots, middle).clip(1, len(knots) - 1)
     share = np.diff(edges) / np.diff(knots)[interval - 1]
-    by_interval = share * options.points_per_interval - 1e-6  # less rounding
+    each = np.clip(0.5 * MOST_INSTANTS / len(knots), _FEWEST, None)
+    by_interval = share * min(options.points_per_interval, each) - 1e-6  # less rounding
     travel = np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)
     by_travel = travel[first] * (high - low) / _TRAVEL
     wanted = np.nan_to_num(np.maximum(by_interval, by_travel))
@@ -335,7 +338,7 @@ def _check_count(count: int) -> None:
             where="trajectory",
             found=f"{count} instants to look at",
             allowed=f"{MOST_INSTANTS}: {_LEAST_STEPS + 1} in every piece between nodes, one for every {_TRAVEL:g} rad "
-            "or m that a joint travels, 32 in every knot interval and in every piece of the path",
+            f"or m that a joint travels, {_FEWEST} in every knot interval, 32 in every piece of the path",
             hint="Split the motion into parts",
         )
 

@@ -139,6 +139,7 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
         "path error": f"{result.verification.path_error:.1e} m or rad",
         "verified": "yes" if result.verified else "NO",
+        "timing": str(result.timing_gap or "no timing of this joint path is known"),
     }
     if candidate.time_scaled > 1.0:
         rows["end time lengthened by"] = (

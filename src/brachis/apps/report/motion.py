@@ -131,4 +131,5 @@ def _describe_plan(result: PlannedMotion) -> dict[str, str]:
         "collocation points": str(result.candidate.collocation_points),
         "planning time": f"{result.timing['total']:.2f} s",
         "least motion": "off" if least is None else least.status,
+        "timing": str(result.timing_gap or "no timing of this joint path is known"),
     }

@@ -21,11 +21,16 @@ from brachis import planner
 from brachis.apps.sweeps.settings import SweepSettings
 from brachis.common.arguments import file_name
 from brachis.common.files import Kind, check_kind, read_text
-from brachis.errors import BrachisError, ClusterError, TaskError, UnknownNameError
+from brachis.errors import (
+    BrachisError,
+    BrachisWarning,
+    ClusterError,
+    TaskError,
+    UnknownNameError,
+)
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
-from brachis.robot.plausibility import PlausibilityWarning
 from brachis.robot.urdf import read_file
 from brachis.task import Task, with_keys
 from brachis.task.fields import plain
@@ -282,7 +287,7 @@ def run_plan(plan: Plan) -> Outcome:
     began = time.perf_counter()
     try:
         with warnings.catch_warnings():  # they are among the outcome's remarks
-            warnings.simplefilter("ignore", PlausibilityWarning)
+            warnings.simplefilter("ignore", BrachisWarning)
             result = planner.plan(
                 robot_of(plan), plan.task, progress=False, check_advice=False
             )
