@@ -149,7 +149,7 @@ def refine_mesh(
     spline : SplineSettings
         Its tolerance is a fraction of the end time.
     deadline : Deadline
-        After it no round is begun; nor is one that looks as if it would end later.
+        After it no round is begun.
 
     Returns
     -------
@@ -166,8 +166,7 @@ def refine_mesh(
         is_settled = len(gains) > 1 and gains[-2:].sum() < 0.5 * spline.tolerance
         if is_settled and 2 * program.variables > _FEW_VARIABLES:
             return None
-        # The next round may take three times as long.
-        if 3.0 * solved.report.wall_time > deadline.left:
+        if deadline.passed:
             return _COARSER
         allowed = [np.diff(own.breaks) >= 2.0 * shortest for own in program.phases]
         chosen = allowed if is_settled else _choose_intervals(solved, allowed)

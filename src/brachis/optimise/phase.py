@@ -324,7 +324,7 @@ class Phase:
         Limits that hold over the whole motion are left out. So are safeguards, which are numerical and not physical.
         Raises UnreachableError as `evaluate` does.
         """
-        return self.evaluate(x).violation(_is_checked_at_points)
+        return self.evaluate(x).violation(is_checked_at_points)
 
     def violation_at(self, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
         """As `violation`, at other normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
@@ -337,7 +337,7 @@ class Phase:
         evaluation = self.evaluator.evaluate(
             *motion.at(t_norm * motion.t_end), near=near
         )
-        return evaluation.violation(_is_checked_at_points)
+        return evaluation.violation(is_checked_at_points)
 
     def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
         """Ratios, (K, c), to the limits that a longer time relieves; see `Limit.ratio`.
@@ -460,7 +460,7 @@ class Phase:
         return self._entries[1]
 
 
-def _is_checked_at_points(limit: Limit) -> bool:
+def is_checked_at_points(limit: Limit) -> bool:
     """Tell whether a violation of the limit counts at single points."""
     return limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean
 

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import UnreachableError
+from brachis.limits import Limit
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.bspline import clamped_knots, spread
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.improve import SolvedProgram
-from brachis.optimise.phase import Phase
+from brachis.optimise.phase import Phase, is_checked_at_points
 from brachis.optimise.program import Program
-from brachis.optimise.timed_splines import breaks_for, fit
+from brachis.optimise.timed_splines import SHORTEST, breaks_for, even_out, fit
 from brachis.timing import Course, TimedCourse, Timing, divide_turns, is_left_out
 
 SOLVER = "phase plane"
@@ -33,8 +34,16 @@ _MOST_PLACES = 40_000
 """Places in all pieces together, about."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
-_ROUNDS = 12
+_ROUNDS = 30
 """Timings with limits that are narrowed, no more."""
+_USUAL = 0.98
+"""Part of the stations whose d2p/dt2 is usual."""
+_SPIKE = 3.0
+"""Times the usual d2p/dt2 that splines can follow."""
+_HALVINGS = 4
+"""Times that intervals in which limits are far exceeded are halved, no more."""
+_FAR = 0.02
+"""Violation of a limit, as a part of it, by which it is far exceeded."""
 _LOOKS = 12
 """Times in each interval at which limits are looked at."""
 _MOST_INTERVALS = 20_000
@@ -45,6 +54,8 @@ _COARSE = (0.3, 3.0, 30.0)
 """As `_FINENESS`, along paths so long that there would be too many intervals."""
 _BESIDE = 0.5
 """Part of what exceeds a limit by which limits are narrowed in the intervals beside it."""
+_NEAR = 5e-4
+"""Violation of a limit from which on rounds go on only while they gain."""
 _ENOUGH = 5e-5
 """Violation of a limit, as a part of it, that is small enough."""
 
@@ -86,6 +97,15 @@ class PhaseTiming:
         speeds = course.speeds
         rates = float(speeds[0]), float(speeds[-1])
         return cls(course, rates, course.solve(rates))
+
+    def without_spikes(self) -> PhaseTiming:
+        """Time again where the timing all but stops for an instant, as no spline does: only as fast as they can."""
+        if self.timing is None:
+            return self
+        most = largest_acceleration(self.timing)
+        if np.abs(self.timing.acceleration).max() <= most:
+            return self
+        return replace(self, timing=self.course.solve(self.rates, {}, most))
 
     @classmethod
     def along(
@@ -133,6 +153,12 @@ class PhaseTiming:
         return cls(course, by_length, course.solve(by_length))
 
 
+def largest_acceleration(timing: Timing) -> float:
+    """Largest d2p/dt2 that splines can follow, 1/s^2."""
+    sizes = np.abs(timing.acceleration)
+    return float(_SPIKE * np.quantile(sizes, _USUAL))
+
+
 def time_phases(solved: SolvedProgram) -> list[PhaseTiming | None]:
     """Time the joint paths of all phases of a motion; see `PhaseTiming.of`."""
     return [PhaseTiming.of(*pair) for pair in solved.program.split(solved.x)]
@@ -150,8 +176,8 @@ def least_time_of(
 
 
 def _spread_excess(worst: np.ndarray, breaks: np.ndarray, timing: Timing) -> np.ndarray:
-    """Spread what exceeds limits in knot intervals, (N,), over these and those beside them, (P - 1,)."""
-    padded = np.pad(np.maximum(worst - 0.5 * _ENOUGH, 0.0), 1)
+    """Spread what exceeds a limit in knot intervals, (N, c), over these and those beside them, (P - 1, c)."""
+    padded = np.pad(np.maximum(worst - 0.5 * _ENOUGH, 0.0), ((1, 1), (0, 0)))
     beside = np.maximum(padded[:-2], padded[2:])
     around = np.maximum(padded[1:-1], _BESIDE * beside)
     t_norm = timing.times / timing.t_end
@@ -159,7 +185,8 @@ def _spread_excess(worst: np.ndarray, breaks: np.ndarray, timing: Timing) -> np.
     last = np.searchsorted(breaks, t_norm[1:], side="left")
     first = np.clip(first, 0, len(around) - 1)
     pairs = np.column_stack([first, np.maximum(last, first + 1)]).ravel()
-    return np.maximum.reduceat(np.append(around, 0.0), pairs)[::2]
+    ended = np.pad(around, ((0, 1), (0, 0)))
+    return np.asarray(np.maximum.reduceat(ended, pairs)[::2])
 
 
 def follow(
@@ -186,6 +213,10 @@ def follow(
     """
     if own.timing is None:
         return None
+    timing = own.without_spikes().timing
+    if timing is None:
+        return None
+    own = replace(own, timing=timing)
     best: tuple[Phase, np.ndarray] | None = None
     least = np.inf
     for fineness in (*_FINENESS, *_COARSE):
@@ -194,11 +225,12 @@ def follow(
         finer = _over_knots(phase, own, fineness * tolerance, points)
         if finer.intervals > _MOST_INTERVALS:
             continue
+        finer = _halve_where_exceeded(finer, own, points)
         followed = _follow_within_limits(finer, own)
         if followed is not None and followed[0] < least:
             least, x = followed
             best = finer, x
-        if least < own.timing.t_end * (1.0 + tolerance):
+        if least < timing.t_end * (1.0 + tolerance):
             break
     return best
 
@@ -209,8 +241,45 @@ def _over_knots(phase: Phase, own: PhaseTiming, tolerance: float, points: int) -
     ends = (phase.boundary.start, phase.boundary.end)
     from_rest = max(len(end[0].derivatives) for end in ends) > 1
     breaks = breaks_for(own.course, own.timing, tolerance, from_rest=from_rest)
+    return _with_breaks(phase, breaks, points)
+
+
+def _with_breaks(phase: Phase, breaks: np.ndarray, points: int) -> Phase:
     knots = clamped_knots(phase.degree, breaks)
     return phase.with_grid(FixedGrid(knots, phase.degree, spread(breaks, points)))
+
+
+def _halve_where_exceeded(phase: Phase, own: PhaseTiming, points: int) -> Phase:
+    """Halve the intervals in which splines along the timing exceed limits by much."""
+    assert own.timing is not None
+    for _ in range(_HALVINGS):
+        try:
+            dense = phase.with_points(spread(phase.breaks, _LOOKS))
+            beyond = _violations(dense, fit(phase, own.course, own.timing))
+        except UnreachableError:
+            return phase
+        worst = np.hstack([*beyond.values()]).max(axis=1)
+        steps = np.diff(phase.breaks) * own.timing.t_end
+        is_halved = (worst > _FAR) & (steps > SHORTEST)
+        if not is_halved.any():
+            return phase
+        middles = 0.5 * (phase.breaks[1:] + phase.breaks[:-1])
+        breaks = np.sort(np.append(phase.breaks, middles[is_halved]))
+        phase = _with_breaks(phase, even_out(breaks), points)
+    return phase
+
+
+def _violations(phase: Phase, x: np.ndarray) -> dict[Limit, np.ndarray]:
+    """Largest violations of the limits that count at single points in each knot interval, (N, c) each."""
+    found = {}
+    evaluation = phase.evaluate(x)
+    for limit, values in zip(phase.limits, evaluation.by_limit, strict=True):
+        if is_checked_at_points(limit):
+            beyond = limit.violation(values)
+            each = beyond[:-1].reshape(phase.intervals, -1, beyond.shape[1])
+            found[limit] = each.max(axis=1)
+            found[limit][-1] = np.maximum(found[limit][-1], beyond[-1])
+    return found
 
 
 def _follow_within_limits(
@@ -220,25 +289,27 @@ def _follow_within_limits(
     course = own.course
     timing = own.timing
     assert timing is not None
+    most_acceleration = largest_acceleration(timing)
     dense = phase.with_points(spread(phase.breaks, _LOOKS))
-    narrower = np.zeros(len(timing.acceleration))
+    narrower: dict[Limit, np.ndarray] = {}
     best: tuple[float, np.ndarray] | None = None
     for _ in range(_ROUNDS):
         try:
             x = fit(phase, course, timing)
-            worst = dense.violation(x).max(axis=1, initial=0.0)
+            beyond = _violations(dense, x)
         except UnreachableError:
             break
-        largest = float(worst.max())
+        largest = float(max(each.max(initial=0.0) for each in beyond.values()))
         needed = timing.t_end * (1.0 + largest)
-        if best is None or needed < best[0]:
+        gain = np.inf if best is None else 1.0 - needed / best[0]
+        if best is None or gain > 0.0:
             best = needed, x
-        if largest <= _ENOUGH:
+        if largest <= _ENOUGH or (largest <= _NEAR and gain < _ENOUGH):
             break
-        each = worst[:-1].reshape(-1, _LOOKS).max(axis=1)
-        each[-1] = max(each[-1], worst[-1])
-        narrower = narrower + _spread_excess(each, phase.breaks, timing)
-        slower = course.solve(own.rates, narrower)
+        for limit, worst in beyond.items():
+            more = _spread_excess(worst, phase.breaks, timing)
+            narrower[limit] = narrower.get(limit, 0.0) + more
+        slower = course.solve(own.rates, narrower, most_acceleration)
         if slower is None or slower.t_end > best[0]:
             break
         timing = slower
@@ -323,7 +394,7 @@ def _is_timing_all(program: Program) -> bool:
 
 
 def retime(
-    solved: SolvedProgram, tolerance: float, points: int
+    solved: SolvedProgram, tolerance: float, points: int, worth: float
 ) -> SolvedProgram | None:
     """Give a solved program the fastest timing of its own joint path, over the knots that this needs.
 
@@ -332,9 +403,11 @@ def retime(
     solved : SolvedProgram
         Without free knots.
     tolerance : float
-        A part of the end time; less than that is not worth a change.
+        Part of the time by which splines should not be slower.
     points : int
         Collocation points an interval.
+    worth : float
+        Part of the time by which the timing has to be faster.
 
     Returns
     -------
@@ -349,7 +422,7 @@ def retime(
     timings = time_phases(solved)
     least = least_time_of(program, solved.x, timings)
     # A motion that is faster exceeds limits between its collocation points.
-    if solved.t_end < least * (1.0 + tolerance):
+    if solved.t_end < least * (1.0 + worth):
         return None
     phases = []
     parts = []

@@ -24,8 +24,8 @@ _FIRST_INTERVALS = 8
 """Intervals that are halved, no fewer."""
 _PLACES_AN_INTERVAL = 250
 """Places for each of these."""
-_SHORTEST = 2e-6
-"""Shortest interval that is halved, as a part of the time: differences of differences are rough over shorter ones."""
+SHORTEST = 4e-5
+"""Shortest interval that is halved, s: accelerations are rounded over shorter ones."""
 _LONGER = 2.5
 """Times the length of an interval that those beside it may have."""
 _SHARPER = 0.5
@@ -101,7 +101,7 @@ def breaks_for(
     while lost > tolerance and queue:
         worst, low, high = heapq.heappop(queue)
         lost += worst
-        if high - low < _SHORTEST:
+        if (high - low) * timing.t_end < SHORTEST:
             done.append(low)
             continue
         middle = 0.5 * (low + high)
@@ -110,10 +110,10 @@ def breaks_for(
             lost += own
             heapq.heappush(queue, (-own, *part))
     begins = np.sort([*done, *(low for _, low, _ in queue)])
-    return _with_even_steps(np.append(begins, 1.0))
+    return even_out(np.append(begins, 1.0))
 
 
-def _with_even_steps(breaks: np.ndarray) -> np.ndarray:
+def even_out(breaks: np.ndarray) -> np.ndarray:
     """Halve intervals, (N + 1,), that are much longer than those beside them."""
     while True:
         steps = np.diff(breaks)

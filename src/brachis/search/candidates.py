@@ -65,6 +65,10 @@ from brachis.search.phase_plane import initial_breaks, initial_guess
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn."""
+_FOR_KNOTS = 0.8
+"""Part of the time left after which the knots are not refined further."""
+_LARGE = 150
+"""Variables above which a motion is retimed, and not refined: with so many, solves with more points take a minute."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
@@ -178,8 +182,7 @@ def finish_candidate(
     assert start is not None and program is not None
     task = start.problem.task
     settings = task.refinement
-    # Of the time that is left, the knots may take this part.
-    soon = deadline.part(0.4)
+    soon = deadline.part(_FOR_KNOTS)
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
@@ -197,7 +200,8 @@ def finish_candidate(
     session = dataclasses.replace(session, deadline=deadline)
     is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
     retimed = _retime(candidate, adapted, options) if is_open else None
-    if retimed is not None and retimed.t_end < adapted.t_end:
+    is_large = adapted.program.variables > _LARGE
+    if retimed is not None and (is_large or retimed.t_end < adapted.t_end):
         return retimed
     named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     refined = refine_and_verify(
@@ -215,12 +219,15 @@ def finish_candidate(
 def _retime(
     candidate: Candidate, solved: SolvedProgram, options: RefinementOptions
 ) -> Candidate | None:
-    """Give a motion the fastest timing of its joint path; None if that is as fast, or is not verified."""
+    """Give a motion the fastest timing of its joint path; None if it is as fast and easily refined, or not verified."""
     assert candidate.start is not None
     spline = candidate.start.problem.task.spline
     if not solved.usable:
         return None
-    retimed = retime(solved, spline.tolerance, spline.points_per_interval)
+    worth = spline.tolerance
+    if solved.program.variables > _LARGE:
+        worth = -np.inf
+    retimed = retime(solved, spline.tolerance, spline.points_per_interval, worth)
     if retimed is None:
         return None
     done = refine_and_verify(candidate, retimed.program, retimed.reports, keep, options)

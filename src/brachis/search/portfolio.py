@@ -49,8 +49,6 @@ SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
-_LEAST_SHARE = 2.0
-"""Time that every guess may take, however many there are, s."""
 
 
 class Search:
@@ -156,14 +154,10 @@ class Search:
         limit = self._deadline
         if not self.is_satisfied:
             limit = limit.part(_COARSE_SHARE)
-        # No guess of several may take more than 15 % of the time.
-        share = min(0.15, _COARSE_SHARE / max(1, len(batch.starts)))
-        seconds = max(_LEAST_SHARE, share * self._problem.task.search.time_limit)
         work = run_in_processes(
             _solve_in_time,
             batch.starts,
             limit,
-            seconds,
             jobs=self._jobs,
             listener=self._listener,
         )
@@ -397,12 +391,12 @@ class Search:
 
 
 def _solve_in_time(
-    start: InitialGuess, deadline: Deadline, seconds: float, listener: Listener
+    start: InitialGuess, deadline: Deadline, listener: Listener
 ) -> Candidate:
-    """Solve from a guess within its share of the time, unless the time is up."""
+    """Solve from a guess, unless the time is up."""
     if deadline.passed:
         return Candidate.of(start, NOT_TRIED)
-    return candidates.solve_candidate(start, deadline.within(seconds), listener)
+    return candidates.solve_candidate(start, deadline, listener)
 
 
 def round_end_time(time: float) -> float:

@@ -284,7 +284,7 @@ class SolverSettings(Model):
     """Name of the solver; auto takes the best one installed."""
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
     """Maximum number of iterations."""
-    time_limit: Positive = Field(default=20.0, le=1e6)
+    time_limit: Positive = Field(default=60.0, le=1e6)
     """Maximum time of one solve, s."""
     tolerance: Positive = 1.0e-6
     """Tolerance of the optimality conditions."""

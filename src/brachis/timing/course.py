@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,11 +85,14 @@ class TimedCourse:
         self._slopes = slopes
 
     def solve(
-        self, rates: tuple[float, float], narrower: np.ndarray | None = None
+        self,
+        rates: tuple[float, float],
+        narrower: Mapping[Limit, np.ndarray] | None = None,
+        most_acceleration: float = np.inf,
     ) -> Timing | None:
-        """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane`."""
+        """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane.narrow`."""
         if narrower is not None:
-            self._plane.narrow(narrower)
+            self._plane.narrow(narrower, most_acceleration)
         return self._plane.solve(rates)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

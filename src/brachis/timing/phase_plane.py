@@ -22,7 +22,7 @@ Limits on the third derivative and on means have no such rows, and are left out:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,8 +47,14 @@ _CREDIBLE = 1e-2
 """Difference of rows from values, as a part of the limit, above which a timing is not believed."""
 _AGREE = 1e-6
 """Change of the time, as a part of it, with which linearisations end."""
+_HELD_BACK = 0.8
+"""Part of what a limit leaves at rest that may be taken."""
 _PAIRS = 4_000_000
 """Pairs of rows that are compared at once."""
+
+
+Narrower = np.ndarray | float
+"""By how much the bounds of a limit are nearer, (P, c)."""
 
 
 @dataclass(frozen=True)
@@ -117,13 +123,13 @@ class _Rows:
 
     @classmethod
     def of(
-        cls, limit: Limit, path: JointPath, motion: Passage, narrower: np.ndarray
+        cls, limit: Limit, path: JointPath, motion: Passage, narrower: Narrower
     ) -> _Rows | None:
         """Linearise a limit at a motion; None if it restricts neither velocity nor acceleration."""
         partials = limit.partials(motion)
         values = limit.values(motion)
-        lower = limit.lower + narrower[:, None]
-        upper = limit.upper - narrower[:, None]
+        lower = limit.lower + narrower
+        upper = limit.upper - narrower
         rate = motion.rate[:, None]
         by_rate = np.zeros_like(values)
         if partials.qdot is not None:
@@ -190,7 +196,8 @@ class PhasePlane:
             if limit.longer_time == "relieves" and not is_left_out(limit)
         ]
         self._steps = np.diff(path.p)
-        self._narrower = np.zeros(len(self._steps))
+        self._narrower: Mapping[Limit, np.ndarray] = {}
+        self._most_acceleration = np.inf
         self._rounds: list[list[_Rows]] = []
         rate = np.full(len(self._steps), path.p[-1] - path.p[0])
         self._linearise(Passage(self._middles, rate, np.zeros_like(rate)))
@@ -198,7 +205,7 @@ class PhasePlane:
     def _linearise(self, motion: Passage) -> None:
         """Write the limits at a motion half-way between the stations, and the bounds that follow."""
         found = [
-            _Rows.of(limit, self._middles, motion, self._narrower)
+            _Rows.of(limit, self._middles, motion, self._narrower.get(limit, 0.0))
             for limit in self._limits
         ]
         rows = [own for own in found if own is not None]
@@ -215,6 +222,14 @@ class PhasePlane:
             np.hstack(blank + [getattr(own, part) for own in sloped])
             for part in ("by_u", "by_x", "lower", "upper")
         )
+        if np.isfinite(self._most_acceleration):
+            most = self._most_acceleration
+            row = np.ones((len(self._steps), 1))
+            a = np.hstack([a, row])
+            b = np.hstack([b, 0.0 * row])
+            low = np.hstack([low, -most * row])
+            high = np.hstack([high, most * row])
+            self._labels.insert(a.shape[1] - 1, "d2p/dt2")
         self._slope, self._lower, self._upper = _as_lines(a, b, low, high)
         # Half-way x is x + step u, seen from the station before.
         step = self._steps[:, None]
@@ -237,13 +252,14 @@ class PhasePlane:
         """Largest x at the stations, (P, c), by limits without acceleration."""
         rates = np.concatenate([rate[:1], 0.5 * (rate[1:] + rate[:-1]), rate[-1:]])
         motion = Passage(self.path, rates, np.zeros_like(rates))
-        narrower = self._narrower
-        narrower = np.maximum(
-            np.append(narrower[:1], narrower), np.append(narrower, 0.0)
-        )
         levels = [np.empty((len(self.path.p), 0))]
         for own in rows:
             if own.by_u is None:
+                narrower: Narrower = 0.0
+                if own.limit in self._narrower:
+                    between = self._narrower[own.limit]
+                    padded = np.pad(between, ((1, 1), (0, 0)), mode="edge")
+                    narrower = np.maximum(padded[1:], padded[:-1])
                 level = _Rows.of(own.limit, self.path, motion, narrower)
                 assert level is not None
                 levels.append(level.upper)
@@ -256,9 +272,25 @@ class PhasePlane:
             between = share * values[:-1] + (1.0 - share) * values[1:]
         return np.concatenate([values[:1], between, values[-1:]])
 
-    def narrow(self, narrower: np.ndarray) -> None:
-        """Bring the bounds of all values nearer, by so much half-way between the stations, (P - 1,)."""
-        self._narrower = narrower
+    def narrow(
+        self,
+        narrower: Mapping[Limit, np.ndarray],
+        most_acceleration: float = np.inf,
+    ) -> None:
+        """Bring the bounds of limits nearer, by so much half-way between the stations, (P - 1, c); bound d2p/dt2 too.
+
+        Where the arm can hold a posture at rest, it still can.
+        """
+        self._most_acceleration = most_acceleration
+        held = dict(narrower)
+        for own in self._rounds[0]:
+            if own.by_u is not None and own.limit in held:
+                above = own.limit.upper - own.constant
+                below = own.constant - own.limit.lower
+                slack = np.minimum(above, below)
+                most = np.where(slack > 0.0, _HELD_BACK * slack, np.inf)
+                held[own.limit] = np.minimum(held[own.limit], most)
+        self._narrower = held
         self._rounds = []
         self._linearise(self._motion)
 
