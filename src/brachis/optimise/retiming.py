@@ -48,9 +48,9 @@ _LOOKS = 12
 """Times in each interval at which limits are looked at."""
 _MOST_INTERVALS = 20_000
 """Intervals of a phase: the verification looks at some 16 instants in each, and at no more than 400,000."""
-_FINENESS = (0.01, 0.0003)
+_FINENESS = (0.001, 0.0001)
 """What intervals may lose together, in tolerances: less where splines had to be much slower than the timing."""
-_COARSE = (0.3, 3.0, 30.0)
+_COARSE = (0.01, 0.1, 1.0, 10.0)
 """As `_FINENESS`, along paths so long that there would be too many intervals."""
 _BESIDE = 0.5
 """Part of what exceeds a limit by which limits are narrowed in the intervals beside it."""
