@@ -88,9 +88,8 @@ def test_in_a_notebook_progress_is_shown_and_leaves_nothing():
     assert {index for index, _ in shown} == {1}
     assert shown[0][1].startswith("planning for 3 joints")
     assert shown[-1][1] == ""
-    assert [output.get("data") for output in notebook.cells[2].outputs] == [
-        {"text/plain": "True"}
-    ]
+    outputs = [output.get("data") for output in notebook.cells[2].outputs]
+    assert [*filter(None, outputs)] == [{"text/plain": "True"}]
 
 
 def test_processes_need_no_main_guard(tmp_path):

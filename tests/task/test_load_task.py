@@ -117,7 +117,7 @@ def test_defaults() -> None:
     ) == (
         "auto",
         300,
-        20.0,
+        60.0,
         1e-6,
     )
     assert (

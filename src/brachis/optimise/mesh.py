@@ -163,7 +163,9 @@ def refine_mesh(
         program = solved.program
         times = np.array([report.objective for report in solved.reports])
         gains = 1.0 - times[1:] / times[:-1]
-        is_settled = len(gains) > 1 and gains[-2:].sum() < 0.5 * spline.tolerance
+        is_settled = (
+            len(gains) > 1 and np.abs(gains[-2:]).sum() < 0.5 * spline.tolerance
+        )
         if is_settled and 2 * program.variables > _FEW_VARIABLES:
             return None
         if deadline.passed:
@@ -209,9 +211,9 @@ def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
     if phase.time_law is not None:
         return np.zeros(phase.intervals)
     breaks = phase.breaks
-    samples = 8
+    samples = 24
     ratios = np.abs(phase.with_points(spread(breaks, samples)).time_scaling_ratios(x))
-    slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :].clip(max=1.0)
+    slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :]
     windows = np.lib.stride_tricks.sliding_window_view(slack, samples + 1, axis=0)
     swing = np.ptp(windows[::samples], axis=2).sum(axis=1)
     return np.asarray(swing * np.diff(breaks) * x[0])

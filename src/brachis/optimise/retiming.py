@@ -18,6 +18,7 @@ from brachis.limits import Limit
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.bspline import clamped_knots, spread
 from brachis.optimise.grid import FixedGrid
+from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase import Phase, is_checked_at_points
 from brachis.optimise.program import Program
@@ -36,10 +37,16 @@ _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
 _ROUNDS = 30
 """Timings with limits that are narrowed, no more."""
-_USUAL = 0.98
-"""Part of the stations whose d2p/dt2 is usual."""
-_SPIKE = 3.0
-"""Times the usual d2p/dt2 that splines can follow."""
+_QUICKEST = 1e-2
+"""Time in which splines can stop from the largest speed, s."""
+_QUICKEST_PART = 0.005
+"""The same as a part of the end time, for short motions."""
+TOO_FAST = 0.01
+"""Part of the least time by which a motion is faster that exceeds limits by much between its collocation points."""
+_ROUGHLY = 0.05
+"""Part of the time that first knots may lose."""
+_FIRST_INTERVALS = 16
+"""Intervals over which a search begins, about."""
 _HALVINGS = 4
 """Times that intervals in which limits are far exceeded are halved, no more."""
 _FAR = 0.02
@@ -50,6 +57,10 @@ _MOST_INTERVALS = 20_000
 """Intervals of a phase: the verification looks at some 16 instants in each, and at no more than 400,000."""
 _FINENESS = (0.001, 0.0001)
 """What intervals may lose together, in tolerances: less where splines had to be much slower than the timing."""
+_MANY = 1000
+"""Intervals with which another round takes seconds."""
+_ENOUGH_IF_MANY = 2.5
+"""Tolerances by which splines over many intervals may be slower than the timing."""
 _COARSE = (0.01, 0.1, 1.0, 10.0)
 """As `_FINENESS`, along paths so long that there would be too many intervals."""
 _BESIDE = 0.5
@@ -155,8 +166,8 @@ class PhaseTiming:
 
 def largest_acceleration(timing: Timing) -> float:
     """Largest d2p/dt2 that splines can follow, 1/s^2."""
-    sizes = np.abs(timing.acceleration)
-    return float(_SPIKE * np.quantile(sizes, _USUAL))
+    quickest = min(_QUICKEST, _QUICKEST_PART * timing.t_end)
+    return float(timing.rate.max() / quickest)
 
 
 def time_phases(solved: SolvedProgram) -> list[PhaseTiming | None]:
@@ -230,17 +241,26 @@ def follow(
         if followed is not None and followed[0] < least:
             least, x = followed
             best = finer, x
-        if least < timing.t_end * (1.0 + tolerance):
+        enough = _ENOUGH_IF_MANY if finer.intervals > _MANY else 1.0
+        if least < timing.t_end * (1.0 + enough * tolerance):
             break
     return best
 
 
-def _over_knots(phase: Phase, own: PhaseTiming, tolerance: float, points: int) -> Phase:
-    """Return a phase over the knots that its timing needs."""
+def _over_knots(
+    phase: Phase,
+    own: PhaseTiming,
+    tolerance: float,
+    points: int,
+    most: float = np.inf,
+) -> Phase:
+    """Return a phase over the knots that its timing needs; see `breaks_for`."""
     assert own.timing is not None
     ends = (phase.boundary.start, phase.boundary.end)
     from_rest = max(len(end[0].derivatives) for end in ends) > 1
-    breaks = breaks_for(own.course, own.timing, tolerance, from_rest=from_rest)
+    breaks = breaks_for(
+        own.course, own.timing, tolerance, from_rest=from_rest, most=most
+    )
     return _with_breaks(phase, breaks, points)
 
 
@@ -384,6 +404,47 @@ def time_guess(
     return SolvedProgram(finer, (_report(finer, x, SolveStatus.ACCEPTABLE, seconds),))
 
 
+def begin_with_timing(
+    program: Program,
+    joint_paths: Sequence[np.ndarray],
+    rates: Sequence[tuple[float, float]],
+    points: int,
+) -> tuple[Program, np.ndarray] | None:
+    """Lay splines along the fastest timing of joint paths, over few knots, close together where it needs them.
+
+    Parameters
+    ----------
+    program : Program
+        Over any knots.
+    joint_paths, rates, points
+        As of `time_guess`.
+
+    Returns
+    -------
+    program : Program
+    x : (v,) ndarray
+        Slowed down until the limits hold at the collocation points; None where the limits allow no timing.
+    """
+    phases = []
+    parts = []
+    for phase, curves, ends in zip(program.phases, joint_paths, rates, strict=True):
+        ascends = np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)
+        try:
+            own = PhaseTiming.along(phase, curves[ascends], ends)
+            if own.timing is None:
+                return None
+            few = _over_knots(phase, own, _ROUGHLY, points, _FIRST_INTERVALS)
+            parts.append(fit(few, own.course, own.timing))
+        except UnreachableError:
+            return None
+        phases.append(few)
+    begun = program.with_phases(phases)
+    try:
+        return begun, shortest_time(begun, np.concatenate(parts))
+    except UnreachableError:
+        return None
+
+
 def _is_timing_all(program: Program) -> bool:
     """Tell whether the phase plane knows all limits, and phases meet at rest."""
     is_linked = any(max(link.orders) for link in program.links)
@@ -412,8 +473,8 @@ def retime(
     Returns
     -------
     SolvedProgram or None
-        None if that is as fast, or where timing is not all: with limits on jerk, torque rate or means, in periodic
-        motions, and where a phase goes on in motion from another one.
+        None if that is about as fast. None where timing is not all: with limits on jerk, torque rate or means, in
+        periodic motions, and where a phase goes on in motion from another one.
     """
     began = time.perf_counter()
     program = solved.program
@@ -422,7 +483,7 @@ def retime(
     timings = time_phases(solved)
     least = least_time_of(program, solved.x, timings)
     # A motion that is faster exceeds limits between its collocation points.
-    if solved.t_end < least * (1.0 + worth):
+    if least * (1.0 - TOO_FAST) < solved.t_end < least * (1.0 + worth):
         return None
     phases = []
     parts = []

@@ -37,7 +37,12 @@ _ANCHORED = 100
 
 
 def breaks_for(
-    course: TimedCourse, timing: Timing, tolerance: float, *, from_rest: bool
+    course: TimedCourse,
+    timing: Timing,
+    tolerance: float,
+    *,
+    from_rest: bool,
+    most: float = np.inf,
 ) -> np.ndarray:
     """Choose knots over which splines follow a timing.
 
@@ -53,6 +58,8 @@ def breaks_for(
         Part of the time that all intervals together may lose.
     from_rest : bool
         Whether accelerations vanish at both ends.
+    most : float, optional
+        Intervals with which halving ends, before those beside much shorter ones are halved too.
 
     Returns
     -------
@@ -96,9 +103,9 @@ def breaks_for(
     evenly = np.linspace(0.0, 1.0, pieces + 1)
     queue = [(-loss(*pair), *pair) for pair in itertools.pairwise(evenly)]
     heapq.heapify(queue)
-    done = []
+    done: list[float] = []
     lost = -sum(item[0] for item in queue)
-    while lost > tolerance and queue:
+    while lost > tolerance and queue and len(done) + len(queue) < most:
         worst, low, high = heapq.heappop(queue)
         lost += worst
         if (high - low) * timing.t_end < SHORTEST:

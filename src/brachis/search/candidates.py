@@ -54,7 +54,7 @@ from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import SOLVER as TIMING
-from brachis.optimise.retiming import keep, retime, time_guess
+from brachis.optimise.retiming import TOO_FAST, keep
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
@@ -62,22 +62,14 @@ from brachis.optimise.transcription import (
 )
 from brachis.problem.problem import Problem
 from brachis.search.phase_plane import initial_breaks, initial_guess
+from brachis.search.timed import LARGE, begin_with_timing, retime, time_alone
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
-_LARGE = 150
-"""Variables above which a motion is retimed, and not refined: with so many, solves with more points take a minute."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
-
-
-def solvers_of(problem: Problem) -> list[str]:
-    """Names of the solvers for a problem, the one that is tried first at the front."""
-    curved = any(limit.guarantee.is_mean for limit in problem.limits)
-    found = solvers_for(problem.task.solver.name, curved=curved)
-    return [solver.name for solver in found]
 
 
 def solve_candidate(
@@ -100,7 +92,7 @@ def solve_candidate(
         target = program_of(problem, start.maps_by_leg(), initial_breaks(start))
     except UnreachableError as error:
         return Candidate.of(start, str(error))
-    timed = _time_alone(start, target)
+    timed = time_alone(start, target)
     if timed is not None:
         return Candidate.of(
             start,
@@ -110,13 +102,20 @@ def solve_candidate(
             reports=timed.reports,
             coarse=timed.t_end,
         )
-    # With more variables a cold solve takes seconds: it is first solved over some of its knots.
-    program = coarsest(target) if target.variables > 150 else target
-    x = initial_guess(program, start)
-    if x is None:
-        return Candidate.of(
-            start, "the splines through the joint path leave the branch, or the chart"
-        )
+    begun = begin_with_timing(start, target)
+    if begun is None:
+        # With more variables a cold solve takes seconds: it is first solved over some of its knots.
+        program = coarsest(target) if target.variables > 150 else target
+        first = initial_guess(program, start)
+        if first is None:
+            return Candidate.of(
+                start,
+                "the splines through the joint path leave the branch, or the chart",
+            )
+        x = first
+    else:
+        program, x = begun
+        target = program
     session = _open_session(start, deadline, listener)
     try:
         x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
@@ -142,22 +141,6 @@ def solve_candidate(
         target=target,
         reports=(*before, *solved.reports),
         coarse=solved.t_end if status.usable else np.inf,
-    )
-
-
-def _time_alone(start: InitialGuess, program: Program) -> SolvedProgram | None:
-    """Time a joint path where nothing else is to be decided, over the knots that this needs."""
-    spline = start.problem.task.spline
-    if start.joint_map.r or spline.intervals != "auto" or spline.knots == "free":
-        return None
-    if start.solver != solvers_of(start.problem)[0]:  # as a fallback others solve
-        return None
-    return time_guess(
-        program,
-        start.legs,
-        start.problem.leg_rates,
-        spline.tolerance,
-        spline.points_per_interval,
     )
 
 
@@ -199,10 +182,12 @@ def finish_candidate(
     options = dataclasses.replace(options, deadline=deadline)
     session = dataclasses.replace(session, deadline=deadline)
     is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
-    retimed = _retime(candidate, adapted, options) if is_open else None
-    is_large = adapted.program.variables > _LARGE
-    if retimed is not None and (is_large or retimed.t_end < adapted.t_end):
-        return retimed
+    retimed = retime(candidate, adapted, options) if is_open else None
+    if retimed is not None:
+        is_large = adapted.program.variables > LARGE
+        change = retimed.t_end / adapted.t_end - 1.0
+        if is_large or not 0.0 <= change <= TOO_FAST:
+            return retimed
     named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     refined = refine_and_verify(
         named, adapted.program, adapted.reports, session, options
@@ -211,27 +196,9 @@ def finish_candidate(
     if retimed is not None:
         found.append(retimed)
     if is_open and refined.verified and refined.refined is not None:
-        again = _retime(candidate, refined.refined, options)
+        again = retime(candidate, refined.refined, options)
         found += [] if again is None else [again]
     return min(found, key=lambda each: (not each.verified, each.t_end))
-
-
-def _retime(
-    candidate: Candidate, solved: SolvedProgram, options: RefinementOptions
-) -> Candidate | None:
-    """Give a motion the fastest timing of its joint path; None if it is as fast and easily refined, or not verified."""
-    assert candidate.start is not None
-    spline = candidate.start.problem.task.spline
-    if not solved.usable:
-        return None
-    worth = spline.tolerance
-    if solved.program.variables > _LARGE:
-        worth = -np.inf
-    retimed = retime(solved, spline.tolerance, spline.points_per_interval, worth)
-    if retimed is None:
-        return None
-    done = refine_and_verify(candidate, retimed.program, retimed.reports, keep, options)
-    return done if done.verified else None
 
 
 def _is_free_chart(start: InitialGuess) -> bool:

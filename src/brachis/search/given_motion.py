@@ -25,9 +25,10 @@ from brachis.kinematics import (
 from brachis.optimise.candidate import InitialGuess, PathMap
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
-from brachis.search.candidates import SELECTABLE, solvers_of
+from brachis.search.candidates import SELECTABLE
 from brachis.search.schedule import has_charts
 from brachis.search.starts import FAMILY, bring_onto_path
+from brachis.search.timed import solvers_of
 from brachis.trajectory import Trajectory
 
 GIVEN = "given motion"

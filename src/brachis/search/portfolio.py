@@ -47,6 +47,8 @@ NOT_TRIED = "not tried: the search ended"
 """Status of a candidate for which there was no time."""
 SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""
+_COMPARED = 49
+"""Even times at which motions of a phase are compared."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 
@@ -417,12 +419,17 @@ def is_same_motion(first: Candidate, second: Candidate) -> bool:
         return False
     postures = []
     for candidate in (first, second):
-        assert candidate.program is not None
-        try:
-            states = candidate.program.states(candidate.reports[-1].x)
-        except UnreachableError:
-            return False
-        postures.append(np.concatenate([state.q for state in states]))
+        program = candidate.program
+        assert program is not None
+        motions = program.motions(candidate.reports[-1].x)
+        found = []
+        for phase, motion in zip(program.phases, motions, strict=True):
+            t = np.linspace(0.0, motion.t_end, _COMPARED)
+            try:
+                found.append(phase.joint_map.state(*motion.at(t), t=t).q)
+            except UnreachableError:
+                return False
+        postures.append(np.concatenate(found))
     return bool(np.abs(postures[0] - postures[1]).max() < 0.1)  # rad or m
 
 

@@ -18,7 +18,6 @@ from brachis.common.progress import Listener
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
-from brachis.search.candidates import solvers_of
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import DeadEnd
@@ -31,6 +30,7 @@ from brachis.search.starts import (
     lattice_starts,
     numeric_starts,
 )
+from brachis.search.timed import solvers_of
 
 _SIZE = 12
 """Guesses of a batch."""

@@ -21,9 +21,10 @@ from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.transcription import program_of
-from brachis.search.candidates import solve_in_chart, solvers_of
+from brachis.search.candidates import solve_in_chart
 from brachis.search.phase_plane import initial_guess
 from brachis.search.processes import process_count, run_in_processes
+from brachis.search.timed import solvers_of
 
 _DEGREE = 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few intervals say most."""

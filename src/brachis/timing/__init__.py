@@ -2,8 +2,8 @@
 
 from brachis.timing.course import Course, TimedCourse
 from brachis.timing.gap import SlowTimingWarning, TimingGap, find_timing_gap
-from brachis.timing.joint_path import JointPath, Passage, divide_turns
-from brachis.timing.phase_plane import PhasePlane, Timing, is_left_out
+from brachis.timing.joint_path import JointPath, Passage, Timing, divide_turns
+from brachis.timing.phase_plane import PhasePlane, is_left_out
 
 __all__ = [
     "Course",

@@ -9,8 +9,8 @@ import numpy as np
 
 from brachis.kinematics import JointMap
 from brachis.limits import Limit
-from brachis.timing.joint_path import JointPath, Passage
-from brachis.timing.phase_plane import PhasePlane, Timing
+from brachis.timing.joint_path import JointPath, Passage, Timing
+from brachis.timing.phase_plane import PhasePlane
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,18 @@ class SlowTimingWarning(BrachisWarning):
 
     The message says how much, where on the path the time is lost, and what would do. The same stands in
     ``result.warnings``, and the figures in ``result.timing_gap``.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import brachis
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> [warning.category.__name__ for warning in caught]
+    ['SlowTimingWarning']
+    >>> result.timing_gap.gap > 0.02
+    True
     """
 
 

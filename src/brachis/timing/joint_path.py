@@ -137,3 +137,43 @@ class Passage(SharedTorques):
         self.qdot = path.q_dp * rate[:, None]
         self.qddot = path.q_dp * acceleration[:, None] + path.q_ddp * rate[:, None] ** 2
         self.qdddot = np.zeros_like(self.q)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When the stations of a joint path are passed.
+
+    Attributes
+    ----------
+    path : JointPath
+    rate : (P,) ndarray
+        dp/dt, 1/s.
+    acceleration : (P - 1,) ndarray
+        d2p/dt2 between the stations, 1/s^2.
+    times : (P,) ndarray
+        From 0 on, s.
+    """
+
+    path: JointPath
+    rate: np.ndarray
+    acceleration: np.ndarray
+    times: np.ndarray
+
+    @classmethod
+    def of(cls, path: JointPath, rate: np.ndarray) -> Timing:
+        """Integrate a rate, (P,), whose square is linear in p between the stations."""
+        steps = np.diff(path.p)
+        durations = 2.0 * steps / (rate[1:] + rate[:-1])
+        acceleration = np.diff(rate**2) / (2.0 * steps)
+        return cls(path, rate, acceleration, np.append(0.0, np.cumsum(durations)))
+
+    @property
+    def t_end(self) -> float:
+        """Time for the whole path, s."""
+        return float(self.times[-1])
+
+    @property
+    def middle_rate(self) -> np.ndarray:
+        """dp/dt half-way between the stations, (P - 1,), 1/s."""
+        squares = self.rate**2
+        return np.sqrt(0.5 * (squares[1:] + squares[:-1]))

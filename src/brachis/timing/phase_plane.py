@@ -29,7 +29,7 @@ from functools import cached_property
 import numpy as np
 
 from brachis.limits import Limit
-from brachis.timing.joint_path import JointPath, Passage
+from brachis.timing.joint_path import JointPath, Passage, Timing
 
 _TINY = 1e-9
 """Coefficients and slopes below this are taken for zero."""
@@ -55,46 +55,6 @@ _PAIRS = 4_000_000
 
 Narrower = np.ndarray | float
 """By how much the bounds of a limit are nearer, (P, c)."""
-
-
-@dataclass(frozen=True)
-class Timing:
-    """When the stations of a joint path are passed.
-
-    Attributes
-    ----------
-    path : JointPath
-    rate : (P,) ndarray
-        dp/dt, 1/s.
-    acceleration : (P - 1,) ndarray
-        d2p/dt2 between the stations, 1/s^2.
-    times : (P,) ndarray
-        From 0 on, s.
-    """
-
-    path: JointPath
-    rate: np.ndarray
-    acceleration: np.ndarray
-    times: np.ndarray
-
-    @classmethod
-    def of(cls, path: JointPath, rate: np.ndarray) -> Timing:
-        """Integrate a rate, (P,), whose square is linear in p between the stations."""
-        steps = np.diff(path.p)
-        durations = 2.0 * steps / (rate[1:] + rate[:-1])
-        acceleration = np.diff(rate**2) / (2.0 * steps)
-        return cls(path, rate, acceleration, np.append(0.0, np.cumsum(durations)))
-
-    @property
-    def t_end(self) -> float:
-        """Time for the whole path, s."""
-        return float(self.times[-1])
-
-    @property
-    def middle_rate(self) -> np.ndarray:
-        """dp/dt half-way between the stations, (P - 1,), 1/s."""
-        squares = self.rate**2
-        return np.sqrt(0.5 * (squares[1:] + squares[:-1]))
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ def test_warned_once_and_in_the_json(command, run, percent, tmp_path):
     out = tmp_path / "out"
     outcome = run(command, percent, "--json", "--out", out)
     assert outcome.code == 0, outcome.err
-    assert outcome.err.count("warning") == 1
+    assert outcome.err.count("warning: robot.limits") == 1
+    assert outcome.err.count("warning: spline.intervals") == 1
     assert outcome.err.startswith(WARNING)
     warning, slow = json.loads(outcome.out)["warnings"]
     assert slow["where"] == "spline.intervals"
