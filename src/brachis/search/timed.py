@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from brachis.optimise import retiming
@@ -69,7 +71,8 @@ def retime(
     )
     if retimed is None:
         return None
+    named = dataclasses.replace(candidate, optimum=solved)
     done = refine_and_verify(
-        candidate, retimed.program, retimed.reports, retiming.keep, options
+        named, retimed.program, retimed.reports, retiming.keep, options
     )
     return done if done.verified else None

@@ -54,7 +54,7 @@ _PAIRS = 4_000_000
 
 
 Narrower = np.ndarray | float
-"""By how much the bounds of a limit are nearer, (P, c)."""
+"""By how much the bounds of a limit are nearer, (P, c); or its lower and its upper ones, (2, P, c)."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,9 @@ class _Rows:
         """Linearise a limit at a motion; None if it restricts neither velocity nor acceleration."""
         partials = limit.partials(motion)
         values = limit.values(motion)
-        lower = limit.lower + narrower
-        upper = limit.upper - narrower
+        below, above = np.broadcast_to(narrower, (2, *values.shape))
+        lower = limit.lower + below
+        upper = limit.upper - above
         rate = motion.rate[:, None]
         by_rate = np.zeros_like(values)
         if partials.qdot is not None:
@@ -218,8 +219,9 @@ class PhasePlane:
                 narrower: Narrower = 0.0
                 if own.limit in self._narrower:
                     between = self._narrower[own.limit]
-                    padded = np.pad(between, ((1, 1), (0, 0)), mode="edge")
-                    narrower = np.maximum(padded[1:], padded[:-1])
+                    ends = between[..., :1, :], between, between[..., -1:, :]
+                    padded = np.concatenate(ends, axis=-2)
+                    narrower = np.maximum(padded[..., 1:, :], padded[..., :-1, :])
                 level = _Rows.of(own.limit, self.path, motion, narrower)
                 assert level is not None
                 levels.append(level.upper)

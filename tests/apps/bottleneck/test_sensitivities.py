@@ -131,17 +131,16 @@ def test_no_limit_costs_less_than_nothing(scara, joint):
     )
 
 
-def test_control_points_near_zero_on_a_fine_mesh_do_not_press(scara):
-    # The first ones of s are some 1e-6 there; taken for active, they would take back most of what a limit costs.
+def test_of_a_timed_motion_the_solver_s_multipliers_count(scara):
     task = scara("j1").task.to_dict()
     task["spline"]["intervals"] = "auto"
     result = brachis.plan(scara("j1").trajectory.robot, task)
     refined = result.candidate.refined
-    program, x = refined.program, refined.reports[-1].x
-    assert 0.0 < x[program.phases[0].slices[0]][0] < 1e-5, "else this tests nothing"
-    found = sensitivities(refined)
+    assert refined.reports[-1].solver == "phase plane", "else this tests nothing"
+    found = sensitivities(result.candidate.optimum)
+    # The arm is planar: with all torques four times as large motions take half the time.
     assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(
-        -0.5 * x[0], rel=1e-4
+        -0.5 * result.t_end, rel=5e-3
     )
 
 

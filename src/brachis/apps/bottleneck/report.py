@@ -34,6 +34,7 @@ from brachis.apps.bottleneck.saturation import (
     saturations,
 )
 from brachis.apps.bottleneck.sensitivities import (
+    TIMINGS,
     BranchBoundary,
     Sensitivities,
     Sensitivity,
@@ -314,6 +315,7 @@ def report(
             phases = limits_by_phase(trajectory, active)
             return BottleneckReport(trajectory.t_end, None, active, phases)
         refined = solve_again(trajectory)
+        optimum = refined
     else:
         trajectory = motion.trajectory
         if motion.candidate.refined is None:
@@ -323,7 +325,8 @@ def report(
                 allowed="a result of brachis.plan",
             )
         refined = motion.candidate.refined
-    found = sensitivities(refined)
+        optimum = motion.candidate.optimum or refined
+    found = sensitivities(optimum)
     tolerance = trajectory.task.refinement.tolerance
     limits = [
         limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD
@@ -335,7 +338,7 @@ def report(
         saturations=active,
         phases=limits_by_phase(trajectory, active),
         timing=find_timing_gap(trajectory, limits),
-        check=check_sensitivities(refined, found) if check else None,
+        check=check_sensitivities(optimum, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
         reference_sought=reference,
     )
@@ -371,9 +374,10 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     lines += [_saving(entry, t_end, degrees=degrees) for entry in costly]
     if len(costly) < len(found.limits):
         lines.append("no other limit costs time" if costly else "no limit costs time")
-    lines.append(
-        f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})"
-    )
+    how = f"multipliers by the {found.source}, residual {found.residual:.0e}"
+    if found.source == TIMINGS:
+        how = "timings of the same joint path with limits raised"
+    lines.append(f"(to first order, from {how})")
     lines += [
         _boundary(entry)
         for entry in found.boundaries

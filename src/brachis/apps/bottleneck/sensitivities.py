@@ -15,6 +15,8 @@ left over, relative to the gradient's, measures how far an answer is from being 
 
 If the slopes are linearly dependent, many sets of multipliers balance the gradient. The one that holds for a relaxation
 is the one that promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+
+A motion that the phase plane timed has no multipliers: its joint path is timed again with every limit a little raised.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from brachis.common.summary import Summary
 from brachis.limits import Bound, Label, Limit, Role
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
+from brachis.optimise.retiming import SOLVER, PhaseTiming
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -231,6 +234,14 @@ STATIONARY = 1e-3
 """Largest residual of an optimum, relative to the gradient; beyond it the multipliers are rough."""
 
 
+TIMINGS = "timings"
+"""Source of sensitivities that are no multipliers."""
+_RAISED = 1e-3
+"""Part by which limits are raised."""
+_NEAR = 0.02
+"""Distance from a limit, as a part of it, beyond which it costs nothing."""
+
+
 @dataclass(frozen=True)
 class Sensitivity:
     """What one figure of a limit costs.
@@ -366,6 +377,8 @@ def sensitivities(refined: SolvedProgram) -> Sensitivities:
         Of the answer before its end time was lengthened to meet the limits between collocation points.
     """
     report = refined.reports[-1]
+    if report.solver == SOLVER:
+        return sensitivities_of_timing(refined)
     multipliers = multipliers_of(refined.program, report.x, report.multipliers)
     return sensitivities_at(refined.program, multipliers)
 
@@ -396,3 +409,42 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         multipliers.residual,
         multipliers.unique,
     )
+
+
+def sensitivities_of_timing(refined: SolvedProgram) -> Sensitivities:
+    """Time the joint path of a motion again with each limit a little raised.
+
+    Where the joint path is the fastest one, a change of it saves nothing to first order.
+    """
+    costs: dict[tuple[Limit, Bound], float] = {}
+    for phase, x in refined.program.split(refined.x):
+        own = PhaseTiming.of(phase, x)
+        if own is None or own.timing is None:
+            continue
+        evaluation = phase.evaluate(x)
+        for limit, values in zip(phase.limits, evaluation.by_limit, strict=True):
+            if limit.role is Role.SAFEGUARD:
+                continue
+            nearest = limit.violation(values).max(axis=0)
+            for bound in limit.bounds:
+                cost = 0.0
+                if nearest[bound.column] > -_NEAR and limit.longer_time == "relieves":
+                    cost = _raise(own, limit, bound) - own.timing.t_end
+                costs[limit, bound] = costs.get((limit, bound), 0.0) + cost
+    found = []
+    for (limit, bound), cost in costs.items():
+        outwards = -1.0 if bound.side == "lower" else 1.0
+        derivative = outwards * cost / (_RAISED * bound.full_scale)
+        found.append(Sensitivity(limit, bound, derivative))
+    found.sort(key=lambda entry: entry.change(1.0))
+    return Sensitivities(tuple(found), (), TIMINGS, 0.0, unique=True)
+
+
+def _raise(own: PhaseTiming, limit: Limit, bound: Bound) -> float:
+    """Least time of a joint path, s, with a bound moved outwards."""
+    assert own.timing is not None
+    sides = {None: [0, 1], "lower": [0], "upper": [1]}[bound.side]
+    nearer = np.zeros((2, len(own.timing.acceleration), len(limit.labels)))
+    nearer[sides, :, bound.column] = -_RAISED * bound.full_scale * bound.per_unit
+    raised = own.course.solve(own.rates, {limit: nearer})
+    return own.timing.t_end if raised is None else raised.t_end
