@@ -29,8 +29,7 @@ import numpy as np
 
 import mixed_cases
 from brachis import plan
-from brachis.errors import BrachisError
-from brachis.errors import BrachisWarning
+from brachis.errors import BrachisError, BrachisWarning
 from brachis.task import load_task
 from committed import save
 from mixed_robots import ROBOTS, ROOT

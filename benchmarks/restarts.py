@@ -21,11 +21,10 @@ import numpy as np
 
 import mixed_cases
 from brachis import plan
-from brachis.errors import BrachisError
+from brachis.errors import BrachisError, BrachisWarning
 from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
-from brachis.errors import BrachisWarning
 from brachis.task import load_task
 from full_space import FullSpace
 from mixed_robots import ROBOTS

@@ -27,8 +27,8 @@ import brachis
 import joint_paths
 import mixed_cases
 from brachis.common import deadline
-from brachis.optimise.backends import monitor
 from brachis.errors import BrachisWarning
+from brachis.optimise.backends import monitor
 from mixed_robots import ROOT
 
 ALLOWED = 1.5

@@ -62,7 +62,7 @@ from brachis.optimise.transcription import (
 )
 from brachis.problem.problem import Problem
 from brachis.search.phase_plane import initial_breaks, initial_guess
-from brachis.search.timed import LARGE, begin_with_timing, retime, time_alone
+from brachis.search.timed import begin_with_timing, is_large, retime, time_alone
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn."""
@@ -184,9 +184,8 @@ def finish_candidate(
     is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
     retimed = retime(candidate, adapted, options) if is_open else None
     if retimed is not None:
-        is_large = adapted.program.variables > LARGE
         change = retimed.t_end / adapted.t_end - 1.0
-        if is_large or not 0.0 <= change <= TOO_FAST:
+        if is_large(adapted.program) or not 0.0 <= change <= TOO_FAST:
             return retimed
     named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     refined = refine_and_verify(

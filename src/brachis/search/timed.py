@@ -14,8 +14,13 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.problem.problem import Problem
 
-LARGE = 150
-"""Variables above which a motion is retimed, and not refined: with so many, solves with more points take a minute."""
+_LARGE = 2500
+"""Rows above which a motion is retimed, and not refined: with so many, solves with more points take a minute."""
+
+
+def is_large(program: Program) -> bool:
+    """Tell whether a program is too large to be refined."""
+    return len(program.lower) > _LARGE
 
 
 def solvers_of(problem: Problem) -> list[str]:
@@ -64,7 +69,7 @@ def retime(
     if not solved.usable:
         return None
     worth = spline.tolerance
-    if solved.program.variables > LARGE:
+    if is_large(solved.program):
         worth = -np.inf
     retimed = retiming.retime(
         solved, spline.tolerance, spline.points_per_interval, worth

@@ -131,7 +131,8 @@ def test_no_limit_costs_less_than_nothing(scara, joint):
     )
 
 
-def test_of_a_timed_motion_the_solver_s_multipliers_count(scara):
+def test_of_a_timed_motion_the_solver_s_multipliers_count(scara, monkeypatch):
+    monkeypatch.setattr("brachis.search.timed._LARGE", 100)
     task = scara("j1").task.to_dict()
     task["spline"]["intervals"] = "auto"
     result = brachis.plan(scara("j1").trajectory.robot, task)
