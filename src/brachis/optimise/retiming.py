@@ -128,11 +128,12 @@ class PhaseTiming:
         ----------
         phase : Phase
         curves : (S, c) ndarray
-            Values along it: s, ascending, and the redundant curves.
+            Values along it: s, not descending, and the redundant curves.
         rates : tuple of float
         """
         path = phase.joint_map.path
         assert path is not None
+        curves = curves[np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)]
         begin, end = curves[[0, -1], 0]
         knots = path.knots[(path.knots > begin) & (path.knots < end)]
         ends = np.concatenate([[begin], knots, [end]])
@@ -428,9 +429,8 @@ def begin_with_timing(
     phases = []
     parts = []
     for phase, curves, ends in zip(program.phases, joint_paths, rates, strict=True):
-        ascends = np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)
         try:
-            own = PhaseTiming.along(phase, curves[ascends], ends)
+            own = PhaseTiming.along(phase, curves, ends)
             if own.timing is None:
                 return None
             few = _over_knots(phase, own, _ROUGHLY, points, _FIRST_INTERVALS)

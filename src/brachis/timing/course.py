@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -87,12 +88,11 @@ class TimedCourse:
     def solve(
         self,
         rates: tuple[float, float],
-        narrower: Mapping[Limit, np.ndarray] | None = None,
+        narrower: Mapping[Limit, np.ndarray] = MappingProxyType({}),
         most_acceleration: float = np.inf,
     ) -> Timing | None:
         """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane.narrow`."""
-        if narrower is not None:
-            self._plane.narrow(narrower, most_acceleration)
+        self._plane.narrow(narrower, most_acceleration)
         return self._plane.solve(rates)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -239,10 +239,21 @@ class PhasePlane:
         narrower: Mapping[Limit, np.ndarray],
         most_acceleration: float = np.inf,
     ) -> None:
-        """Bring the bounds of limits nearer, by so much half-way between the stations, (P - 1, c); bound d2p/dt2 too.
+        """Bring the bounds of limits nearer half-way between the stations, and bound d2p/dt2.
 
         Where the arm can hold a posture at rest, it still can.
+
+        Parameters
+        ----------
+        narrower : mapping of Limit to (P - 1, c) ndarray
+            Or (2, P - 1, c): for the lower and for the upper bounds. Negative numbers move them outwards. Limits that
+            are missing keep their bounds.
+        most_acceleration : float, optional
+            Largest size of d2p/dt2, 1/s^2.
         """
+        is_plain = not (narrower or self._narrower)
+        if is_plain and most_acceleration == self._most_acceleration:
+            return
         self._most_acceleration = most_acceleration
         held = dict(narrower)
         for own in self._rounds[0]:

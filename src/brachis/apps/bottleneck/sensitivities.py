@@ -235,7 +235,7 @@ STATIONARY = 1e-3
 
 
 TIMINGS = "timings"
-"""Source of sensitivities that are no multipliers."""
+"""Source of sensitivities that come from timings, without multipliers."""
 _RAISED = 1e-3
 """Part by which limits are raised."""
 _NEAR = 0.02
@@ -412,9 +412,20 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
 
 
 def sensitivities_of_timing(refined: SolvedProgram) -> Sensitivities:
-    """Time the joint path of a motion again with each limit a little raised.
+    """Time the joint path of a motion again with each limit raised by 0.1 %.
 
-    Where the joint path is the fastest one, a change of it saves nothing to first order.
+    This is right where the joint path is given. Where it is free, two limits may be active at once all along it: then
+    raising one of them saves nothing unless the joint path changes too.
+
+    Parameters
+    ----------
+    refined : SolvedProgram
+        Timed by the phase plane.
+
+    Returns
+    -------
+    Sensitivities
+        Those of limits that a slower motion does not relieve are zero.
     """
     costs: dict[tuple[Limit, Bound], float] = {}
     for phase, x in refined.program.split(refined.x):
