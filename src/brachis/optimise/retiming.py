@@ -385,7 +385,7 @@ def time_guess(
         As of `retime`; or where the phase plane finds no timing.
     """
     began = time.perf_counter()
-    if not _is_timing_all(program):
+    if not is_timing_all(program):
         return None
     phases = []
     parts = []
@@ -445,7 +445,7 @@ def begin_with_timing(
         return None
 
 
-def _is_timing_all(program: Program) -> bool:
+def is_timing_all(program: Program) -> bool:
     """Tell whether the phase plane knows all limits, and phases meet at rest."""
     is_linked = any(max(link.orders) for link in program.links)
     is_periodic = any(phase.boundary.periodic for phase in program.phases)
@@ -478,7 +478,7 @@ def retime(
     """
     began = time.perf_counter()
     program = solved.program
-    if not _is_timing_all(program):
+    if not is_timing_all(program):
         return None
     timings = time_phases(solved)
     least = least_time_of(program, solved.x, timings)

@@ -16,6 +16,7 @@ from brachis.apps.bottleneck.sensitivities import (
     sensitivities_at,
 )
 from brachis.optimise.backends import SolverOptions, solvers_for
+from support.effort import QUICK
 
 from .conftest import FORCE, LENGTH, MASS, X, Z
 
@@ -143,6 +144,31 @@ def test_of_a_timed_motion_the_solver_s_multipliers_count(scara, monkeypatch):
     assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(
         -0.5 * result.t_end, rel=5e-3
     )
+
+
+def test_limits_along_a_given_joint_path_cost_what_planning_again_saves():
+    rng = np.random.default_rng(1)
+    points = np.cumsum(rng.normal(0.0, 0.4, (6, 3)), axis=0)
+
+    def timed(j1):
+        return brachis.plan(
+            brachis.examples.scara_line,
+            start=points[0].tolist(),
+            task_space="joints",
+            redundant_joints="auto",
+            path=[{"spline": {"through": points[1:].tolist()}}],
+            intervals="auto",
+            limits={"torque": {"j1": j1}},
+            **QUICK,
+        )
+
+    result = timed(10.0)
+    saved = timed(11.0).t_end - result.t_end
+    for motion in (result, result.trajectory):
+        found = brachis.bottleneck.report(motion).sensitivities
+        change = found.of("j1", "torque").change(0.1)
+        assert change == pytest.approx(saved, rel=0.05)
+        assert found.of("j2", "torque").change(0.1) == pytest.approx(0.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("end", [1, -1])

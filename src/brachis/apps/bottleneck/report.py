@@ -61,6 +61,7 @@ from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.motion import Motion
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
+from brachis.optimise.retiming import is_timing_all, keep
 from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
@@ -75,7 +76,7 @@ if TYPE_CHECKING:
 
 
 def solve_again(trajectory: Trajectory) -> SolvedProgram:
-    """Solve the problem of a saved motion from where it ended.
+    """Solve the problem of a saved motion from where it ended; a timing alone stays as it is.
 
     Parameters
     ----------
@@ -104,6 +105,9 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         program, x = _problem(trajectory)
         first = program.phases[0].joint_map
+        is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
+        if is_open and not first.r and is_timing_all(program):
+            return SolvedProgram(program, (keep(program, x),))
         has_law = any(phase.time_law is not None for phase in program.phases)
         curved = any(limit.guarantee.is_mean for limit in program.limits)
         for backend in solvers_for(task.solver.name, curved=curved):
