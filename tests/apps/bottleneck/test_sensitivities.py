@@ -163,11 +163,12 @@ def test_limits_along_a_given_joint_path_cost_what_planning_again_saves():
         )
 
     result = timed(10.0)
-    saved = timed(11.0).t_end - result.t_end
+    # Least times go with a power of the torque.
+    power = np.log(timed(11.0).t_end / result.t_end) / np.log(1.1)
     for motion in (result, result.trajectory):
         found = brachis.bottleneck.report(motion).sensitivities
-        change = found.of("j1", "torque").change(0.1)
-        assert change == pytest.approx(saved, rel=0.05)
+        change = found.of("j1", "torque").change(1.0)
+        assert change == pytest.approx(power * result.t_end, rel=0.02)
         assert found.of("j2", "torque").change(0.1) == pytest.approx(0.0, abs=1e-3)
 
 
