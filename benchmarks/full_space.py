@@ -17,7 +17,8 @@ import pinocchio as pin
 
 from brachis.kinematics import DirectJointMap, JointState
 from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern
-from brachis.optimise.bspline import clamped_knots, spread
+from brachis.common.arrays import spread
+from brachis.optimise.bspline import (clamped_knots)
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase

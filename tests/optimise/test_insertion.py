@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
+from brachis.common.arrays import spread
 from brachis.optimise.bspline import (
     basis_derivatives,
     basis_functions,
@@ -15,7 +16,6 @@ from brachis.optimise.bspline import (
     clamped_uniform_knots,
     insert_knots,
     local_basis,
-    spread,
 )
 
 LENGTHS = np.array([0.3, 0.05, 0.2, 0.01, 0.14, 0.3])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.optimise.bspline import clamped_knots, spread
+from brachis.common.arrays import spread
+from brachis.optimise.bspline import clamped_knots
 from support.phases import phase_of, reachable_points
 
 SHORTEST = 0.1

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from brachis.apps.bottleneck.sensitivities import multipliers_of, sensitivities_at
+from brachis.common.arrays import spread
 from brachis.common.deadline import NEVER
 from brachis.kinematics import DirectJointMap
 from brachis.limits.joint import PositionLimit, TorqueLimit
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.boundary import Boundary, EndCondition
-from brachis.optimise.bspline import clamped_uniform_knots, spread
+from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram

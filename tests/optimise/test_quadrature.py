@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.optimise.bspline import clamped_knots, spread
+from brachis.common.arrays import spread
+from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid, FreeGrid
 
 BREAKS = np.array([0.0, 0.2, 0.5, 0.6, 1.0])

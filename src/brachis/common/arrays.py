@@ -23,6 +23,28 @@ def interpolate_columns(
     return np.column_stack([np.interp(places, s, column) for column in values.T])
 
 
+def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
+    """Spread numbers, such as times, evenly over every interval, with both its ends.
+
+    Parameters
+    ----------
+    breaks : (N + 1,) ndarray
+        Ends of the intervals, ascending.
+    points : int or (N,) int ndarray
+        Steps into which each interval is divided.
+
+    Returns
+    -------
+    (sum of points + 1,) ndarray
+    """
+    steps = np.broadcast_to(points, len(breaks) - 1)
+    first = np.repeat(np.cumsum(steps) - steps, steps)
+    number = np.arange(len(first)) - first
+    width = np.repeat(np.diff(breaks) / steps, steps)
+    inside = number * width + np.repeat(breaks[:-1], steps)
+    return np.append(inside, breaks[-1])
+
+
 def bisect(
     is_before: Callable[[np.ndarray], np.ndarray], end: np.ndarray
 ) -> np.ndarray:

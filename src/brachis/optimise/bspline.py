@@ -173,28 +173,6 @@ def clamped_uniform_knots(degree: int, intervals: int) -> np.ndarray:
     return clamped_knots(degree, np.linspace(0.0, 1.0, intervals + 1))
 
 
-def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
-    """Spread times evenly over every interval, with both its ends.
-
-    Parameters
-    ----------
-    breaks : (N + 1,) ndarray
-        Ends of the intervals, ascending.
-    points : int or (N,) int ndarray
-        Steps into which each interval is divided.
-
-    Returns
-    -------
-    (sum of points + 1,) ndarray
-    """
-    steps = np.broadcast_to(points, len(breaks) - 1)
-    parts = [
-        np.linspace(a, b, n, endpoint=False)
-        for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)
-    ]
-    return np.append(np.concatenate(parts), breaks[-1])
-
-
 def insert_knots(
     control_points: np.ndarray, knots: np.ndarray, finer: np.ndarray, degree: int
 ) -> np.ndarray:

@@ -410,7 +410,7 @@ def refine_and_verify(
     report = reports[-1]
     for looks_left in range(4 if options.max_rounds else 0, -1, -1):
         refined = refine(program, report, solve, options)
-        done = _verify(candidate, reports[:-1], refined)
+        done = verify(candidate, reports[:-1], refined)
         if not looks_left or options.deadline.passed:
             break
         finer = with_points_at_violations(done)
@@ -444,10 +444,22 @@ def with_points_at_violations(candidate: Candidate) -> Program | None:
     return refined.program.with_points(points)
 
 
-def _verify(
+def verify(
     candidate: Candidate, before: tuple[SolverReport, ...], refined: SolvedProgram
 ) -> Candidate:
-    """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
+    """Make the trajectory of a refined program and verify it.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    before : tuple of SolverReport
+        Of earlier solves.
+    refined : SolvedProgram
+
+    Returns
+    -------
+    Candidate
+    """
     start = candidate.start
     assert start is not None
     problem = start.problem

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.common.arrays import interpolate_columns
+from brachis.common.arrays import interpolate_columns, spread
 from brachis.errors import UnreachableError
 from brachis.optimise.boundary import greville
-from brachis.optimise.bspline import basis_matrix, spread
+from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program

@@ -18,9 +18,10 @@ from dataclasses import replace
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import spread
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
-from brachis.optimise.bspline import clamped_knots, spread
+from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import (
     Change,
     Solve,

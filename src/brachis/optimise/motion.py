@@ -7,17 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import bisect
+from brachis.common.arrays import bisect, spread
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
 from brachis.optimise.boundary import LocalBasis, greville
-from brachis.optimise.bspline import (
-    ORDERS,
-    clamped_knots,
-    insert_knots,
-    local_basis,
-    spread,
-)
+from brachis.optimise.bspline import ORDERS, clamped_knots, insert_knots, local_basis
 from brachis.path.time_law import TimeLaw
 from brachis.trajectory import PhaseSpline
 

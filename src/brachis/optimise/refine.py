@@ -18,12 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.common.arrays import bisect
+from brachis.common.arrays import bisect, spread
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.kinematics import JointState
 from brachis.optimise.backends import SolverReport
-from brachis.optimise.bspline import spread
 from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
 from brachis.common import tolerances
 from brachis.optimise.boundary import greville
 from brachis.optimise.motion import Motion
-from brachis.optimise.phase import Phase
 from brachis.timing import TimedCourse, Timing
 
 _FIRST_INTERVALS = 8
@@ -28,8 +25,6 @@ SHORTEST = 4e-5
 """Shortest interval that is halved, s: accelerations are rounded over shorter ones."""
 _LONGER = 2.5
 """Times the length of an interval that those beside it may have."""
-_SHARPER = 0.5
-"""Part of the smaller step of the acceleration by which splines are sharpened, no more."""
 _POINT = 1e-12
 """Half a chord below which it is a point, as a part of the time."""
 _ANCHORED = 100
@@ -132,7 +127,7 @@ def even_out(breaks: np.ndarray) -> np.ndarray:
         breaks = np.sort(np.append(breaks, middles[is_long]))
 
 
-def spline_along(
+def control_points_along(
     course: TimedCourse,
     timing: Timing,
     knots: np.ndarray,
@@ -144,8 +139,8 @@ def spline_along(
     At the ends so many derivatives, from the acceleration on, vanish.
 
     A control point of the rate belongs to d - 1 knots. Its mean is the chord over as many of these as are even beside
-    their mean. Curves of degree 2 are met exactly, and accelerations stay among those near by. Means of means are
-    flatter than the curve; what is missing is added where it changes smoothly.
+    their mean. Curves of degree 2 are met exactly, and accelerations stay among those near by. Means are moved and
+    sharpened where accelerations change smoothly.
     """
     t_end = timing.t_end
     windows = _windows(knots[2:-2], degree - 1)
@@ -155,50 +150,16 @@ def spline_along(
     ends = np.column_stack([places - half, places + half]) * t_end
     widths = ends[:, 1] - ends[:, 0]
     is_point = half <= 0.0
-
-    def means(curves: Callable[[np.ndarray], tuple[np.ndarray, ...]]) -> np.ndarray:
-        y = curves(ends.ravel())[0].reshape(len(ends), 2, -1)
-        rates = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths)[:, None]
-        rates[is_point] = curves(ends[is_point, 0])[1]
-        return np.asarray(rates)
-
-    first = course.curves(timing, np.zeros(1))[0]
-    end = course.curves(timing, np.array([t_end]))[1]
-
-    def splines(rates: np.ndarray) -> np.ndarray:
-        points = _integrate(first, rates, knots[1:-1], t_end)
-        return np.concatenate([first, points]).T
-
-    wanted = means(partial(course.curves, timing))
-    rates = _without_bias(wanted, half, knots, degree, vanishing)
+    y = course.curves(timing, ends.ravel())[0].reshape(len(ends), 2, -1)
+    means = (y[:, 1] - y[:, 0]) / np.where(is_point, 1.0, widths)[:, None]
+    means[is_point] = course.curves(timing, ends[is_point, 0])[1]
+    rates = _sharpen(means, half, knots, degree, vanishing)
     # What that takes from the rates is spread over all.
+    end = course.curves(timing, np.array([t_end]))[1]
     rates = rates + (places**2 * (3.0 - 2.0 * places))[:, None] * (end - rates[-1])
-    motion = Motion(t_end, knots, degree, splines(rates))
-    missing = wanted - means(motion.at)
-    return splines(rates + _smooth_part(missing, rates, knots, degree))
-
-
-def _smooth_part(
-    missing: np.ndarray, rates: np.ndarray, knots: np.ndarray, degree: int
-) -> np.ndarray:
-    """Part of what is missing at control points of the rate, (w, c), that may be added without swinging beside jumps.
-
-    It is no more than what is missing beside, and accelerations change by no more than half of their smaller step.
-    """
-    beside = np.pad(missing, ((1, 1), (0, 0)), mode="edge")
-    three = np.stack([beside[:-2], missing, beside[2:]])
-    is_same = (np.sign(three) == np.sign(missing)).all(axis=0)
-    size = np.where(is_same, np.abs(three).min(axis=0), 0.0)
-    size[[0, -1]] = 0.0
-    widths = np.diff(_windows(knots[2:-2], degree - 1).mean(axis=1))[:, None]
-    means = np.diff(rates, axis=0) / widths
-    steps = np.abs(np.diff(np.pad(means, ((1, 1), (0, 0)), mode="edge"), axis=0))
-    most = _SHARPER * widths * np.minimum(steps[1:], steps[:-1])
-    way = np.concatenate([np.zeros_like(size[:1]), np.cumsum(most, axis=0)])
-    from_left = np.minimum.accumulate(size - way) + way
-    from_right = np.minimum.accumulate((size + way)[::-1])[::-1] - way
-    size = np.maximum(np.minimum(from_left, from_right), 0.0)
-    return np.asarray(np.sign(missing) * size)
+    first = course.curves(timing, np.zeros(1))[0]
+    points = _integrate(first, rates, knots[1:-1], t_end)
+    return np.concatenate([first, points]).T
 
 
 def _windows(knots: np.ndarray, count: int) -> np.ndarray:
@@ -215,51 +176,72 @@ def _integrate(
     return np.asarray(first + np.cumsum(rates * steps[:, None], axis=0))
 
 
-def _without_bias(
+def _sharpen(
     rates: np.ndarray,
     half: np.ndarray,
     knots: np.ndarray,
     degree: int,
     vanishing: tuple[int, int],
 ) -> np.ndarray:
-    """Move the accelerations of means, (w, c), over so much to both sides, (w,), to where they belong.
+    """Turn accelerations of means, (w, c), over so much to both sides, (w,), into those where they belong.
 
-    Where intervals of different length meet these places differ. Slopes are the smaller ones of both sides, so that
-    nothing swings beside a jump.
+    Where intervals of different length meet these places differ; and means of a curve that bends are beside it. Slopes
+    and bends are the smallest ones near by, and none where they change their sign: so nothing swings beside a jump.
     """
-    places = _windows(knots[2:-2], degree - 1).mean(axis=1)
+    windows = _windows(knots[2:-2], degree - 1)
+    places = windows.mean(axis=1)
     widths = np.diff(places)[:, None]
     means = np.diff(rates, axis=0) / widths
     taken = 0.5 * (places[1:] + places[:-1]) + np.diff(half**2) / (6.0 * widths[:, 0])
-    inner = _windows(knots[2:-2], degree)
-    belong = inner[:, 1:-1].mean(axis=1) if degree > 2 else taken
+    inner = _windows(knots[2:-2], degree)[:, 1:-1]
+    belong = inner.mean(axis=1) if degree > 2 else taken
     slopes = np.diff(means, axis=0) / np.diff(taken)[:, None]
-    before = np.concatenate([slopes[:1], slopes])
-    behind = np.concatenate([slopes, slopes[-1:]])
-    smaller = np.where(np.abs(before) < np.abs(behind), before, behind)
-    smaller = np.where(before * behind > 0.0, smaller, 0.0)
-    moved = means + smaller * (belong - taken)[:, None]
+    bends = 2.0 * np.diff(slopes, axis=0) / (taken[2:] - taken[:-2])[:, None]
+    # Second moments of the means, and of control points beside their curve.
+    beside = widths[:, 0] ** 2 / 24.0 + (half[1:] ** 2 + half[:-1] ** 2) / 12.0
+    if degree == 3:
+        # Accelerations are linear between knots, and stay inside of what bends.
+        steps = np.diff(knots[2:-2]) ** 2
+        beside = beside + (steps[1:] + steps[:-1]) / 16.0
+    if degree > 3:
+        beside = beside + inner.var(axis=1) / (2.0 * (degree - 3))
+    slope = _smallest(slopes, 2, "edge")
+    bend = _smallest(bends, 3, "constant")
+    moved = means + slope * (belong - taken)[:, None] - bend * beside[:, None]
     moved[: vanishing[0]] = 0.0
     moved[len(moved) - vanishing[1] :] = 0.0
     return np.concatenate([rates[:1], rates[:1] + np.cumsum(moved * widths, axis=0)])
 
 
-def fit(phase: Phase, course: TimedCourse, timing: Timing) -> np.ndarray:
-    """Point x, (v,), of a phase that follows a timing; see `spline_along`."""
-    knots = phase.knots
+def _smallest(values: np.ndarray, count: int, beyond: str) -> np.ndarray:
+    """Smallest of so many neighbours, (n, c) to (n + count - 1, c), or zero where their signs differ."""
+    pad = ((count - 1, count - 1), (0, 0))
+    padded = np.pad(values, pad, mode=beyond)  # type: ignore[call-overload]
+    near = np.lib.stride_tricks.sliding_window_view(padded, count, axis=0)
+    size = np.abs(near).min(axis=-1)
+    is_same = np.abs(np.sign(near).sum(axis=-1)) == count
+    return np.asarray(np.where(is_same, np.sign(near[..., 0]) * size, 0.0))
+
+
+def splines_along(
+    course: TimedCourse,
+    timing: Timing,
+    knots: np.ndarray,
+    degree: int,
+    vanishing: tuple[int, int],
+) -> Motion:
+    """Lay splines along a timing; see `control_points_along`."""
     t_end = timing.t_end
-    ends = phase.boundary.start, phase.boundary.end
-    first, last = (max(len(end[-1].derivatives) - 1, 0) for end in ends)
-    points = spline_along(course, timing, knots, phase.degree, (first, last))
-    places = greville(knots, phase.degree)
+    points = control_points_along(course, timing, knots, degree, vanishing)
+    places = greville(knots, degree)
     # Means of rates miss the curves by a little, which grows along the motion.
-    count = 1 + phase.intervals // _ANCHORED
+    count = 1 + (len(places) - degree) // _ANCHORED
     anchors = np.linspace(0.0, 1.0, count + 1)
     wanted = course.curves(timing, anchors * t_end)[0]
     for _ in range(2):
-        reached = Motion(t_end, knots, phase.degree, points).at(anchors * t_end)[0]
+        reached = Motion(t_end, knots, degree, points).at(anchors * t_end)[0]
         points = points + _smoothly(anchors, wanted - reached, places).T
-    return phase.variables_from(Motion(t_end, knots, phase.degree, points))
+    return Motion(t_end, knots, degree, points)
 
 
 def _smoothly(

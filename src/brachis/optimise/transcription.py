@@ -11,10 +11,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.boundary import Boundary, EndCondition
-from brachis.optimise.bspline import clamped_knots, spread
+from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.mesh import COARSE_INTERVALS
 from brachis.optimise.phase import Phase

@@ -54,7 +54,7 @@ from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import SOLVER as TIMING
-from brachis.optimise.retiming import TOO_FAST, keep
+from brachis.optimise.retiming import TOO_FAST
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
@@ -62,7 +62,13 @@ from brachis.optimise.transcription import (
 )
 from brachis.problem.problem import Problem
 from brachis.search.phase_plane import initial_breaks, initial_guess
-from brachis.search.timed import begin_with_timing, is_large, retime, time_alone
+from brachis.search.timed import (
+    begin_with_timing,
+    is_large,
+    retime,
+    time_alone,
+    verify_timed,
+)
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn."""
@@ -169,12 +175,12 @@ def finish_candidate(
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
+    solved = SolvedProgram(program, candidate.reports)
     if candidate.reports[-1].solver == TIMING:
         options = dataclasses.replace(options, deadline=deadline)
-        return refine_and_verify(candidate, program, candidate.reports, keep, options)
+        return verify_timed(candidate, solved, options)
     session = _open_session(start, soon, listener)
     target = candidate.target
-    solved = SolvedProgram(program, candidate.reports)
     if candidate.keeps_knots and _is_free_chart(start) and not deadline.passed:
         solved = best_of_joints(start.problem, solved, session)
         target = solved.program

@@ -8,7 +8,12 @@ import numpy as np
 
 from brachis.optimise import retiming
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
+from brachis.optimise.candidate import (
+    Candidate,
+    InitialGuess,
+    refine_and_verify,
+    verify,
+)
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
@@ -77,7 +82,17 @@ def retime(
     if retimed is None:
         return None
     named = dataclasses.replace(candidate, optimum=solved)
-    done = refine_and_verify(
-        named, retimed.program, retimed.reports, retiming.keep, options
-    )
+    done = verify_timed(named, retimed, options)
     return done if done.verified else None
+
+
+def verify_timed(
+    candidate: Candidate, timed: SolvedProgram, options: RefinementOptions
+) -> Candidate:
+    """Verify a timing as it is; where that fails, lengthen it until the limits hold between the places looked at."""
+    reports = timed.reports
+    alone = SolvedProgram(timed.program, reports[-1:], violation=timed.report.violation)
+    done = verify(candidate, reports[:-1], alone)
+    if done.verified:
+        return done
+    return refine_and_verify(candidate, timed.program, reports, retiming.keep, options)

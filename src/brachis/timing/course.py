@@ -100,8 +100,12 @@ class TimedCourse:
         i = np.clip(np.searchsorted(timing.times, t, side="right") - 1, 0, None)
         i = np.minimum(i, len(timing.acceleration) - 1)
         ahead = t - timing.times[i]
-        way = (timing.rate[i] + 0.5 * timing.acceleration[i] * ahead) * ahead
-        rate = timing.rate[i] + timing.acceleration[i] * ahead
+        acceleration = timing.acceleration[i]
+        jerk = timing.jerk[i]
+        left = np.diff(timing.times)[i] - ahead
+        rate = timing.rate[i] + (acceleration - 0.5 * jerk * left) * ahead
+        mean = 0.5 * acceleration - jerk * (left + ahead / 3.0) / 4.0
+        way = (timing.rate[i] + mean * ahead) * ahead
         step = np.diff(self.path.p)[i]
         u = np.clip(way / step, 0.0, 1.0)[:, None]
         chord = self._y[i + 1] - self._y[i]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from brachis.common.arrays import spread
 from brachis.common.summary import Summary
 from brachis.errors import BrachisWarning
 from brachis.limits import Limit
@@ -19,7 +20,9 @@ from brachis.trajectory import MotionPhase, Trajectory
 PLACES = 2000
 """Places at which the joint path of a motion is timed, no fewer."""
 _LEAST_PLACES = 4
-"""Places in every knot interval, no fewer."""
+"""Places in every knot interval, about."""
+_MOST_PLACES = 40_000
+"""Places for all of these, about."""
 WORTH_A_WARNING = 0.02
 """Gap from which on a plan warns."""
 _STILL = 1e-9
@@ -169,14 +172,14 @@ def _time_phase(
     limits: Sequence[Limit],
 ) -> tuple[JointPath, np.ndarray, np.ndarray] | None:
     """Stations of a phase's joint path, when the motion passes them, and when the fastest timing does, (P,), s."""
-    count = max(PLACES, _LEAST_PLACES * intervals)
+    count = max(PLACES, min(_LEAST_PLACES * intervals, _MOST_PLACES))
     inner = trajectory.times[
         (trajectory.times > phase.begin) & (trajectory.times < phase.end)
     ]
     ends = np.concatenate([[phase.begin], inner, [phase.end]])
     ends = ends[np.append(np.diff(ends) > _STILL * phase.duration, True)]
     steps = np.ceil(count * np.diff(ends) / phase.duration).astype(int)
-    t = np.concatenate([ends[:1], *map(_divide, ends[:-1], ends[1:], steps)])
+    t = spread(ends, steps)
     t = divide_turns(t, trajectory.velocity(t))
     s = trajectory.path_coordinate(t)
     qdot = trajectory.velocity(t)
@@ -188,11 +191,6 @@ def _time_phase(
     if timing is None:
         return None
     return path, t[kept], timing.times
-
-
-def _divide(low: float, high: float, steps: int) -> np.ndarray:
-    """Divide an interval evenly: the ends of its parts, without the first one."""
-    return np.linspace(low, high, steps + 1)[1:]
 
 
 def _narrowest(s: np.ndarray, lost: np.ndarray) -> tuple[float, float]:

@@ -149,7 +149,9 @@ class Timing:
     rate : (P,) ndarray
         dp/dt, 1/s.
     acceleration : (P - 1,) ndarray
-        d2p/dt2 between the stations, 1/s^2.
+        Mean d2p/dt2 between the stations, 1/s^2.
+    jerk : (P - 1,) ndarray
+        d3p/dt3 there, 1/s^3: as much as it changes smoothly. Accelerations that jump do so at stations.
     times : (P,) ndarray
         From 0 on, s.
     """
@@ -157,15 +159,29 @@ class Timing:
     path: JointPath
     rate: np.ndarray
     acceleration: np.ndarray
+    jerk: np.ndarray
     times: np.ndarray
 
     @classmethod
     def of(cls, path: JointPath, rate: np.ndarray) -> Timing:
-        """Integrate a rate, (P,), whose square is linear in p between the stations."""
+        """Integrate a rate, (P,), known at the stations."""
         steps = np.diff(path.p)
-        durations = 2.0 * steps / (rate[1:] + rate[:-1])
-        acceleration = np.diff(rate**2) / (2.0 * steps)
-        return cls(path, rate, acceleration, np.append(0.0, np.cumsum(durations)))
+        mean = 0.5 * (rate[1:] + rate[:-1])
+        durations = steps / mean
+        acceleration = np.diff(rate) / durations
+        # The smaller slope of both sides: none beside a jump.
+        between = 0.5 * (durations[1:] + durations[:-1])
+        slopes = np.pad(np.diff(acceleration) / between, 1)
+        smaller = np.minimum(np.abs(slopes[1:]), np.abs(slopes[:-1]))
+        most = np.abs(acceleration) / durations
+        is_smooth = slopes[1:] * slopes[:-1] > 0.0
+        size = np.where(is_smooth, np.minimum(smaller, most), 0.0)
+        jerk = np.sign(slopes[1:]) * size
+        durations = durations * (1.0 + jerk * durations**2 / (12.0 * mean))
+        durations = (steps + jerk * durations**3 / 12.0) / mean
+        acceleration = np.diff(rate) / durations
+        times = np.append(0.0, np.cumsum(durations))
+        return cls(path, rate, acceleration, jerk, times)
 
     @property
     def t_end(self) -> float:

@@ -325,8 +325,9 @@ def _spread(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> P
     steps = np.ceil(np.clip(wanted, _LEAST_STEPS, 10_000)).astype(int)
     count = steps + 1
     _check_count(int(count.sum()))
-    spans = zip(low, high, count, strict=True)
-    u = np.concatenate([np.linspace(*span) for span in spans])
+    begins = np.repeat(np.cumsum(count) - count, count)
+    part = (np.arange(len(begins)) - begins) / np.repeat(steps, count)
+    u = (1.0 - part) * np.repeat(low, count) + part * np.repeat(high, count)
     return np.repeat(first, count), u
 
 

@@ -40,6 +40,7 @@ from brachis.apps.bottleneck.sensitivities import (
     Sensitivity,
     sensitivities,
 )
+from brachis.common.arrays import spread
 from brachis.common.deadline import Deadline
 from brachis.common.summary import LINES
 from brachis.errors import (
@@ -55,7 +56,6 @@ from brachis.kinematics import (
 )
 from brachis.limits import Role
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.bspline import spread
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.motion import Motion

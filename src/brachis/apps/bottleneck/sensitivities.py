@@ -30,8 +30,9 @@ import numpy as np
 from brachis.common.summary import Summary
 from brachis.limits import Bound, Label, Limit, Role
 from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
-from brachis.optimise.retiming import SOLVER, PhaseTiming
+from brachis.optimise.retiming import SOLVER
 
 if TYPE_CHECKING:
     from scipy import sparse

@@ -1,0 +1,273 @@
+"""Splines along the fastest timing of a phase's joint path, within its limits.
+
+Splines follow a timing nearly (`timed_splines`). Where they exceed a limit, this is narrowed there by so much, and the
+joint path is timed anew. That leaves the motion as fast as possible, but new limits make new places at which
+accelerations jump. So what is left after a few times is slowed down instead: a factor f(p) < 1 of the rate dp/dt leaves
+f^2 of all accelerations, but for f f' (dp/dt)^2, and changes over about the way in which the motion could stop.
+
+Knots stand where accelerations jump. They stay there on the path, whatever its timing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brachis.common.arrays import spread
+from brachis.errors import UnreachableError
+from brachis.limits import Limit, Moments
+from brachis.optimise.bspline import clamped_knots
+from brachis.optimise.grid import FixedGrid
+from brachis.optimise.motion import Motion
+from brachis.optimise.phase import Phase, is_checked_at_points
+from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
+from brachis.optimise.timed_splines import breaks_for, splines_along
+from brachis.timing import Timing
+
+_FINENESS = (0.001, 0.0001, 0.01, 0.1, 1.0)
+"""What intervals may lose together, in tolerances: less where that was slow, more where there were too many."""
+_MOST_INTERVALS = 40_000
+"""Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
+_LOOKS = 8
+"""Times in each interval at which limits are looked at."""
+_NARROWED = 2
+"""Timings with limits that are narrowed; what they leave is slowed down."""
+_ROUNDS = 40
+"""Splines that are laid, no more."""
+_ENOUGH = 5e-5
+"""Violation of a limit, as a part of it, that is small enough."""
+_MORE = 1.2
+"""Part of what would do by which motions are slowed down: splines do not quite follow."""
+_MOST_SLOWED = 0.7
+"""Logarithm of the factor of the rate in one round, no more."""
+_QUICK = 0.9
+"""Part of the path on which accelerations are smaller than those by which the motion could stop."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A motion along a timing.
+
+    Attributes
+    ----------
+    phase : Phase
+        Over the knots that the timing needs.
+    x : (v,) ndarray
+    violation : float
+        Largest violation of a limit that was seen, as a part of it.
+    """
+
+    phase: Phase
+    x: np.ndarray
+    violation: float
+
+
+def follow(
+    phase: Phase, own: PhaseTiming, tolerance: float, points: int
+) -> Followed | None:
+    """Lay splines along the fastest timing of a phase's joint path, within the limits.
+
+    Parameters
+    ----------
+    phase : Phase
+        With another grid.
+    own : PhaseTiming
+    tolerance : float
+        Part of the time by which they should not be slower.
+    points : int
+        Collocation points an interval.
+
+    Returns
+    -------
+    Followed or None
+        None where the limits allow no timing.
+    """
+    timing = own.without_spikes().timing
+    if timing is None:
+        return None
+    best: tuple[Motion, float] | None = None
+    least = np.inf
+    for fineness in _FINENESS:
+        breaks = _knots(phase, own, timing, fineness * tolerance)
+        if len(breaks) > _MOST_INTERVALS:
+            if best is None:
+                continue
+            break
+        motion, violation = _hold_limits(phase, own, timing, breaks)
+        needed = motion.t_end * (1.0 + violation)
+        if needed >= least:
+            break
+        least = needed
+        best = motion, violation
+        if least < timing.t_end * (1.0 + 2.0 * tolerance):
+            break
+    if best is None:
+        return None
+    return Followed(*_as_phase(phase, best[0], points), best[1])
+
+
+def begin(
+    phase: Phase, own: PhaseTiming, lost: float, most: int, points: int
+) -> tuple[Phase, np.ndarray] | None:
+    """Lay splines along the fastest timing over few intervals; limits may be exceeded.
+
+    Parameters
+    ----------
+    phase, own, points
+        As of `follow`.
+    lost : float
+        Part of the time that the intervals may lose together.
+    most : int
+        Intervals, about.
+
+    Returns
+    -------
+    phase : Phase
+    x : (v,) ndarray
+        None where the limits allow no timing.
+    """
+    if own.timing is None:
+        return None
+    breaks = _knots(phase, own, own.timing, lost, most)
+    motion = _lay_splines(phase, own, own.timing, breaks)
+    return _as_phase(phase, motion, points)
+
+
+def _knots(
+    phase: Phase,
+    own: PhaseTiming,
+    timing: Timing,
+    tolerance: float,
+    most: float = np.inf,
+) -> np.ndarray:
+    """Choose knots, (N + 1,), over which splines follow a timing; see `breaks_for`."""
+    ends = (phase.boundary.start, phase.boundary.end)
+    from_rest = max(len(end[0].derivatives) for end in ends) > 1
+    return breaks_for(own.course, timing, tolerance, from_rest=from_rest, most=most)
+
+
+def _lay_splines(
+    phase: Phase, own: PhaseTiming, timing: Timing, breaks: np.ndarray
+) -> Motion:
+    """Lay splines along a timing over knots, within the boundary conditions; see `splines_along`."""
+    ends = phase.boundary.start, phase.boundary.end
+    first, last = (max(len(end[-1].derivatives) - 1, 0) for end in ends)
+    knots = clamped_knots(phase.degree, breaks)
+    motion = splines_along(own.course, timing, knots, phase.degree, (first, last))
+    splines = phase.boundary.splines(knots, phase.degree)
+    t_end = motion.t_end
+    points = [
+        spline.control_points(spline.free_from(nearly, t_end), t_end)
+        for spline, nearly in zip(splines, motion.control_points, strict=True)
+    ]
+    return replace(motion, control_points=np.array(points))
+
+
+def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndarray]:
+    """Return the phase over the knots of a motion, and its point x."""
+    t_norm = spread(np.unique(motion.knots), points)
+    finer = phase.with_grid(FixedGrid(motion.knots, phase.degree, t_norm))
+    return finer, finer.variables_from(motion)
+
+
+def _hold_limits(
+    phase: Phase, own: PhaseTiming, timing: Timing, breaks: np.ndarray
+) -> tuple[Motion, float]:
+    """Lay splines until the limits hold: the best motion, and its largest violation; infinite if it is not known."""
+    most_acceleration = largest_acceleration(timing)
+    limits = [
+        limit
+        for limit in phase.limits
+        if is_checked_at_points(limit) and limit.longer_time == "relieves"
+    ]
+    motion = _lay_splines(phase, own, timing, breaks)
+    best = motion, np.inf
+    narrower: dict[Limit, np.ndarray] = {}
+    for number in range(_ROUNDS):
+        t = spread(breaks, _LOOKS) * motion.t_end
+        try:
+            state = phase.joint_map.state(*motion.at(t), t=t)
+        except UnreachableError:
+            break
+        values = {limit: limit.values(state) for limit in limits}
+        beyond = {limit: limit.violation(values[limit]).clip(0.0) for limit in limits}
+        violation = max((each.max() for each in beyond.values()), default=0.0)
+        if motion.t_end * (1.0 + violation) < best[0].t_end * (1.0 + best[1]):
+            best = motion, float(violation)
+        if violation <= _ENOUGH:
+            break
+        slower: Timing | None
+        if number < _NARROWED:
+            for limit in limits:
+                excess = beyond[limit] / limit.violation_scale
+                more = _between_stations(excess, breaks, timing)
+                narrower[limit] = narrower.get(limit, 0.0) + more
+            slower = own.course.solve(own.rates, narrower, most_acceleration)
+            if slower is None:
+                break
+        else:
+            at_rest = Moments.at_rest(state.q)
+            parts = _slow_down(values, beyond, at_rest)
+            factor = np.exp(-_fade(_between_stations(parts, breaks, timing), timing))
+            slower = Timing.of(timing.path, timing.rate * factor)
+        breaks = _move(breaks, timing, slower)
+        timing = slower
+        motion = _lay_splines(phase, own, timing, breaks)
+    return best
+
+
+def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
+    """Move knots, (N + 1,), to the times at which another timing passes the same places."""
+    places = np.interp(breaks, before.times / before.t_end, before.path.p)
+    moved = np.interp(places, timing.path.p, timing.times / timing.t_end)
+    return np.concatenate([[0.0], moved[1:-1], [1.0]])
+
+
+def _slow_down(
+    values: Mapping[Limit, np.ndarray],
+    beyond: Mapping[Limit, np.ndarray],
+    at_rest: Moments,
+) -> np.ndarray:
+    """Find by how much a motion has to be slower at every instant, (K, 1), as a logarithm.
+
+    What a limit measures at rest, as of gravity, it measures at any speed.
+    """
+    parts = [np.zeros((len(at_rest.q), 1))]
+    for limit, excess in beyond.items():
+        by_speed = np.abs(values[limit] - limit.values(at_rest)) * limit.violation_scale
+        order = min(max(limit.order, 1), 2)
+        part = np.divide(
+            excess, order * by_speed, out=np.zeros_like(excess), where=excess > 0.0
+        )
+        parts.append(part.max(axis=1, keepdims=True, initial=0.0))
+    return np.asarray(np.minimum(_MORE * np.max(parts, axis=0), _MOST_SLOWED))
+
+
+def _between_stations(
+    values: np.ndarray, breaks: np.ndarray, timing: Timing
+) -> np.ndarray:
+    """Take the largest of values, (K, c), in the knot intervals between stations, (P - 1, c)."""
+    each = values[:-1].reshape(-1, _LOOKS, values.shape[1]).max(axis=1)
+    each = np.maximum(each, values[_LOOKS::_LOOKS])
+    t_norm = timing.times / timing.t_end
+    first = np.searchsorted(breaks, t_norm[:-1], side="right") - 1
+    last = np.searchsorted(breaks, t_norm[1:], side="left")
+    first = np.clip(first, 0, len(each) - 1)
+    pairs = np.column_stack([first, np.maximum(last, first + 1)]).ravel()
+    ended = np.pad(each, ((0, 1), (0, 0)))
+    return np.asarray(np.maximum.reduceat(ended, pairs)[::2])
+
+
+def _fade(slower: np.ndarray, timing: Timing) -> np.ndarray:
+    """Spread slowing between stations, (P - 1, 1), over the stations, (P,): beside its places it fades."""
+    quick = np.quantile(np.abs(timing.acceleration), _QUICK)
+    steps = np.diff(timing.path.p) / timing.middle_rate**2
+    way = np.append(0.0, np.cumsum(2.0 * quick * steps))
+    beside = np.pad(slower[:, 0], 1)
+    with np.errstate(divide="ignore"):
+        own = np.log(np.maximum(beside[1:], beside[:-1]))
+    ahead = np.maximum.accumulate(own + way) - way
+    behind = np.maximum.accumulate((own - way)[::-1])[::-1] + way
+    return np.asarray(np.exp(np.maximum(ahead, behind)))

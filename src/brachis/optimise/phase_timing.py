@@ -1,0 +1,147 @@
+"""The fastest timing of the joint path of a phase, known from the phase plane within milliseconds (`timing`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brachis.common import tolerances
+from brachis.common.arrays import spread
+from brachis.errors import UnreachableError
+from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Program
+from brachis.timing import Course, TimedCourse, Timing, divide_turns
+
+PLACES = 4000
+"""Places at which a joint path is timed, no fewer: with half of them splines were up to 0.4 % slower."""
+_PLACES_A_PIECE = 24
+"""Places in every piece of a path, unless there are very many of these."""
+_MOST_PLACES = 40_000
+"""Places in all pieces together, about."""
+_LEAST_PLACES = 12
+"""Places in every knot interval, no fewer."""
+_MOVES = 1e-3
+"""Part of the largest d2p/dt2 from which on a station counts: at others the motion cruises."""
+_USUAL = 0.98
+"""Part of these stations whose d2p/dt2 is usual."""
+_SPIKE = 3.0
+"""Times the usual d2p/dt2 that splines can follow."""
+
+
+@dataclass(frozen=True)
+class PhaseTiming:
+    """A phase's motion beside the fastest timing of its joint path.
+
+    Attributes
+    ----------
+    course : TimedCourse
+    rates : tuple of float
+        Of the path's length at both ends, 1/s.
+    timing : Timing or None
+        None where the limits allow none, not even the motion's own, within rounding.
+    """
+
+    course: TimedCourse
+    rates: tuple[float, float]
+    timing: Timing | None
+
+    @classmethod
+    def of(cls, phase: Phase, x: np.ndarray) -> PhaseTiming | None:
+        """Time the joint path of a phase; None where its speed is given, or where it cannot be evaluated."""
+        if phase.time_law is not None:
+            return None
+        motion = phase.motion(x)
+        count = max(_LEAST_PLACES, -(-PLACES // phase.intervals))
+        t = spread(motion.breaks / motion.t_end, count) * motion.t_end
+        try:
+            before = phase.joint_map.state(*motion.at(t), t=t)
+            t = divide_turns(t, before.qdot)
+            y, ydot, yddot, _ = motion.at(t)
+            course = TimedCourse(
+                Course(t, y, ydot, yddot), phase.joint_map, phase.limits
+            )
+        except UnreachableError:
+            return None
+        speeds = course.speeds
+        rates = float(speeds[0]), float(speeds[-1])
+        return cls(course, rates, course.solve(rates))
+
+    def without_spikes(self) -> PhaseTiming:
+        """Time again where the timing all but stops for an instant, as no spline does: only as fast as they can."""
+        if self.timing is None:
+            return self
+        most = largest_acceleration(self.timing)
+        if np.abs(self.timing.acceleration).max() <= most:
+            return self
+        return replace(self, timing=self.course.solve(self.rates, {}, most))
+
+    @classmethod
+    def along(
+        cls, phase: Phase, curves: np.ndarray, rates: tuple[float, float]
+    ) -> PhaseTiming:
+        """Time a joint path between rates ds/dt at its ends, 1/s; raise UnreachableError if it leaves the map.
+
+        Parameters
+        ----------
+        phase : Phase
+        curves : (S, c) ndarray
+            Values along it: s, not descending, and the redundant curves.
+        rates : tuple of float
+        """
+        path = phase.joint_map.path
+        assert path is not None
+        curves = curves[np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)]
+        begin, end = curves[[0, -1], 0]
+        knots = path.knots[(path.knots > begin) & (path.knots < end)]
+        ends = np.concatenate([[begin], knots, [end]])
+        ends = ends[np.append(np.diff(ends) > tolerances.PATH, True)]
+        pieces = len(ends) - 1
+        count = max(PLACES, min(_PLACES_A_PIECE * pieces, _MOST_PLACES))
+
+        def lay(s: np.ndarray) -> tuple[TimedCourse, tuple[float, float]]:
+            coarse = Course.through(curves, s)
+            derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
+            state = phase.joint_map.state(*derivatives, t=s - begin)
+            s = divide_turns(s, state.qdot)
+            course = Course.through(curves, s)
+            timed = TimedCourse(course, phase.joint_map, phase.limits)
+            return timed, tuple(timed.speeds[[0, -1]] * rates)
+
+        course, by_length = lay(
+            spread(ends, np.full(pieces, -(-count // (3 * pieces))))
+        )
+        timing = course.solve(by_length)
+        if timing is None:
+            return cls(course, by_length, None)
+        # Stations where the motion takes its time.
+        t = np.linspace(0.0, timing.t_end, count)
+        s = np.union1d(course.curves(timing, t)[0][:, 0].clip(begin, end), ends)
+        s = s[np.append(np.diff(s) > tolerances.PATH, True)]
+        s[0] = begin
+        course, by_length = lay(s)
+        return cls(course, by_length, course.solve(by_length))
+
+
+def largest_acceleration(timing: Timing) -> float:
+    """Largest d2p/dt2 that splines can follow, 1/s^2."""
+    sizes = np.abs(timing.acceleration)
+    return float(_SPIKE * np.quantile(sizes[sizes >= _MOVES * sizes.max()], _USUAL))
+
+
+def time_phases(solved: SolvedProgram) -> list[PhaseTiming | None]:
+    """Time the joint paths of all phases of a motion; see `PhaseTiming.of`."""
+    return [PhaseTiming.of(*pair) for pair in solved.program.split(solved.x)]
+
+
+def least_time_of(
+    program: Program, x: np.ndarray, timings: Sequence[PhaseTiming | None]
+) -> float:
+    """Return the least time of a motion's own joint paths, s, with the durations that are given, and the pauses."""
+    total = 0.0
+    for (phase, part), own in zip(program.split(x), timings, strict=True):
+        fastest = None if own is None else own.timing
+        total += phase.pause + (part[0] if fastest is None else fastest.t_end)
+    return float(total)
