@@ -15,10 +15,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from brachis.common.arrays import spread
 from brachis.kinematics import DirectJointMap, JointState
 from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern
-from brachis.common.arrays import spread
-from brachis.optimise.bspline import (clamped_knots)
+from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase

@@ -26,13 +26,15 @@ from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
 
-_FINENESS = (0.001, 0.0001, 0.01, 0.1, 1.0)
+_FINENESS = (0.01, 0.001, 0.0001, 0.1, 1.0)
 """What intervals may lose together, in tolerances: less where that was slow, more where there were too many."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
 _LOOKS = 8
 """Times in each interval at which limits are looked at."""
-_NARROWED = 2
+_LOOKS_A_PIECE = 32
+"""Times in each piece of a path."""
+_NARROWED = 4
 """Timings with limits that are narrowed; what they leave is slowed down."""
 _ROUNDS = 40
 """Splines that are laid, no more."""
@@ -42,6 +44,7 @@ _MORE = 1.2
 """Part of what would do by which motions are slowed down: splines do not quite follow."""
 _MOST_SLOWED = 0.7
 """Logarithm of the factor of the rate in one round, no more."""
+_LEASTQ = 0.1
 _QUICK = 0.9
 """Part of the path on which accelerations are smaller than those by which the motion could stop."""
 
@@ -186,7 +189,8 @@ def _hold_limits(
     best = motion, np.inf
     narrower: dict[Limit, np.ndarray] = {}
     for number in range(_ROUNDS):
-        t = spread(breaks, _LOOKS) * motion.t_end
+        t_norm = _look_at(phase, motion, breaks)
+        t = t_norm * motion.t_end
         try:
             state = phase.joint_map.state(*motion.at(t), t=t)
         except UnreachableError:
@@ -202,7 +206,7 @@ def _hold_limits(
         if number < _NARROWED:
             for limit in limits:
                 excess = beyond[limit] / limit.violation_scale
-                more = _between_stations(excess, breaks, timing)
+                more = _between_stations(excess, t_norm, breaks, timing)
                 narrower[limit] = narrower.get(limit, 0.0) + more
             slower = own.course.solve(own.rates, narrower, most_acceleration)
             if slower is None:
@@ -210,7 +214,8 @@ def _hold_limits(
         else:
             at_rest = Moments.at_rest(state.q)
             parts = _slow_down(values, beyond, at_rest)
-            factor = np.exp(-_fade(_between_stations(parts, breaks, timing), timing))
+            slowing = _between_stations(parts, t_norm, breaks, timing)
+            factor = np.exp(-_fade(slowing, timing))
             slower = Timing.of(timing.path, timing.rate * factor)
         breaks = _move(breaks, timing, slower)
         timing = slower
@@ -245,12 +250,31 @@ def _slow_down(
     return np.asarray(np.minimum(_MORE * np.max(parts, axis=0), _MOST_SLOWED))
 
 
+def _look_at(phase: Phase, motion: Motion, breaks: np.ndarray) -> np.ndarray:
+    """List normalised times at which limits are looked at: in every knot interval, and in every piece of the path."""
+    t_norm = spread(breaks, _LOOKS)
+    path = phase.joint_map.path
+    if path is None or len(path.breaks) < 3:
+        return t_norm
+    s = np.maximum.accumulate(motion.at(t_norm * motion.t_end)[0][:, 0])
+    inside = path.breaks[(path.breaks > s[0]) & (path.breaks < s[-1])]
+    if not len(inside):
+        return t_norm
+    ends = np.concatenate([s[:1], inside, s[-1:]])
+    # Closer together beside the ends, where the curvature changes.
+    part = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _LOOKS_A_PIECE + 1))
+    pieces = ends[:-1, None] + np.diff(ends)[:, None] * part
+    return np.union1d(t_norm, np.interp(pieces.ravel(), s, t_norm))
+
+
 def _between_stations(
-    values: np.ndarray, breaks: np.ndarray, timing: Timing
+    values: np.ndarray, t_norm: np.ndarray, breaks: np.ndarray, timing: Timing
 ) -> np.ndarray:
     """Take the largest of values, (K, c), in the knot intervals between stations, (P - 1, c)."""
-    each = values[:-1].reshape(-1, _LOOKS, values.shape[1]).max(axis=1)
-    each = np.maximum(each, values[_LOOKS::_LOOKS])
+    each = np.zeros((len(breaks) - 1, values.shape[1]))
+    for side in ("left", "right"):
+        interval = np.searchsorted(breaks, t_norm, side=side) - 1
+        np.maximum.at(each, interval.clip(0, len(each) - 1), values)
     t_norm = timing.times / timing.t_end
     first = np.searchsorted(breaks, t_norm[:-1], side="right") - 1
     last = np.searchsorted(breaks, t_norm[1:], side="left")
@@ -262,7 +286,8 @@ def _between_stations(
 
 def _fade(slower: np.ndarray, timing: Timing) -> np.ndarray:
     """Spread slowing between stations, (P - 1, 1), over the stations, (P,): beside its places it fades."""
-    quick = np.quantile(np.abs(timing.acceleration), _QUICK)
+    sizes = np.abs(timing.acceleration)
+    quick = np.maximum(sizes, _LEASTQ * np.quantile(sizes, _QUICK))
     steps = np.diff(timing.path.p) / timing.middle_rate**2
     way = np.append(0.0, np.cumsum(2.0 * quick * steps))
     beside = np.pad(slower[:, 0], 1)

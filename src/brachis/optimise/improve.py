@@ -23,6 +23,7 @@ from brachis.optimise.backends import (
     SolverReport,
     SolveStatus,
 )
+from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
 from brachis.task import SolverSettings
 
@@ -263,7 +264,7 @@ class SolverSession:
 
         return cls(backend, options, deadline, progress)
 
-    def __call__(self, program: Program, x: np.ndarray) -> SolverReport:
+    def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,)."""
         left = self.deadline.within(self.options.time_limit).left
         # Only the time that is not given can get shorter.

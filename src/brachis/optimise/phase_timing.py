@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
-from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.timing import Course, TimedCourse, Timing, divide_turns
@@ -80,49 +80,59 @@ class PhaseTiming:
 
     @classmethod
     def along(
-        cls, phase: Phase, curves: np.ndarray, rates: tuple[float, float]
+        cls,
+        phase: Phase,
+        course_at: Callable[[np.ndarray], Course],
+        ends: tuple[float, float],
     ) -> PhaseTiming:
-        """Time a joint path between rates ds/dt at its ends, 1/s; raise UnreachableError if it leaves the map.
+        """Time a joint path; raise UnreachableError if it leaves the map.
 
         Parameters
         ----------
         phase : Phase
-        curves : (S, c) ndarray
-            Values along it: s, not descending, and the redundant curves.
-        rates : tuple of float
+            With its rates at the ends.
+        course_at : callable
+            Curves at ascending path coordinates, (P,).
+        ends : tuple of float
+            Path coordinates.
         """
         path = phase.joint_map.path
         assert path is not None
-        curves = curves[np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)]
-        begin, end = curves[[0, -1], 0]
+        begin, end = ends
         knots = path.knots[(path.knots > begin) & (path.knots < end)]
-        ends = np.concatenate([[begin], knots, [end]])
-        ends = ends[np.append(np.diff(ends) > tolerances.PATH, True)]
-        pieces = len(ends) - 1
-        count = max(PLACES, min(_PLACES_A_PIECE * pieces, _MOST_PLACES))
+        pieces = np.concatenate([[begin], knots, [end]])
+        pieces = pieces[np.append(np.diff(pieces) > tolerances.PATH, True)]
+        number = len(pieces) - 1
+        count = max(PLACES, min(_PLACES_A_PIECE * number, _MOST_PLACES))
+        sides = phase.boundary.start[0], phase.boundary.end[0]
+        rates = np.array([side.derivatives[:1].sum() for side in sides])
 
         def lay(s: np.ndarray) -> tuple[TimedCourse, tuple[float, float]]:
-            coarse = Course.through(curves, s)
+            coarse = course_at(s)
             derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
             state = phase.joint_map.state(*derivatives, t=s - begin)
-            s = divide_turns(s, state.qdot)
-            course = Course.through(curves, s)
+            course = course_at(divide_turns(s, state.qdot))
             timed = TimedCourse(course, phase.joint_map, phase.limits)
             return timed, tuple(timed.speeds[[0, -1]] * rates)
 
-        course, by_length = lay(
-            spread(ends, np.full(pieces, -(-count // (3 * pieces))))
-        )
+        course, by_length = lay(spread(pieces, -(-count // (3 * number))))
         timing = course.solve(by_length)
         if timing is None:
             return cls(course, by_length, None)
         # Stations where the motion takes its time.
         t = np.linspace(0.0, timing.t_end, count)
-        s = np.union1d(course.curves(timing, t)[0][:, 0].clip(begin, end), ends)
+        s = np.union1d(course.curves(timing, t)[0][:, 0].clip(begin, end), pieces)
         s = s[np.append(np.diff(s) > tolerances.PATH, True)]
         s[0] = begin
         course, by_length = lay(s)
         return cls(course, by_length, course.solve(by_length))
+
+    @classmethod
+    def through(cls, phase: Phase, curves: np.ndarray) -> PhaseTiming:
+        """Time a joint path through curves, (S, c), the first of them s; see `along`."""
+        curves = curves[np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)]
+        begin, end = curves[[0, -1], 0]
+        return cls.along(phase, partial(Course.through, curves), (begin, end))
 
 
 def largest_acceleration(timing: Timing) -> float:
@@ -131,17 +141,6 @@ def largest_acceleration(timing: Timing) -> float:
     return float(_SPIKE * np.quantile(sizes[sizes >= _MOVES * sizes.max()], _USUAL))
 
 
-def time_phases(solved: SolvedProgram) -> list[PhaseTiming | None]:
-    """Time the joint paths of all phases of a motion; see `PhaseTiming.of`."""
-    return [PhaseTiming.of(*pair) for pair in solved.program.split(solved.x)]
-
-
-def least_time_of(
-    program: Program, x: np.ndarray, timings: Sequence[PhaseTiming | None]
-) -> float:
-    """Return the least time of a motion's own joint paths, s, with the durations that are given, and the pauses."""
-    total = 0.0
-    for (phase, part), own in zip(program.split(x), timings, strict=True):
-        fastest = None if own is None else own.timing
-        total += phase.pause + (part[0] if fastest is None else fastest.t_end)
-    return float(total)
+def time_phases(program: Program, x: np.ndarray) -> list[PhaseTiming | None]:
+    """Time the joint paths of all phases of a motion, (v,); see `PhaseTiming.of`."""
+    return [PhaseTiming.of(*pair) for pair in program.split(x)]

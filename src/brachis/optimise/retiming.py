@@ -11,17 +11,25 @@ from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.follow import Followed, begin, follow
 from brachis.optimise.guess import shortest_time
-from brachis.optimise.improve import SolvedProgram
-from brachis.optimise.phase_timing import PhaseTiming, least_time_of, time_phases
+from brachis.optimise.improve import SolvedProgram, SolverSession
+from brachis.optimise.path_program import PathPhase, PathProgram
+from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.timing import is_left_out
 
 SOLVER = "phase plane"
 """Name of what solves a program by its timing alone."""
-TOO_FAST = 0.01
-"""Part of the least time by which a motion is faster that exceeds limits by much between its collocation points."""
 _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
+_PATH_INTERVALS = (16, 32, 64)
+"""Intervals of the redundant curves over the path, one after the other."""
+_LOOKS = 400
+"""Even steps of the joint path at which the tool is looked for."""
+_STANDS = 1e-2
+"""Part of its usual step which the tool makes in one of these where it stands."""
+_LEAST_STATIONS = 120
+_STATIONS_AN_INTERVAL = 4
+"""Stations of the path at which limits hold, at least and for every interval."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search begins, about."""
 
@@ -55,7 +63,6 @@ def _report(
 def time_guess(
     program: Program,
     joint_paths: Sequence[np.ndarray],
-    rates: Sequence[tuple[float, float]],
     tolerance: float,
     points: int,
 ) -> SolvedProgram | None:
@@ -67,8 +74,6 @@ def time_guess(
         Over any knots.
     joint_paths : sequence of (S, c) ndarray
         Of every phase, s and other curves.
-    rates : sequence of tuple of float
-        ds/dt at both ends of each, 1/s.
     tolerance, points
         As of `retime`.
 
@@ -81,9 +86,9 @@ def time_guess(
     if not is_timing_all(program):
         return None
     found = []
-    for phase, curves, ends in zip(program.phases, joint_paths, rates, strict=True):
+    for phase, curves in zip(program.phases, joint_paths, strict=True):
         try:
-            own = PhaseTiming.along(phase, curves, ends)
+            own = PhaseTiming.through(phase, curves)
         except UnreachableError:
             return None
         followed = follow(phase, own, tolerance, points)
@@ -96,7 +101,6 @@ def time_guess(
 def begin_with_timing(
     program: Program,
     joint_paths: Sequence[np.ndarray],
-    rates: Sequence[tuple[float, float]],
     points: int,
 ) -> tuple[Program, np.ndarray] | None:
     """Lay splines along the fastest timing of joint paths, over few knots, close together where it needs them.
@@ -105,7 +109,7 @@ def begin_with_timing(
     ----------
     program : Program
         Over any knots.
-    joint_paths, rates, points
+    joint_paths, points
         As of `time_guess`.
 
     Returns
@@ -116,9 +120,9 @@ def begin_with_timing(
     """
     phases = []
     parts = []
-    for phase, curves, ends in zip(program.phases, joint_paths, rates, strict=True):
+    for phase, curves in zip(program.phases, joint_paths, strict=True):
         try:
-            own = PhaseTiming.along(phase, curves, ends)
+            own = PhaseTiming.through(phase, curves)
             begun = begin(phase, own, _ROUGHLY, _FIRST_INTERVALS, points)
         except UnreachableError:
             return None
@@ -142,37 +146,102 @@ def is_timing_all(program: Program) -> bool:
     return not (is_linked or is_periodic or has_laws or left_out)
 
 
-def retime(
-    solved: SolvedProgram, tolerance: float, points: int, worth: float
-) -> SolvedProgram | None:
-    """Give a solved program the fastest timing of its own joint path, over the knots that this needs.
+def stands_still(timings: Sequence[PhaseTiming | None]) -> bool:
+    """Tell whether the tool stands on its path while the joints move: then these are no curves over the path."""
+    for own in timings:
+        if own is not None and own.timing is not None:
+            path = own.timing.path
+            length = np.linspace(0.0, path.p[-1], _LOOKS + 1)
+            steps = np.diff(np.interp(length, path.p, path.s))
+            if steps[1:-1].min() < _STANDS * np.median(steps):
+                return True
+    return False
+
+
+def improve_joint_paths(
+    solved: SolvedProgram,
+    timings: Sequence[PhaseTiming | None],
+    solve: SolverSession,
+    tolerance: float,
+) -> tuple[list[PhaseTiming | None], tuple[SolverReport, ...]]:
+    """Find better joint paths than those of a solved program, over the path; see `PathProgram`.
 
     Parameters
     ----------
     solved : SolvedProgram
-        Without free knots.
+        Of whose program `is_timing_all` holds. It may exceed limits between its collocation points.
+    timings : sequence of PhaseTiming or None
+        Of its phases.
+    solve : SolverSession
+    tolerance : float
+        Splines get more intervals as long as that gains half of this part of the time.
+
+    Returns
+    -------
+    timings : list of PhaseTiming or None
+        Of the best joint paths.
+    reports : tuple of SolverReport
+    """
+    program = solved.program
+    best = [*timings]
+    reports: list[SolverReport] = []
+    for intervals in _PATH_INTERVALS:
+        least = _total(best)
+        if solve.deadline.passed or not np.isfinite(least):
+            break
+        pairs = zip(program.phases, best, strict=True)
+        stations = max(_LEAST_STATIONS, _STATIONS_AN_INTERVAL * intervals)
+        over_path = PathProgram(
+            [PathPhase(phase, own, intervals, stations) for phase, own in pairs if own],
+            program.links,
+        )
+        report = solve(over_path, over_path.start)
+        reports.append(report)
+        try:
+            found = over_path.timings(report.x)
+        except UnreachableError:
+            break
+        time_found = _total(found)
+        if time_found < least:
+            best = [*found]
+        is_settled = time_found > least * (1.0 - 0.5 * tolerance)
+        if is_settled and intervals > _PATH_INTERVALS[0]:
+            break
+    return best, tuple(reports)
+
+
+def _total(timings: Sequence[PhaseTiming | None]) -> float:
+    """Time of all phases, s; infinite where one has no timing."""
+    fastest = [None if own is None else own.timing for own in timings]
+    return sum(np.inf if own is None else own.t_end for own in fastest)
+
+
+def retime(
+    solved: SolvedProgram,
+    timings: Sequence[PhaseTiming | None],
+    tolerance: float,
+    points: int,
+) -> SolvedProgram:
+    """Give a solved program the fastest timing of joint paths, over the knots that this needs.
+
+    Parameters
+    ----------
+    solved : SolvedProgram
+        Of whose program `is_timing_all` holds.
+    timings : sequence of PhaseTiming or None
+        Of joint paths for its phases.
     tolerance : float
         Part of the time by which splines should not be slower.
     points : int
         Collocation points an interval.
-    worth : float
-        Part of the time by which the timing has to be faster.
 
     Returns
     -------
-    SolvedProgram or None
-        None if that is about as fast. None where timing is not all: with limits on jerk, torque rate or means, in
-        periodic motions, and where a phase goes on in motion from another one.
+    SolvedProgram
+        A phase whose joint path has no timing stays as it is.
     """
     began = time.perf_counter()
     program = solved.program
-    if not is_timing_all(program):
-        return None
-    timings = time_phases(solved)
-    least = least_time_of(program, solved.x, timings)
-    # A motion that is faster exceeds limits between its collocation points.
-    if least * (1.0 - TOO_FAST) < solved.t_end < least * (1.0 + worth):
-        return None
     found = []
     for (phase, x), own in zip(program.split(solved.x), timings, strict=True):
         followed = None if own is None else follow(phase, own, tolerance, points)

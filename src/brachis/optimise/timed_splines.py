@@ -21,10 +21,13 @@ _FIRST_INTERVALS = 8
 """Intervals that are halved, no fewer."""
 _PLACES_AN_INTERVAL = 250
 """Places for each of these."""
-SHORTEST = 4e-5
+SHORTEST = 2e-4
 """Shortest interval that is halved, s: accelerations are rounded over shorter ones."""
 _LONGER = 2.5
 """Times the length of an interval that those beside it may have."""
+_SWITCH = 0.2
+"""Part of accelerations by which they change where the motion switches from one limit to another."""
+_FEW = 8
 _POINT = 1e-12
 """Half a chord below which it is a point, as a part of the time."""
 _ANCHORED = 100
@@ -74,7 +77,11 @@ def breaks_for(
         acceleration = np.pad(np.pad(acceleration, 1, mode="edge"), 1)
         rate = np.pad(rate, 2)
         t = np.concatenate([[0.0, tolerances.TIME], t, [1.0 - tolerances.TIME, 1.0]])
+    sizes = np.abs(values).max(axis=1)
     jumps = np.abs(np.diff(values, axis=0)).max(axis=1)
+    # A smaller step is one of the limits themselves, which a ramp exceeds.
+    is_switch = jumps > _SWITCH * np.maximum(sizes[1:], sizes[:-1])
+    jumps = np.where(is_switch, jumps, 0.0)
     ramps = timing.t_end / 24.0 * np.abs(np.diff(acceleration))
 
     def loss(low: float, high: float) -> float:
@@ -91,7 +98,7 @@ def breaks_for(
         slowest = rate[first : last + 1].min()
         late = ramps[first:last].max() * length
         part_lost = late / slowest if late < slowest else 1.0
-        smooth = off - jumps[first:last].max()
+        smooth = off - jumps[first:last].max() if len(at) >= _FEW else 0.0
         return float(length * max(smooth, off * part_lost))
 
     pieces = max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL)

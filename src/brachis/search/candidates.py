@@ -51,10 +51,11 @@ from brachis.optimise.improve import (
     improve,
 )
 from brachis.optimise.mesh import adapt_mesh, coarsest
+from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import SOLVER as TIMING
-from brachis.optimise.retiming import TOO_FAST
+from brachis.optimise.retiming import improve_joint_paths, stands_still
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
@@ -64,8 +65,8 @@ from brachis.problem.problem import Problem
 from brachis.search.phase_plane import initial_breaks, initial_guess
 from brachis.search.timed import (
     begin_with_timing,
-    is_large,
-    retime,
+    is_timed,
+    plan_timing,
     time_alone,
     verify_timed,
 )
@@ -184,26 +185,27 @@ def finish_candidate(
     if candidate.keeps_knots and _is_free_chart(start) and not deadline.passed:
         solved = best_of_joints(start.problem, solved, session)
         target = solved.program
+    if is_timed(start, program) and solved.usable:
+        named = dataclasses.replace(candidate, optimum=solved)
+        timed = solved
+        timings = time_phases(program, solved.x)
+        if stands_still(timings):
+            timed = adapt_mesh(solved, session, task.spline, options, target=target)
+            timings = time_phases(timed.program, timed.x)
+            named = dataclasses.replace(named, optimum=timed)
+        else:
+            timings, reports = improve_joint_paths(
+                timed, timings, session, task.spline.tolerance
+            )
+            timed = dataclasses.replace(timed, reports=(*reports, *timed.reports))
+        done = plan_timing(named, timed, timings, options)
+        if done is not None:
+            return done
     adapted = adapt_mesh(solved, session, task.spline, options, target=target)
     options = dataclasses.replace(options, deadline=deadline)
-    session = dataclasses.replace(session, deadline=deadline)
-    is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
-    retimed = retime(candidate, adapted, options) if is_open else None
-    if retimed is not None:
-        change = retimed.t_end / adapted.t_end - 1.0
-        if is_large(adapted.program) or not 0.0 <= change <= TOO_FAST:
-            return retimed
     named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
-    refined = refine_and_verify(
-        named, adapted.program, adapted.reports, session, options
-    )
-    found = [refined]
-    if retimed is not None:
-        found.append(retimed)
-    if is_open and refined.verified and refined.refined is not None:
-        again = retime(candidate, refined.refined, options)
-        found += [] if again is None else [again]
-    return min(found, key=lambda each: (not each.verified, each.t_end))
+    session = dataclasses.replace(session, deadline=deadline)
+    return refine_and_verify(named, adapted.program, adapted.reports, session, options)
 
 
 def _is_free_chart(start: InitialGuess) -> bool:

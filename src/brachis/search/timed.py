@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,21 +11,18 @@ from brachis.optimise.backends import solvers_for
 from brachis.optimise.candidate import (
     Candidate,
     InitialGuess,
-    refine_and_verify,
     verify,
 )
 from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.problem.problem import Problem
 
-_LARGE = 2500
-"""Rows above which a motion is retimed, and not refined: with so many, solves with more points take a minute."""
-
-
-def is_large(program: Program) -> bool:
-    """Tell whether a program is too large to be refined."""
-    return len(program.lower) > _LARGE
+_MORE = 1.2
+"""Times the violation by which a timing takes longer."""
+_LONGEST = 0.01
+"""Part of the time by which it may."""
 
 
 def solvers_of(problem: Problem) -> list[str]:
@@ -45,7 +42,6 @@ def time_alone(start: InitialGuess, program: Program) -> SolvedProgram | None:
     return retiming.time_guess(
         program,
         start.legs,
-        start.problem.leg_rates,
         spline.tolerance,
         spline.points_per_interval,
     )
@@ -60,39 +56,52 @@ def begin_with_timing(
     is_open = spline.intervals == "auto" and spline.knots != "free"
     if not is_open or problem.task.boundary.periodic or any(problem.time_laws):
         return None
-    return retiming.begin_with_timing(
-        program, start.legs, problem.leg_rates, spline.points_per_interval
-    )
+    return retiming.begin_with_timing(program, start.legs, spline.points_per_interval)
 
 
-def retime(
-    candidate: Candidate, solved: SolvedProgram, options: RefinementOptions
+def is_timed(start: InitialGuess, program: Program) -> bool:
+    """Tell whether motions get the timing of the phase plane: where it knows all limits, and the knots are open."""
+    spline = start.problem.task.spline
+    is_open = spline.intervals == "auto" and spline.knots != "free"
+    return is_open and retiming.is_timing_all(program)
+
+
+def plan_timing(
+    candidate: Candidate,
+    solved: SolvedProgram,
+    timings: Sequence[PhaseTiming | None],
+    options: RefinementOptions,
 ) -> Candidate | None:
-    """Give a motion the fastest timing of its joint path; None if it is as fast and easily refined, or not verified."""
+    """Give joint paths, one for each phase, their fastest timing; None if the motion is not verified."""
     assert candidate.start is not None
     spline = candidate.start.problem.task.spline
-    if not solved.usable:
-        return None
-    worth = spline.tolerance
-    if is_large(solved.program):
-        worth = -np.inf
     retimed = retiming.retime(
-        solved, spline.tolerance, spline.points_per_interval, worth
+        solved, timings, spline.tolerance, spline.points_per_interval
     )
-    if retimed is None:
-        return None
-    named = dataclasses.replace(candidate, optimum=solved)
-    done = verify_timed(named, retimed, options)
+    done = verify_timed(candidate, retimed, options)
     return done if done.verified else None
 
 
 def verify_timed(
     candidate: Candidate, timed: SolvedProgram, options: RefinementOptions
 ) -> Candidate:
-    """Verify a timing as it is; where that fails, lengthen it until the limits hold between the places looked at."""
+    """Verify a timing; where a limit is exceeded by a little between the places looked at, it takes a little longer."""
     reports = timed.reports
-    alone = SolvedProgram(timed.program, reports[-1:], violation=timed.report.violation)
-    done = verify(candidate, reports[:-1], alone)
-    if done.verified:
-        return done
-    return refine_and_verify(candidate, timed.program, reports, retiming.keep, options)
+    factor = 1.0
+    while True:
+        own = SolvedProgram(
+            timed.program,
+            reports[-1:],
+            violation=timed.report.violation,
+            time_scaled=factor,
+        )
+        done = verify(candidate, reports[:-1], own)
+        found = done.verification
+        if done.verified or found is None:
+            return done
+        failed = [check for check in found.checks if not check.passed]
+        if not all(check.of_limit for check in failed):
+            return done
+        factor *= 1.0 + _MORE * max(found.worst_ratio - 1.0, options.tolerance)
+        if factor > 1.0 + _LONGEST:
+            return done

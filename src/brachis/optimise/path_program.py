@@ -1,0 +1,322 @@
+"""The NLP over the path: how fast stations of the path are passed, and redundant curves as splines of s.
+
+Places of the path do not move, as they do over time: corners that are passed within milliseconds have their stations.
+With X = sdot^2 linear in s between the stations, u = d2s/dt2 is constant there, as in the phase plane, and half-way
+
+    ydot = y' sqrt(X),        yddot = y'' X + y' u.
+
+What it finds is a joint path: its timing is computed anew, on a finer grid.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from brachis.common import tolerances
+from brachis.common.arrays import spread
+from brachis.errors import UnreachableError
+from brachis.optimise.bspline import basis_matrix, clamped_knots, local_basis
+from brachis.optimise.evaluator import Evaluation
+from brachis.optimise.phase import Phase
+from brachis.optimise.phase_timing import PhaseTiming
+from brachis.optimise.program import Link
+from brachis.timing import Course, TimedCourse
+
+_DEGREE = 3
+_SLOWEST = 1e-3
+"""Least sdot^2 between the ends, as a part of what it is at the beginning."""
+_STOPPED = 1e-8
+"""Part of the median sdot^2 below which a station is passed at rest."""
+_SHORTEST = tolerances.PATH
+_SAMPLES = 20
+"""Places in every interval of the splines at which they begin as the curves are."""
+_STATIONS_A_PIECE = 4
+"""Stations in every piece of a path, at most as far apart as others."""
+
+
+class PathPhase:
+    """A phase of the NLP over the path.
+
+    Parameters
+    ----------
+    phase : Phase
+        Along a path, with limits up to the second order.
+    own : PhaseTiming
+        From which the solve begins.
+    intervals, stations : int
+        Of the splines, and between the stations; both are as long in time.
+
+    Attributes
+    ----------
+    start, x_lower, x_upper : (v,) ndarray
+        Variables: X at the stations, in units of what it is at the beginning, and the control points.
+    lower, upper : (c,) ndarray
+    jacobian_rows, jacobian_columns : (nnz,) int ndarray
+    """
+
+    def __init__(
+        self, phase: Phase, own: PhaseTiming, intervals: int, stations: int
+    ) -> None:
+        timing = own.timing
+        assert timing is not None and phase.joint_map.path is not None
+        self.phase = phase
+        t = np.linspace(0.0, timing.t_end, _SAMPLES * intervals + 1)
+        curves = own.course.curves(timing, t)[0]
+        ascends = np.append(True, np.diff(curves[:, 0]) > _SHORTEST)
+        t, curves = t[ascends], curves[ascends]
+        self._begin = curves[0, 0]
+        self._way = curves[-1, 0] - self._begin
+        evenly = np.linspace(0.0, timing.t_end, stations + 1)
+        s = np.interp(evenly, t, curves[:, 0])
+        self._s = _with_pieces(s, phase.joint_map.path.breaks)
+        self._steps = np.diff(self._s)
+        middles = 0.5 * (self._s[1:] + self._s[:-1])
+        self._middles = middles
+        times = np.interp(self._s, curves[:, 0], t)
+        squares = own.course.curves(timing, times)[1][:, 0] ** 2
+        self._units = np.maximum(squares, _STOPPED * np.median(squares))
+        evenly = np.linspace(0.0, timing.t_end, intervals + 1)
+        breaks = self._part(np.interp(evenly, t, curves[:, 0]))
+        self._knots = clamped_knots(_DEGREE, breaks)
+        first, basis = local_basis(self._knots, _DEGREE, self._part(middles))
+        self._basis = basis / self._way ** np.arange(4)[:, None, None]
+        columns = first[:, None] + np.arange(_DEGREE + 1)
+        self._columns = columns
+        self._count = intervals + _DEGREE
+        matrix = basis_matrix(self._knots, _DEGREE, self._part(curves[:, 0]))
+        points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
+        self._curves_count = len(points)
+        self.ends = float(self._begin), float(self._begin + self._way)
+        self._set_variables(squares, points)
+        self._begin_within_limits()
+        limits = phase.limits
+        lower = np.concatenate([limit.lower for limit in limits])
+        upper = np.concatenate([limit.upper for limit in limits])
+        self.lower = np.tile(lower, len(middles))
+        self.upper = np.tile(upper, len(middles))
+        numbers = np.arange(len(middles))[:, None]
+        of_curves = [self.place_of(j, 0) + columns for j in range(self._curves_count)]
+        every = np.hstack([numbers, numbers + 1, *of_curves])
+        shape = (len(middles), len(lower), every.shape[1])
+        self.jacobian_columns = np.broadcast_to(every[:, None], shape).ravel()
+        self.jacobian_rows = np.repeat(np.arange(len(self.lower)), every.shape[1])
+        self._last: tuple[bytes, Evaluation] | None = None
+
+    def _set_variables(self, squares: np.ndarray, points: np.ndarray) -> None:
+        """Set the variables at the beginning, and their bounds: X at the ends stays, and values that are given."""
+        count = len(self._s)
+        self.start = np.concatenate([squares / self._units, points.ravel()])
+        self.x_lower = np.full(len(self.start), -np.inf)
+        self.x_upper = np.full(len(self.start), np.inf)
+        self.x_lower[:count] = _SLOWEST
+        given = [(0, self.start[0]), (count - 1, self.start[count - 1])]
+        boundary = self.phase.boundary
+        for conditions, end in (boundary.start, 0), (boundary.end, -1):
+            for j, condition in enumerate(conditions[1:]):
+                if np.isfinite(condition.value):
+                    given.append((self.place_of(j, end), condition.value))
+        for place, value in given:
+            self.start[place] = value
+            self.x_lower[place] = value
+            self.x_upper[place] = value
+
+    def _begin_within_limits(self) -> None:
+        """Begin with the fastest timing of the splines over these stations, if there is one."""
+        phase = self.phase
+        squares, _ = self._split(self.start)
+        course = self.course(self.start, self._s)
+        try:
+            timed = TimedCourse(course, phase.joint_map, phase.limits)
+        except UnreachableError:
+            return
+        first, last = timed.speeds[[0, -1]] * np.sqrt(squares[[0, -1]])
+        timing = timed.solve((float(first), float(last)))
+        if timing is None:
+            return
+        y, rates = timed.curves(timing, timing.times)
+        found = np.interp(self._s, y[:, 0], rates[:, 0] ** 2) / self._units
+        inner = slice(1, len(self._s) - 1)
+        self.start[inner] = np.maximum(found[inner], _SLOWEST)
+
+    def place_of(self, curve: int, end: int) -> int:
+        """Return the number of the variable that is a redundant curve's value at the start (0) or end (-1)."""
+        return len(self._s) + curve * self._count + end % self._count
+
+    def _part(self, s: np.ndarray) -> np.ndarray:
+        """Path coordinates as parts of the way, from 0 to 1."""
+        return np.asarray(((s - self._begin) / self._way).clip(0.0, 1.0))
+
+    def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """X at the stations, (P,), and control points, (r, M + 3)."""
+        count = len(self._s)
+        points = x[count:].reshape(self._curves_count, self._count)
+        return x[:count] * self._units, points
+
+    def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Y' and y'', (P - 1, c), and X and u, (P - 1, 1), half-way between the stations; y in front."""
+        squares, points = self._split(x)
+        near = points[:, self._columns]
+        y, y_ds, y_dds = (
+            np.einsum("mk,jmk->mj", basis, near) for basis in self._basis[:3]
+        )
+        mean = 0.5 * (squares[1:] + squares[:-1])
+        u = np.diff(squares) / (2.0 * self._steps)
+        return (
+            np.column_stack([self._middles, y]),
+            np.column_stack([np.ones(len(y)), y_ds]),
+            np.column_stack([np.zeros(len(y)), y_dds]),
+            mean[:, None],
+            u[:, None],
+        )
+
+    def evaluate(self, x: np.ndarray) -> Evaluation:
+        """Joint motion and limits half-way between the stations; raises UnreachableError where there is none."""
+        key = x.tobytes()
+        if self._last is None or self._last[0] != key:
+            y, y_ds, y_dds, mean, u = self._motion(x)
+            orders = (y, y_ds * np.sqrt(mean), y_dds * mean + y_ds * u, 0.0 * y)
+            t = self._middles - self._begin
+            self._last = (key, self.phase.evaluator.evaluate(*orders, t=t))
+        return self._last[1]
+
+    def time(self, x: np.ndarray) -> float:
+        """Time, s."""
+        rates = np.sqrt(self._split(x)[0].clip(0.0))
+        return float((2.0 * self._steps / (rates[1:] + rates[:-1])).sum())
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the time, (v,); zero by what is given at the ends."""
+        rates = np.sqrt(self._split(x)[0].clip(1e-300))
+        by_sum = -2.0 * self._steps / (rates[1:] + rates[:-1]) ** 2
+        by_rate = np.pad(by_sum, (1, 0)) + np.pad(by_sum, (0, 1))
+        by_square = by_rate / (2.0 * rates) * self._units
+        by_square[[0, -1]] = 0.0
+        return np.pad(by_square, (0, len(x) - len(by_square)))
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of all limits, (c,)."""
+        return self.evaluate(x).values.ravel()
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the Jacobian on its pattern, (nnz,)."""
+        _, y_ds, y_dds, mean, u = self._motion(x)
+        by_y, by_rate, by_second = self.evaluate(x).slopes[:3]
+        of_mean = np.einsum("mcj,mj->mc", by_rate, y_ds / (2.0 * np.sqrt(mean)))
+        of_mean += np.einsum("mcj,mj->mc", by_second, y_dds)
+        of_u = np.einsum("mcj,mj->mc", by_second, y_ds)
+        of_step = of_u / (2.0 * self._steps[:, None])
+        parts = [
+            ((0.5 * of_mean - of_step) * self._units[:-1, None])[:, :, None],
+            ((0.5 * of_mean + of_step) * self._units[1:, None])[:, :, None],
+        ]
+        value, first, second, _ = self._basis
+        of_rate = first * np.sqrt(mean)
+        of_second = second * mean + first * u
+        for j in range(1, self._curves_count + 1):
+            own = by_y[:, :, j, None] * value[:, None]
+            own = own + by_rate[:, :, j, None] * of_rate[:, None]
+            parts.append(own + by_second[:, :, j, None] * of_second[:, None])
+        return np.concatenate(parts, axis=2).ravel()
+
+    def course(self, x: np.ndarray, s: np.ndarray) -> Course:
+        """Take the curves at path coordinates s, (S,)."""
+        first, basis = local_basis(self._knots, _DEGREE, self._part(s))
+        near = self._split(x)[1][:, first[:, None] + np.arange(_DEGREE + 1)]
+        basis = basis / self._way ** np.arange(4)[:, None, None]
+        y, y_ds, y_dds = (np.einsum("mk,jmk->mj", own, near) for own in basis[:3])
+        return Course(
+            s,
+            np.column_stack([s, y]),
+            np.column_stack([np.ones(len(s)), y_ds]),
+            np.column_stack([np.zeros(len(s)), y_dds]),
+        )
+
+
+def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
+    """Add stations, (P,), in the pieces of a path between them, such as rounded corners."""
+    breaks = np.concatenate([s[:1], breaks[(breaks > s[0]) & (breaks < s[-1])], s[-1:]])
+    inner = spread(breaks, _STATIONS_A_PIECE)
+    is_short = np.repeat(np.diff(breaks), _STATIONS_A_PIECE) < 4.0 * np.diff(s).max()
+    added = np.union1d(s, inner[:-1][is_short])
+    return added[np.append(True, np.diff(added) > _SHORTEST)]
+
+
+class PathProgram:
+    """The NLP over the path of all phases; a `Problem` for the solvers.
+
+    Parameters
+    ----------
+    phases : sequence of PathPhase
+    links : sequence of Link
+        Of values alone: phases meet at rest.
+    """
+
+    def __init__(self, phases: Sequence[PathPhase], links: Sequence[Link]) -> None:
+        self.phases = tuple(phases)
+        sizes = [len(phase.start) for phase in self.phases]
+        first = np.cumsum([0, *sizes]).tolist()
+        self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
+        self.start = np.concatenate([phase.start for phase in self.phases])
+        self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
+        self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
+        pairs = [
+            (
+                first[link.before] + self.phases[link.before].place_of(curve - 1, -1),
+                first[link.after] + self.phases[link.after].place_of(curve - 1, 0),
+            )
+            for link in links
+            for curve in link.curves
+            if curve > 0
+        ]
+        self._pairs = np.reshape(np.array(pairs, dtype=int), (-1, 2))
+        joined = np.zeros(len(self._pairs))
+        self.lower = np.concatenate([*(own.lower for own in self.phases), joined])
+        self.upper = np.concatenate([*(own.upper for own in self.phases), joined])
+        heights = np.cumsum([0, *(len(own.lower) for own in self.phases)]).tolist()
+        rows = [
+            own.jacobian_rows + a for own, a in zip(self.phases, heights, strict=False)
+        ]
+        columns = [
+            own.jacobian_columns + a for own, a in zip(self.phases, first, strict=False)
+        ]
+        numbers = heights[-1] + np.arange(len(self._pairs))
+        self.jacobian_rows = np.concatenate([*rows, np.repeat(numbers, 2)])
+        self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
+
+    def _split(self, x: np.ndarray) -> list[tuple[PathPhase, np.ndarray]]:
+        return [
+            (own, x[part]) for own, part in zip(self.phases, self._parts, strict=True)
+        ]
+
+    def objective(self, x: np.ndarray) -> float:
+        """Time of all phases, s."""
+        return sum(phase.time(part) for phase, part in self._split(x))
+
+    end_time = objective
+    free_time = objective
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the time, (v,)."""
+        return np.concatenate([own.gradient(part) for own, part in self._split(x)])
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of the rows, (c,); raises UnreachableError where there are none."""
+        before, after = self._pairs.T
+        rows = [own.rows(part) for own, part in self._split(x)]
+        return np.concatenate([*rows, x[before] - x[after]])
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the Jacobian on its pattern, (nnz,); raises as `rows` does."""
+        entries = [own.jacobian(part) for own, part in self._split(x)]
+        return np.concatenate([*entries, np.tile([1.0, -1.0], len(self._pairs))])
+
+    def timings(self, x: np.ndarray) -> list[PhaseTiming]:
+        """Time the joint paths of all phases anew; raises UnreachableError where one leaves its map."""
+        return [
+            PhaseTiming.along(own.phase, partial(own.course, part), own.ends)
+            for own, part in self._split(x)
+        ]
