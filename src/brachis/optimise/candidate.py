@@ -145,8 +145,6 @@ class Candidate(Summary):
         Of all solves: with ever smaller branch margins, on ever finer meshes, then of the refinement rounds.
     coarse : float
         End time at the first collocation points, s; infinite without a motion.
-    optimum : SolvedProgram or None
-        What a solver found before its joint path was timed again: the multipliers are its.
     refined : SolvedProgram or None
         The last program, its answer and its multipliers; None while it is not finished.
     trajectory : Trajectory or None
@@ -176,7 +174,6 @@ class Candidate(Summary):
     reports: tuple[SolverReport, ...] = ()
     coarse: float = np.inf
     refined: SolvedProgram | None = None
-    optimum: SolvedProgram | None = None
     trajectory: Trajectory | None = None
     verification: Verification | None = None
     not_completed: str = ""
@@ -455,10 +452,6 @@ def verify(
     before : tuple of SolverReport
         Of earlier solves.
     refined : SolvedProgram
-
-    Returns
-    -------
-    Candidate
     """
     start = candidate.start
     assert start is not None

@@ -26,7 +26,7 @@ from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
 
-_FINENESS = (0.01, 0.001, 0.0001, 0.1, 1.0)
+_FINENESS = (0.3, 0.01, 0.001, 0.0001, 3.0)
 """What intervals may lose together, in tolerances: less where that was slow, more where there were too many."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,10 +24,8 @@ _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
 _PATH_INTERVALS = (16, 32, 64)
 """Intervals of the redundant curves over the path, one after the other."""
-_LOOKS = 400
-"""Even steps of the joint path at which the tool is looked for."""
-_STANDS = 1e-2
-"""Part of its usual step which the tool makes in one of these where it stands."""
+_CREDIBLE = 0.01
+"""Part of the time by which an answer over the path may differ from its timing."""
 _LEAST_STATIONS = 120
 _STATIONS_AN_INTERVAL = 4
 """Stations of the path at which limits hold, at least and for every interval."""
@@ -146,16 +145,23 @@ def is_timing_all(program: Program) -> bool:
     return not (is_linked or is_periodic or has_laws or left_out)
 
 
-def stands_still(timings: Sequence[PhaseTiming | None]) -> bool:
-    """Tell whether the tool stands on its path while the joints move: then these are no curves over the path."""
-    for own in timings:
-        if own is not None and own.timing is not None:
-            path = own.timing.path
-            length = np.linspace(0.0, path.p[-1], _LOOKS + 1)
-            steps = np.diff(np.interp(length, path.p, path.s))
-            if steps[1:-1].min() < _STANDS * np.median(steps):
-                return True
-    return False
+@dataclass(frozen=True)
+class BetterPaths:
+    """What came of the search over the path.
+
+    Attributes
+    ----------
+    timings : tuple of PhaseTiming or None
+        Of the best joint paths, one for each phase.
+    reports : tuple of SolverReport
+    is_credible : bool
+        Whether the answers are about as fast as their timings. Where the tool stands on its path while the joints move,
+        curves over the path are none.
+    """
+
+    timings: tuple[PhaseTiming | None, ...]
+    reports: tuple[SolverReport, ...]
+    is_credible: bool
 
 
 def improve_joint_paths(
@@ -163,7 +169,7 @@ def improve_joint_paths(
     timings: Sequence[PhaseTiming | None],
     solve: SolverSession,
     tolerance: float,
-) -> tuple[list[PhaseTiming | None], tuple[SolverReport, ...]]:
+) -> BetterPaths:
     """Find better joint paths than those of a solved program, over the path; see `PathProgram`.
 
     Parameters
@@ -178,15 +184,14 @@ def improve_joint_paths(
 
     Returns
     -------
-    timings : list of PhaseTiming or None
-        Of the best joint paths.
-    reports : tuple of SolverReport
+    BetterPaths
     """
     program = solved.program
     best = [*timings]
     reports: list[SolverReport] = []
+    is_credible = True
     for intervals in _PATH_INTERVALS:
-        least = _total(best)
+        least = least_time(best)
         if solve.deadline.passed or not np.isfinite(least):
             break
         pairs = zip(program.phases, best, strict=True)
@@ -200,18 +205,21 @@ def improve_joint_paths(
         try:
             found = over_path.timings(report.x)
         except UnreachableError:
+            is_credible = False
             break
-        time_found = _total(found)
+        time_found = least_time(found)
+        missed = abs(report.objective / time_found - 1.0)
+        is_credible = is_credible and missed < _CREDIBLE
         if time_found < least:
             best = [*found]
         is_settled = time_found > least * (1.0 - 0.5 * tolerance)
         if is_settled and intervals > _PATH_INTERVALS[0]:
             break
-    return best, tuple(reports)
+    return BetterPaths(tuple(best), tuple(reports), is_credible)
 
 
-def _total(timings: Sequence[PhaseTiming | None]) -> float:
-    """Time of all phases, s; infinite where one has no timing."""
+def least_time(timings: Sequence[PhaseTiming | None]) -> float:
+    """Return the time of all phases, s; infinite where one has no timing."""
     fastest = [None if own is None else own.timing for own in timings]
     return sum(np.inf if own is None else own.t_end for own in fastest)
 

@@ -55,7 +55,10 @@ from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import SOLVER as TIMING
-from brachis.optimise.retiming import improve_joint_paths, stands_still
+from brachis.optimise.retiming import (
+    improve_joint_paths,
+    least_time,
+)
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
@@ -185,23 +188,24 @@ def finish_candidate(
     if candidate.keeps_knots and _is_free_chart(start) and not deadline.passed:
         solved = best_of_joints(start.problem, solved, session)
         target = solved.program
+    adapted: SolvedProgram | None = None
     if is_timed(start, program) and solved.usable:
-        named = dataclasses.replace(candidate, optimum=solved)
-        timed = solved
         timings = time_phases(program, solved.x)
-        if stands_still(timings):
-            timed = adapt_mesh(solved, session, task.spline, options, target=target)
-            timings = time_phases(timed.program, timed.x)
-            named = dataclasses.replace(named, optimum=timed)
-        else:
-            timings, reports = improve_joint_paths(
-                timed, timings, session, task.spline.tolerance
-            )
-            timed = dataclasses.replace(timed, reports=(*reports, *timed.reports))
-        done = plan_timing(named, timed, timings, options)
+        tolerance = task.spline.tolerance
+        better = improve_joint_paths(solved, timings, session, tolerance)
+        best = better.timings
+        timed = dataclasses.replace(solved, reports=(*better.reports, *solved.reports))
+        if not better.is_credible:
+            adapted = adapt_mesh(solved, session, task.spline, options, target=target)
+            timings = time_phases(adapted.program, adapted.x)
+            if least_time(timings) < least_time(best):
+                best = tuple(timings)
+                timed = adapted
+        done = plan_timing(candidate, timed, best, options)
         if done is not None:
             return done
-    adapted = adapt_mesh(solved, session, task.spline, options, target=target)
+    if adapted is None:
+        adapted = adapt_mesh(solved, session, task.spline, options, target=target)
     options = dataclasses.replace(options, deadline=deadline)
     named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
     session = dataclasses.replace(session, deadline=deadline)

@@ -13,11 +13,12 @@ from brachis.apps.bottleneck.check import (
     SensitivityCheck,
     check_sensitivities,
 )
+from brachis.apps.bottleneck.optimum import solve_again
 from brachis.apps.bottleneck.reference import (
     Reference,
     find_reference,
 )
-from brachis.apps.bottleneck.report import BottleneckReport, report, solve_again
+from brachis.apps.bottleneck.report import BottleneckReport, report
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
     THRESHOLD,

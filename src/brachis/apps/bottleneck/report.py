@@ -1,11 +1,4 @@
-"""The bottleneck report: what limits cost, when they are active, and the reference.
-
-A saved motion has neither collocation points nor multipliers, so its problem is solved
-again. Task, URDF, redundant joints and branch (or the chart), knots and control points
-are saved. The problem is built over these knots, with the branch margin that the motion
-keeps, solved from the saved control points and refined as in a plan. The start is an
-optimum already, so this takes a few iterations and ends at the same one.
-"""
+"""The bottleneck report: what limits cost, when they are active, and the reference."""
 
 from __future__ import annotations
 
@@ -15,10 +8,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from threadpoolctl import ThreadpoolController
-
 from brachis.apps.bottleneck.check import SensitivityCheck, check_sensitivities
+from brachis.apps.bottleneck.optimum import solve_again
 from brachis.apps.bottleneck.reference import (
     MEANING,
     Reference,
@@ -40,146 +31,18 @@ from brachis.apps.bottleneck.sensitivities import (
     Sensitivity,
     sensitivities,
 )
-from brachis.common.arrays import spread
-from brachis.common.deadline import Deadline
 from brachis.common.summary import LINES
 from brachis.errors import (
     InputError,
-    PlanningError,
-    UnreachableError,
-)
-from brachis.kinematics import (
-    ChartRows,
-    JointMap,
-    JointSpaceMap,
-    chart_around,
 )
 from brachis.limits import Role
-from brachis.optimise.backends import solvers_for
-from brachis.optimise.grid import FixedGrid
-from brachis.optimise.improve import SolvedProgram, SolverSession
-from brachis.optimise.motion import Motion
-from brachis.optimise.program import Program
-from brachis.optimise.refine import RefinementOptions, refine
-from brachis.optimise.retiming import is_timing_all, keep
-from brachis.optimise.transcription import maps_by_leg, program_over
-from brachis.problem.problem import Problem, decompositions_of
-from brachis.robot import ROLL_JOINT
+from brachis.optimise.retiming import SOLVER
 from brachis.robot.joints import shown_unit
-from brachis.robot.task_map import JOINTS
-from brachis.search.candidates import MARGINS
 from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory, phase_rows
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
-
-
-def solve_again(trajectory: Trajectory) -> SolvedProgram:
-    """Solve the problem of a saved motion from where it ended; a timing alone stays as it is.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        As `brachis.plan` made it, or loaded.
-
-    Returns
-    -------
-    SolvedProgram
-        As ``result.candidate.refined`` of the plan.
-
-    Raises
-    ------
-    InputError
-        The closed form or the branch is not known here; see `brachis.plan`.
-    PlanningError
-        The motion is not an optimum of its problem: no solver of the task came back to it.
-    """
-    task = trajectory.task
-    deadline = Deadline.after(task.search.time_limit)
-    settings = task.refinement
-    options = RefinementOptions(
-        settings.tolerance, settings.density, settings.max_rounds, deadline
-    )
-    ends = []
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
-        program, x = _problem(trajectory)
-        first = program.phases[0].joint_map
-        is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
-        if is_open and not first.r and is_timing_all(program):
-            return SolvedProgram(program, (keep(program, x),))
-        has_law = any(phase.time_law is not None for phase in program.phases)
-        curved = any(limit.guarantee.is_mean for limit in program.limits)
-        for backend in solvers_for(task.solver.name, curved=curved):
-            if deadline.passed:
-                break
-            solve = SolverSession.for_task(
-                backend,
-                task.solver,
-                first,
-                deadline,
-                lambda _text: None,
-                has_time_law=has_law,
-            )
-            try:
-                refined = refine(program, solve(program, x), solve, options)
-            except (ImportError, UnreachableError):
-                continue
-            if not refined.converged:
-                continue
-            slower = trajectory.t_end / refined.t_end - 1.0
-            if -1e-3 <= slower <= task.search.slower + 1e-3:
-                return refined
-            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.reports[-1].solver}")
-    what = "a different optimum" if ends else "no optimum"
-    raise PlanningError(
-        f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
-        found=", ".join(ends) or None,
-        hint="Run brachis bottleneck on the task file: it plans again",
-    )
-
-
-def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
-    """Build the problem over the saved knots; the motion is its point x."""
-    task = trajectory.task
-    joint_map: JointMap
-    if len(trajectory.chart_rows):
-        problem = Problem.of(trajectory.robot, task)
-        rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
-        s = trajectory.path_coordinate(trajectory.times)
-        path = problem.path
-        joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
-    elif task.task_space == JOINTS:
-        problem = Problem.of(trajectory.robot, task)
-        joint_map = JointSpaceMap(problem.robot, problem.path)
-    else:
-        names = tuple(
-            name for name in trajectory.redundant_joints if name != ROLL_JOINT
-        )
-        own = task.model_copy(
-            update={"redundant_joints": names, "branch": trajectory.branch}
-        )
-        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, own))
-        problem = decomposition.problem
-        joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
-    parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)
-    moving = [(phase, spline) for phase, spline in parts if not phase.is_dwell]
-    starts = trajectory.position([phase.begin for phase, _ in moving])
-    grids = []
-    motions = []
-    for (_, spline), law in zip(moving, problem.time_laws, strict=True):
-        t_norm = spread(np.unique(spline.knots), task.spline.points_per_interval)
-        grids.append(FixedGrid(spline.knots, spline.degree, t_norm))
-        points = spline.control_points[0 if law is None else 1 :]
-        motions.append(Motion(spline.t_end, spline.knots, spline.degree, points, law))
-    program = program_over(problem, maps_by_leg(problem, joint_map, starts), grids)
-    x = program.variables_from(motions)
-    for margin in MARGINS:
-        program = program.with_margin(margin)
-        # Solvers and interpolation are not exact.
-        if program.safeguard_slack(x) >= -1e-4:
-            break
-    return program, x
 
 
 @dataclass(frozen=True, repr=False)
@@ -329,7 +192,9 @@ def report(
                 allowed="a result of brachis.plan",
             )
         refined = motion.candidate.refined
-        optimum = motion.candidate.optimum or refined
+        is_timed = refined.report.solver == SOLVER
+        is_free = refined.program.phases[0].joint_map.r > 0
+        optimum = solve_again(trajectory) if is_timed and is_free else refined
     found = sensitivities(optimum)
     tolerance = trajectory.task.refinement.tolerance
     limits = [

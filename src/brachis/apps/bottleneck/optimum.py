@@ -1,0 +1,172 @@
+"""The optimisation problem of a motion, solved again: what a saved motion, or a timed one, has no multipliers of.
+
+Task, URDF, redundant joints and branch (or the chart), knots and control points are saved. The problem is built over
+these knots, with the branch margin that the motion keeps, solved from the saved control points and refined as in a
+plan. The start is an optimum already, so this takes a few iterations and ends at the same one. A timing of the phase
+plane has too many knots for that: its problem begins over a few, which are refined.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from brachis.common.arrays import spread
+from brachis.common.deadline import Deadline
+from brachis.errors import PlanningError, UnreachableError
+from brachis.kinematics import ChartRows, JointMap, JointSpaceMap, chart_around
+from brachis.optimise.backends import solvers_for
+from brachis.optimise.bspline import clamped_knots
+from brachis.optimise.grid import FixedGrid
+from brachis.optimise.guess import fit_curves, shortest_time
+from brachis.optimise.improve import SolvedProgram, SolverSession
+from brachis.optimise.mesh import adapt_mesh
+from brachis.optimise.motion import Motion
+from brachis.optimise.program import Program
+from brachis.optimise.refine import RefinementOptions, refine
+from brachis.optimise.retiming import is_timing_all, keep
+from brachis.optimise.transcription import maps_by_leg, program_over
+from brachis.problem.problem import Problem, decompositions_of
+from brachis.robot import ROLL_JOINT
+from brachis.robot.task_map import JOINTS
+from brachis.search.candidates import MARGINS
+from brachis.trajectory import Trajectory
+
+_FEW_INTERVALS = 16
+_FIT = 8
+"""Intervals with which a timed motion begins, and times in each at which splines follow it."""
+_TIMED_FASTER = 0.01
+"""Part of the time by which a timing may be faster than splines over few knots."""
+
+
+def solve_again(trajectory: Trajectory) -> SolvedProgram:
+    """Solve the problem of a saved motion from where it ended; a timing alone stays as it is.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        As `brachis.plan` made it, or loaded.
+
+    Returns
+    -------
+    SolvedProgram
+        As ``result.candidate.refined`` of the plan.
+
+    Raises
+    ------
+    InputError
+        The closed form or the branch is not known here; see `brachis.plan`.
+    PlanningError
+        The motion is not an optimum of its problem: no solver of the task came back to it.
+    """
+    task = trajectory.task
+    deadline = Deadline.after(task.search.time_limit)
+    settings = task.refinement
+    options = RefinementOptions(
+        settings.tolerance, settings.density, settings.max_rounds, deadline
+    )
+    ends = []
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
+        program, x = _problem(trajectory)
+        first = program.phases[0].joint_map
+        is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
+        is_timed = is_open and is_timing_all(program)
+        if is_timed and not first.r:
+            return SolvedProgram(program, (keep(program, x),))
+        longest = 1e-3
+        if is_timed:
+            program, x = _over_few_knots(program, x, task.spline.points_per_interval)
+            longest = _TIMED_FASTER
+        has_law = any(phase.time_law is not None for phase in program.phases)
+        curved = any(limit.guarantee.is_mean for limit in program.limits)
+        for backend in solvers_for(task.solver.name, curved=curved):
+            if deadline.passed:
+                break
+            solve = SolverSession.for_task(
+                backend,
+                task.solver,
+                first,
+                deadline,
+                lambda _text: None,
+                has_time_law=has_law,
+            )
+            try:
+                solved = SolvedProgram(program, (solve(program, x),))
+                if is_timed:
+                    solved = adapt_mesh(solved, solve, task.spline, options)
+                refined = refine(solved.program, solved.report, solve, options)
+            except (ImportError, UnreachableError):
+                continue
+            if not refined.converged:
+                continue
+            slower = trajectory.t_end / refined.t_end - 1.0
+            if -longest <= slower <= task.search.slower + 1e-3:
+                return refined
+            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.reports[-1].solver}")
+    what = "a different optimum" if ends else "no optimum"
+    raise PlanningError(
+        f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
+        found=", ".join(ends) or None,
+        hint="Run brachis bottleneck on the task file: it plans again",
+    )
+
+
+def _over_few_knots(
+    program: Program, x: np.ndarray, points: int
+) -> tuple[Program, np.ndarray]:
+    """Write a motion, x, over a few even knots: a timing has too many for a solver."""
+    breaks = np.linspace(0.0, 1.0, _FEW_INTERVALS + 1)
+    phases = []
+    parts = []
+    for (phase, _), motion in zip(program.split(x), program.motions(x), strict=True):
+        knots = clamped_knots(phase.degree, breaks)
+        few = phase.with_grid(FixedGrid(knots, phase.degree, spread(breaks, points)))
+        t_norm = spread(breaks, _FIT)
+        curves = motion.at(t_norm * motion.t_end)[0]
+        phases.append(few)
+        parts.append(fit_curves(few, motion.t_end, t_norm, curves))
+    first = program.with_phases(phases)
+    return first, shortest_time(first, np.concatenate(parts))
+
+
+def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
+    """Build the problem over the saved knots; the motion is its point x."""
+    task = trajectory.task
+    joint_map: JointMap
+    if len(trajectory.chart_rows):
+        problem = Problem.of(trajectory.robot, task)
+        rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
+        s = trajectory.path_coordinate(trajectory.times)
+        path = problem.path
+        joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
+    elif task.task_space == JOINTS:
+        problem = Problem.of(trajectory.robot, task)
+        joint_map = JointSpaceMap(problem.robot, problem.path)
+    else:
+        names = tuple(
+            name for name in trajectory.redundant_joints if name != ROLL_JOINT
+        )
+        own = task.model_copy(
+            update={"redundant_joints": names, "branch": trajectory.branch}
+        )
+        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, own))
+        problem = decomposition.problem
+        joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
+    parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)
+    moving = [(phase, spline) for phase, spline in parts if not phase.is_dwell]
+    starts = trajectory.position([phase.begin for phase, _ in moving])
+    grids = []
+    motions = []
+    for (_, spline), law in zip(moving, problem.time_laws, strict=True):
+        t_norm = spread(np.unique(spline.knots), task.spline.points_per_interval)
+        grids.append(FixedGrid(spline.knots, spline.degree, t_norm))
+        points = spline.control_points[0 if law is None else 1 :]
+        motions.append(Motion(spline.t_end, spline.knots, spline.degree, points, law))
+    program = program_over(problem, maps_by_leg(problem, joint_map, starts), grids)
+    x = program.variables_from(motions)
+    for margin in MARGINS:
+        program = program.with_margin(margin)
+        # Solvers and interpolation are not exact.
+        if program.safeguard_slack(x) >= -1e-4:
+            break
+    return program, x
