@@ -32,6 +32,8 @@ _SLOWEST = 1e-3
 _STOPPED = 1e-8
 """Part of the median sdot^2 below which a station is passed at rest."""
 _SHORTEST = tolerances.PATH
+_NOTHING = 1e-24
+"""Stands for zero where it is divided by."""
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
 _STATIONS_A_PIECE = 4
@@ -185,12 +187,12 @@ class PathPhase:
 
     def time(self, x: np.ndarray) -> float:
         """Time, s."""
-        rates = np.sqrt(self._split(x)[0].clip(0.0))
+        rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
         return float((2.0 * self._steps / (rates[1:] + rates[:-1])).sum())
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the time, (v,); zero by what is given at the ends."""
-        rates = np.sqrt(self._split(x)[0].clip(1e-300))
+        rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
         by_sum = -2.0 * self._steps / (rates[1:] + rates[:-1]) ** 2
         by_rate = np.pad(by_sum, (1, 0)) + np.pad(by_sum, (0, 1))
         by_square = by_rate / (2.0 * rates) * self._units

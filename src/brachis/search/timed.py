@@ -21,7 +21,7 @@ from brachis.problem.problem import Problem
 
 _MORE = 1.2
 """Times the violation by which a timing takes longer."""
-_LONGEST = 0.01
+_LONGEST = 0.03
 """Part of the time by which it may."""
 
 

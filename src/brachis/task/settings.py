@@ -198,9 +198,10 @@ class SplineSettings(Model):
     degree: Count = Field(default=3, ge=2, le=7)
     """Degree of the splines; 3 gives continuous torque, 4 continuous torque rate."""
     intervals: Intervals = "auto"
-    """Number of knot intervals of every phase. auto halves the intervals that lose most time, until two rounds together
-    gain less than half the tolerance. A number makes planning faster and the motion slower. knots: free needs a
-    number."""
+    """Number of knot intervals of every phase. auto gives the fastest timing of the best joint path, with knots where
+    it needs them; with limits on jerk, torque rate or means it halves the intervals that lose most time, until two
+    rounds together gain less than half the tolerance. A number makes planning faster and the motion slower. knots:
+    free needs a number."""
     tolerance: Positive = Field(default=1.0e-3, le=0.1)
     """With intervals: auto, the accepted loss against very many intervals, as a fraction of the end time t_E."""
     knots: Literal["uniform", "free"] = "uniform"
