@@ -54,6 +54,10 @@ class PathPhase:
 
     Attributes
     ----------
+    breaks : (M + 1,) ndarray
+        Ends of the intervals of the splines, as parts of the way.
+    ends : tuple of float
+        Path coordinates.
     start, x_lower, x_upper : (v,) ndarray
         Variables: X at the stations, in units of what it is at the beginning, and the control points.
     lower, upper : (c,) ndarray
@@ -83,6 +87,7 @@ class PathPhase:
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
         evenly = np.linspace(0.0, timing.t_end, intervals + 1)
         breaks = self._part(np.interp(evenly, t, curves[:, 0]))
+        self.breaks = breaks
         self._knots = clamped_knots(_DEGREE, breaks)
         first, basis = local_basis(self._knots, _DEGREE, self._part(middles))
         self._basis = basis / self._way ** np.arange(4)[:, None, None]
