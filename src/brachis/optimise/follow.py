@@ -165,6 +165,9 @@ def _lay_splines(
         spline.control_points(spline.free_from(nearly, t_end), t_end)
         for spline, nearly in zip(splines, motion.control_points, strict=True)
     ]
+    if phase.joint_map.path is not None:
+        # Where the tool stands, means of its rate are not exact.
+        points[0] = np.maximum.accumulate(points[0].clip(max=points[0][-1]))
     return replace(motion, control_points=np.array(points))
 
 
