@@ -59,7 +59,8 @@ def test_answers_are_as_fast_as_their_timings(programs):
     for program, x in found:
         timing = retiming.least_time(program.timings(x))
         assert timing == pytest.approx(program.objective(x), rel=2e-3)
-    assert result.t_end == pytest.approx(timing, rel=1e-3)
+    # Splines may be slower by twice the tolerance.
+    assert result.t_end == pytest.approx(timing, rel=2e-3)
 
 
 def test_values_that_are_given_stay(programs):

@@ -3,7 +3,7 @@
 Splines follow a timing nearly (`timed_splines`). Where they exceed a limit, this is narrowed there by so much, and the
 joint path is timed anew. That leaves the motion as fast as possible, but new limits make new places at which
 accelerations jump. So what is left after a few times is slowed down instead: a factor f(p) < 1 of the rate dp/dt leaves
-f^2 of all accelerations, but for f f' (dp/dt)^2, and changes over about the way in which the motion could stop.
+f^2 of all accelerations, but for f f' (dp/dt)^2, and changes over about twice the way in which the motion could stop.
 
 Knots stand where accelerations jump. They stay there on the path, whatever its timing.
 """
@@ -26,8 +26,8 @@ from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
 
-_FINENESS = (0.3, 0.01, 0.001, 0.0001, 3.0)
-"""What intervals may lose together, in tolerances: less where that was slow, more where there were too many."""
+_FINENESS = (6.0, 0.3, 0.01, 0.001, 0.0001)
+"""What intervals may lose together, in tolerances: less where that was slow."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
 _LOOKS = 8
@@ -95,8 +95,6 @@ def follow(
     for fineness in _FINENESS:
         breaks = _knots(phase, own, timing, fineness * tolerance)
         if len(breaks) > _MOST_INTERVALS:
-            if best is None:
-                continue
             break
         motion, violation = _hold_limits(phase, own, timing, breaks)
         needed = motion.t_end * (1.0 + violation)
@@ -292,7 +290,7 @@ def _fade(slower: np.ndarray, timing: Timing) -> np.ndarray:
     sizes = np.abs(timing.acceleration)
     quick = np.maximum(sizes, _LEASTQ * np.quantile(sizes, _QUICK))
     steps = np.diff(timing.path.p) / timing.middle_rate**2
-    way = np.append(0.0, np.cumsum(2.0 * quick * steps))
+    way = np.append(0.0, np.cumsum(quick * steps))
     beside = np.pad(slower[:, 0], 1)
     with np.errstate(divide="ignore"):
         own = np.log(np.maximum(beside[1:], beside[:-1]))

@@ -23,7 +23,7 @@ _PLACES_AN_INTERVAL = 250
 """Places for each of these."""
 SHORTEST = 2e-4
 """Shortest interval that is halved, s: accelerations are rounded over shorter ones."""
-_LONGER = 2.5
+_LONGER = 4.5
 """Times the length of an interval that those beside it may have."""
 _SWITCH = 0.2
 """Part of accelerations by which they change where the motion switches from one limit to another."""
