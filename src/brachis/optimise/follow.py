@@ -26,8 +26,14 @@ from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
 
-_FINENESS = (6.0, 0.3, 0.01, 0.001, 0.0001)
-"""What intervals may lose together, in tolerances: less where that was slow."""
+_FIRST_LOSS = 6.0
+"""What the intervals may lose together at first, in tolerances."""
+_ENOUGH_SLOWER = 1.0
+"""Tolerances by which splines may be slower than the timing."""
+_FINER = (0.03, 0.75)
+"""Smallest and largest factor of what they may lose, where that was too slow."""
+_MESHES = 6
+"""Choices of knots that are tried, no more."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
 _LOOKS = 8
@@ -92,18 +98,21 @@ def follow(
         return None
     best: tuple[Motion, float] | None = None
     least = np.inf
-    for fineness in _FINENESS:
-        breaks = _knots(phase, own, timing, fineness * tolerance)
+    lost = _FIRST_LOSS * tolerance
+    enough = _ENOUGH_SLOWER * tolerance
+    for _ in range(_MESHES):
+        breaks = _knots(phase, own, timing, lost)
         if len(breaks) > _MOST_INTERVALS:
             break
         motion, violation = _hold_limits(phase, own, timing, breaks)
         needed = motion.t_end * (1.0 + violation)
-        if needed >= least:
+        if needed < least:
+            least = needed
+            best = motion, violation
+        slower = needed / timing.t_end - 1.0
+        if slower < enough:
             break
-        least = needed
-        best = motion, violation
-        if least < timing.t_end * (1.0 + 2.0 * tolerance):
-            break
+        lost *= np.clip(0.9 * enough / slower, *_FINER)
     if best is None:
         return None
     return Followed(*_as_phase(phase, best[0], points), best[1])

@@ -9,11 +9,7 @@ import numpy as np
 
 from brachis.optimise import retiming
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.candidate import (
-    Candidate,
-    InitialGuess,
-    verify,
-)
+from brachis.optimise.candidate import Candidate, InitialGuess, verify
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
@@ -36,16 +32,12 @@ def solvers_of(problem: Problem) -> list[str]:
 def time_alone(start: InitialGuess, program: Program) -> SolvedProgram | None:
     """Time a joint path where nothing else is to be decided, over the knots that this needs."""
     spline = start.problem.task.spline
-    if start.joint_map.r or spline.intervals != "auto" or spline.knots == "free":
+    if start.joint_map.r or spline.intervals != "auto":
         return None
     if start.solver != solvers_of(start.problem)[0]:  # as a fallback others solve
         return None
-    return retiming.time_guess(
-        program,
-        start.legs,
-        spline.tolerance,
-        spline.points_per_interval,
-    )
+    points = spline.points_per_interval
+    return retiming.time_guess(program, start.legs, spline.tolerance, points)
 
 
 def begin_with_timing(
@@ -54,16 +46,15 @@ def begin_with_timing(
     """Lay first splines along the fastest timing of a joint path, where the task leaves the knots open."""
     problem = start.problem
     spline = problem.task.spline
-    is_open = spline.intervals == "auto" and spline.knots != "free"
-    if not is_open or problem.task.boundary.periodic or any(problem.time_laws):
+    is_given = spline.intervals != "auto"
+    if is_given or problem.task.boundary.periodic or any(problem.time_laws):
         return None
     return retiming.begin_with_timing(program, start.legs, spline.points_per_interval)
 
 
 def is_timed(start: InitialGuess, program: Program) -> bool:
     """Tell whether motions get the timing of the phase plane: where it knows all limits, and the knots are open."""
-    spline = start.problem.task.spline
-    is_open = spline.intervals == "auto" and spline.knots != "free"
+    is_open = start.problem.task.spline.intervals == "auto"
     return is_open and retiming.is_timing_all(program)
 
 

@@ -69,8 +69,7 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         program, x = _problem(trajectory)
         first = program.phases[0].joint_map
-        is_open = task.spline.intervals == "auto" and task.spline.knots != "free"
-        is_timed = is_open and is_timing_all(program)
+        is_timed = task.spline.intervals == "auto" and is_timing_all(program)
         if is_timed and not first.r:
             return SolvedProgram(program, (keep(program, x),))
         longest = 1e-3
