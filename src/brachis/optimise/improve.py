@@ -205,6 +205,8 @@ _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
 
+_ROUGH_ITERATIONS = 40
+"""Iterations of a rough solve, no more."""
 _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
 
@@ -263,6 +265,12 @@ class SolverSession:
             listener(Iteration(text))
 
         return cls(backend, options, deadline, progress)
+
+    def roughly(self) -> SolverSession:
+        """Return the session for answers that nearly hold the limits, and hardly get any faster."""
+        iterations = min(_ROUGH_ITERATIONS, self.options.max_iterations)
+        rough = SolverOptions(1e-3, iterations, np.inf, progress=1e-3, patience=3)
+        return dataclasses.replace(self, options=rough, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,)."""

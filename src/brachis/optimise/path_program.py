@@ -23,7 +23,7 @@ from brachis.optimise.bspline import basis_matrix, clamped_knots, local_basis
 from brachis.optimise.evaluator import Evaluation
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
-from brachis.optimise.program import Link
+from brachis.optimise.program import Link, is_safeguard
 from brachis.timing import Course, TimedCourse
 
 _DEGREE = 3
@@ -229,6 +229,11 @@ class PathPhase:
             parts.append(own + by_second[:, :, j, None] * of_second[:, None])
         return np.concatenate(parts, axis=2).ravel()
 
+    def curves(self, x: np.ndarray) -> np.ndarray:
+        """Take s and the redundant curves at many places, (S, c)."""
+        s = self._begin + self._way * spread(self.breaks, _SAMPLES)
+        return self.course(x, s).y
+
     def course(self, x: np.ndarray, s: np.ndarray) -> Course:
         """Take the curves at path coordinates s, (S,)."""
         first, basis = local_basis(self._knots, _DEGREE, self._part(s))
@@ -321,9 +326,20 @@ class PathProgram:
         entries = [own.jacobian(part) for own, part in self._split(x)]
         return np.concatenate([*entries, np.tile([1.0, -1.0], len(self._pairs))])
 
-    def timings(self, x: np.ndarray) -> list[PhaseTiming]:
+    def safeguard_slack(self, x: np.ndarray) -> float:
+        """Smallest distance of a safeguard from its bound; infinite without safeguards."""
+        violations = [
+            own.evaluate(part).violation(is_safeguard) for own, part in self._split(x)
+        ]
+        return -float(max(own.max(initial=-np.inf) for own in violations))
+
+    def curves(self, x: np.ndarray) -> list[np.ndarray]:
+        """Take s and the redundant curves of all phases at many places, (S, c) each."""
+        return [own.curves(part) for own, part in self._split(x)]
+
+    def timings(self, x: np.ndarray, places: int) -> list[PhaseTiming]:
         """Time the joint paths of all phases anew; raises UnreachableError where one leaves its map."""
         return [
-            PhaseTiming.along(own.phase, partial(own.course, part), own.ends)
+            PhaseTiming.along(own.phase, partial(own.course, part), own.ends, places)
             for own, part in self._split(x)
         ]

@@ -84,6 +84,7 @@ class PhaseTiming:
         phase: Phase,
         course_at: Callable[[np.ndarray], Course],
         ends: tuple[float, float],
+        places: int = PLACES,
     ) -> PhaseTiming:
         """Time a joint path; raise UnreachableError if it leaves the map.
 
@@ -95,6 +96,8 @@ class PhaseTiming:
             Curves at ascending path coordinates, (P,).
         ends : tuple of float
             Path coordinates.
+        places : int, optional
+            Where it is timed, no fewer.
         """
         path = phase.joint_map.path
         assert path is not None
@@ -103,7 +106,7 @@ class PhaseTiming:
         pieces = np.concatenate([[begin], knots, [end]])
         pieces = pieces[np.append(np.diff(pieces) > tolerances.PATH, True)]
         number = len(pieces) - 1
-        count = max(PLACES, min(_PLACES_A_PIECE * number, _MOST_PLACES))
+        count = max(places, min(_PLACES_A_PIECE * number, _MOST_PLACES))
         sides = phase.boundary.start[0], phase.boundary.end[0]
         rates = np.array([side.derivatives[:1].sum() for side in sides])
 
@@ -128,11 +131,14 @@ class PhaseTiming:
         return cls(course, by_length, course.solve(by_length))
 
     @classmethod
-    def through(cls, phase: Phase, curves: np.ndarray) -> PhaseTiming:
+    def through(
+        cls, phase: Phase, curves: np.ndarray, places: int = PLACES
+    ) -> PhaseTiming:
         """Time a joint path through curves, (S, c), the first of them s; see `along`."""
         curves = curves[np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)]
         begin, end = curves[[0, -1], 0]
-        return cls.along(phase, partial(Course.through, curves), (begin, end))
+        course_at = partial(Course.through, curves)
+        return cls.along(phase, course_at, (begin, end), places)
 
 
 def largest_acceleration(timing: Timing) -> float:

@@ -391,7 +391,7 @@ class Program(Summary):
     @property
     def safeguard_bounds(self) -> tuple[float, ...]:
         """Least values of the safeguards in force: branch margins."""
-        own = filter(_is_safeguard, self.limits)
+        own = filter(is_safeguard, self.limits)
         return tuple(float(bound) for limit in own for bound in limit.lower)
 
     def safeguard_slack(self, x: np.ndarray) -> float:
@@ -400,11 +400,12 @@ class Program(Summary):
         Raises UnreachableError as `states` does.
         """
         violations = [
-            phase.evaluate(part).violation(_is_safeguard)
+            phase.evaluate(part).violation(is_safeguard)
             for phase, part in self.split(x)
         ]
         return -float(max(own.max(initial=-np.inf) for own in violations))
 
 
-def _is_safeguard(limit: Limit) -> bool:
+def is_safeguard(limit: Limit) -> bool:
+    """Tell whether a limit keeps the solve on its branch, and is none of the robot's."""
     return limit.role is Role.SAFEGUARD

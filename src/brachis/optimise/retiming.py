@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.errors import UnreachableError
+from brachis.limits.safeguards import HELD_BACK
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.follow import Followed, begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.path_program import PathPhase, PathProgram
-from brachis.optimise.phase_timing import PhaseTiming
+from brachis.optimise.phase_timing import PLACES, PhaseTiming
 from brachis.optimise.program import Program
 from brachis.timing import is_left_out
 
@@ -22,28 +23,48 @@ SOLVER = "phase plane"
 """Name of what solves a program by its timing alone."""
 _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
-_PATH_INTERVALS = (16, 32, 64)
-"""Intervals of the redundant curves over the path, one after the other."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
 _LEAST_STATIONS = 120
 _STATIONS_AN_INTERVAL = 4
 """Stations of the path at which limits hold, at least and for every interval."""
 _FIRST_INTERVALS = 16
-"""Intervals over which a search begins, about."""
+"""Intervals over which a search over time begins, about."""
+
+
+@dataclass(frozen=True)
+class PathEffort:
+    """How closely joint paths are looked for.
+
+    Attributes
+    ----------
+    intervals : tuple of int
+        Of the redundant curves over the path, one after the other.
+    places : int
+        At which answers are timed.
+    """
+
+    intervals: tuple[int, ...]
+    places: int
+
+
+ROUGH = PathEffort((16,), 800)
+"""To rank joint paths."""
+FINE = PathEffort((32, 64), PLACES)
+"""For a plan, from the answer of a rough search."""
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:
     """Solve nothing: a timing is not improved by more collocation points, but lengthened until limits hold."""
-    return _report(program, x, SolveStatus.STALLED, np.inf, 0.0)
+    return report_timing(program, x, SolveStatus.STALLED, np.inf, 0.0)
 
 
-def _report(
+def report_timing(
     program: Program,
     x: np.ndarray,
-    status: SolveStatus,
-    violation: float,
-    seconds: float,
+    status: SolveStatus = SolveStatus.ACCEPTABLE,
+    violation: float = 0.0,
+    seconds: float = 0.0,
 ) -> SolverReport:
     """Report a motion that no solver changed."""
     return SolverReport(
@@ -151,74 +172,104 @@ class BetterPaths:
 
     Attributes
     ----------
-    timings : tuple of PhaseTiming or None
-        Of the best joint paths, one for each phase.
+    curves : tuple of (S, c) ndarray
+        The best joint path of every phase, as curves: s and the redundant ones.
+    timings : tuple of PhaseTiming
+        Of them.
     reports : tuple of SolverReport
     is_credible : bool
         Whether the answers are about as fast as their timings. Where the tool stands on its path while the joints move,
         curves over the path are none.
+    is_held_back : bool
+        Whether a branch margin is so near to its bound that it holds the motion back.
     """
 
-    timings: tuple[PhaseTiming | None, ...]
-    reports: tuple[SolverReport, ...]
-    is_credible: bool
+    curves: tuple[np.ndarray, ...]
+    timings: tuple[PhaseTiming, ...]
+    reports: tuple[SolverReport, ...] = ()
+    is_credible: bool = True
+    is_held_back: bool = False
+
+    @property
+    def t_end(self) -> float:
+        """Time of all phases, s; infinite where one has no timing."""
+        return least_time(self.timings)
 
 
 def improve_joint_paths(
-    solved: SolvedProgram,
-    timings: Sequence[PhaseTiming | None],
+    program: Program,
+    curves: Sequence[np.ndarray],
     solve: SolverSession,
     tolerance: float,
+    effort: PathEffort,
 ) -> BetterPaths:
-    """Find better joint paths than those of a solved program, over the path; see `PathProgram`.
+    """Find better joint paths over the path; see `PathProgram`.
 
     Parameters
     ----------
-    solved : SolvedProgram
-        Of whose program `is_timing_all` holds. It may exceed limits between its collocation points.
-    timings : sequence of PhaseTiming or None
-        Of its phases.
+    program : Program
+        Of which `is_timing_all` holds, over any knots.
+    curves : sequence of (S, c) ndarray
+        Of every phase: s, ascending, and the redundant curves.
     solve : SolverSession
     tolerance : float
         Splines get more intervals as long as that gains half of this part of the time.
+    effort : PathEffort
 
     Returns
     -------
     BetterPaths
+        Those given, where the limits allow no timing of them.
+
+    Raises
+    ------
+    UnreachableError
+        Curves leave the joint map.
     """
-    program = solved.program
-    best = [*timings]
-    reports: list[SolverReport] = []
-    is_credible = True
-    for intervals in _PATH_INTERVALS:
-        least = least_time(best)
-        if solve.deadline.passed or not np.isfinite(least):
+    pairs = zip(program.phases, curves, strict=True)
+    timings = [PhaseTiming.through(*pair, effort.places) for pair in pairs]
+    best = BetterPaths(tuple(curves), tuple(timings))
+    for count in effort.intervals:
+        before = best.t_end
+        if not np.isfinite(before) or solve.deadline.passed:
             break
-        pairs = zip(program.phases, best, strict=True)
-        stations = max(_LEAST_STATIONS, _STATIONS_AN_INTERVAL * intervals)
-        over_path = PathProgram(
-            [PathPhase(phase, own, intervals, stations) for phase, own in pairs if own],
-            program.links,
-        )
-        report = solve(over_path, over_path.start)
-        reports.append(report)
-        try:
-            found = over_path.timings(report.x)
-        except UnreachableError:
-            is_credible = False
+        best = _better(program, best, solve, count, effort.places)
+        if not best.is_credible or best.t_end > before * (1.0 - 0.5 * tolerance):
             break
-        time_found = least_time(found)
-        missed = abs(report.objective / time_found - 1.0)
-        is_credible = is_credible and missed < _CREDIBLE
-        if time_found < least:
-            best = [*found]
-        is_settled = time_found > least * (1.0 - 0.5 * tolerance)
-        if is_settled and intervals > _PATH_INTERVALS[0]:
-            break
-    return BetterPaths(tuple(best), tuple(reports), is_credible)
+    return best
 
 
-def least_time(timings: Sequence[PhaseTiming | None]) -> float:
+def _better(
+    program: Program,
+    best: BetterPaths,
+    solve: SolverSession,
+    intervals: int,
+    places: int,
+) -> BetterPaths:
+    """Solve over the path from the best joint paths, and keep what is faster."""
+    stations = max(_LEAST_STATIONS, _STATIONS_AN_INTERVAL * intervals)
+    pairs = zip(program.phases, best.timings, strict=True)
+    phases = [PathPhase(phase, own, intervals, stations) for phase, own in pairs]
+    over_path = PathProgram(phases, program.links)
+    report = solve(over_path, over_path.start)
+    reports = (*best.reports, report)
+    try:
+        timings = tuple(over_path.timings(report.x, places))
+        slack = over_path.safeguard_slack(report.x)
+    except UnreachableError:
+        return replace(best, reports=reports, is_credible=False)
+    found = BetterPaths(tuple(over_path.curves(report.x)), timings, reports)
+    missed = abs(report.objective / found.t_end - 1.0)
+    if found.t_end >= best.t_end:
+        found = replace(best, reports=reports)
+    return replace(
+        found,
+        is_credible=missed < _CREDIBLE,
+        is_held_back=slack <= HELD_BACK,
+    )
+
+
+def least_time(timings: Iterable[PhaseTiming | None]) -> float:
     """Return the time of all phases, s; infinite where one has no timing."""
     fastest = [None if own is None else own.timing for own in timings]
     return sum(np.inf if own is None else own.t_end for own in fastest)
@@ -267,5 +318,5 @@ def _as_solved(
     finer = program.with_phases([own.phase for own in found])
     x = np.concatenate([own.x for own in found])
     violation = max(own.violation for own in found)
-    report = _report(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)
+    report = report_timing(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)
     return SolvedProgram(finer, (*reports, report))

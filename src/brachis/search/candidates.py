@@ -38,7 +38,7 @@ from brachis.kinematics import (
     null_spaces,
     transversality,
 )
-from brachis.limits.safeguards import MARGIN
+from brachis.limits.safeguards import HELD_BACK, MARGINS
 from brachis.optimise.backends import SolverReport, SolveStatus, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
 from brachis.optimise.guess import fit_curves, shortest_time
@@ -54,17 +54,21 @@ from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.optimise.retiming import SOLVER as TIMING
 from brachis.optimise.retiming import (
+    FINE,
+    ROUGH,
     improve_joint_paths,
     least_time,
+    report_timing,
 )
+from brachis.optimise.retiming import SOLVER as TIMING
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
     program_over,
 )
 from brachis.problem.problem import Problem
+from brachis.search.over_path import TRANSVERSAL, improve_guess
 from brachis.search.phase_plane import initial_breaks, initial_guess
 from brachis.search.timed import (
     begin_with_timing,
@@ -74,8 +78,6 @@ from brachis.search.timed import (
     verify_timed,
 )
 
-MARGINS = (0.1, 0.02, MARGIN)
-"""Branch margins that are tried in turn."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 SELECTABLE = 0.05
@@ -112,6 +114,41 @@ def solve_candidate(
             reports=timed.reports,
             coarse=timed.t_end,
         )
+    session = _open_session(start, deadline, listener)
+    try:
+        planned = _solve_over_path(start, target, session)
+        return planned or _solve_over_time(start, target, session)
+    except ImportError as error:
+        return Candidate.of(start, f"{start.solver}: not installed ({error})")
+
+
+def _solve_over_path(
+    start: InitialGuess, target: Program, session: SolverSession
+) -> Candidate | None:
+    """Solve over the path where the phase plane knows all limits; None where they allow no timing."""
+    if not is_timed(start, target):
+        return None
+    try:
+        better = improve_guess(start, target, session.roughly(), ROUGH)
+    except UnreachableError:
+        return None
+    begun = begin_with_timing(better.start, better.program)
+    if begun is None:
+        return None
+    return Candidate.of(
+        better.start,
+        "planned",
+        program=begun[0],
+        target=begun[0],
+        reports=(*better.found.reports, report_timing(*begun)),
+        coarse=better.start.estimate,
+    )
+
+
+def _solve_over_time(
+    start: InitialGuess, target: Program, session: SolverSession
+) -> Candidate:
+    """Solve over time: with the coarsest knots of those given, or with knots that the fastest timing needs."""
     begun = begin_with_timing(start, target)
     if begun is None:
         # With more variables a cold solve takes seconds: it is first solved over some of its knots.
@@ -126,31 +163,28 @@ def solve_candidate(
     else:
         program, x = begun
         target = program
-    session = _open_session(start, deadline, listener)
-    try:
-        x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
-        if _is_free_chart(start):
-            solved = solve_in_chart(problem, program, x, session)
-            maps = [phase.joint_map for phase in solved.program.phases]
-            grids = [phase.grid for phase in target.phases]
-            target = program_over(problem, maps, grids)
-        else:
-            solved = solve_by_margin_continuation(program, x, session, MARGINS)
-    except ImportError as error:
-        return Candidate.of(start, f"{start.solver}: not installed ({error})")
+    x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
+    if _is_free_chart(start):
+        solved = solve_in_chart(start.problem, program, x, session)
+        maps = [phase.joint_map for phase in solved.program.phases]
+        grids = [phase.grid for phase in target.phases]
+        target = program_over(start.problem, maps, grids)
+    else:
+        solved = solve_by_margin_continuation(program, x, session, MARGINS)
     status = solved.report.status
     words = status.name.lower().replace("_", " ")
     if status is SolveStatus.OPTIMAL:
         words = "planned"
     elif status.usable:
         words = f"planned, {words}"
+    coarse = solved.t_end if status.usable else np.inf
     return Candidate.of(
         start,
         words,
         program=solved.program,
         target=target,
         reports=(*before, *solved.reports),
-        coarse=solved.t_end if status.usable else np.inf,
+        coarse=coarse,
     )
 
 
@@ -179,36 +213,68 @@ def finish_candidate(
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon
     )
-    solved = SolvedProgram(program, candidate.reports)
-    if candidate.reports[-1].solver == TIMING:
-        options = dataclasses.replace(options, deadline=deadline)
-        return verify_timed(candidate, solved, options)
     session = _open_session(start, soon, listener)
+    latest = dataclasses.replace(options, deadline=deadline)
+    if candidate.reports[-1].solver == TIMING:
+        return _finish_over_path(candidate, session, latest)
+    return _finish_over_time(candidate, session, latest)
+
+
+def _finish_over_path(
+    candidate: Candidate, session: SolverSession, options: RefinementOptions
+) -> Candidate:
+    """Improve joint paths further over the path, lay splines along their timing, and verify.
+
+    Where the tool stands while the joints move, curves over the path are none: then they are improved over time too.
+    """
+    start = candidate.start
+    program = candidate.program
+    assert start is not None and program is not None
+    solved = SolvedProgram(program, candidate.reports)
+    if not start.joint_map.r:
+        return verify_timed(candidate, solved, options)
+    spline = start.problem.task.spline
+    found = improve_joint_paths(program, start.legs, session, spline.tolerance, FINE)
+    solved = dataclasses.replace(solved, reports=(*found.reports, *solved.reports))
+    done = None
+    if found.is_credible:
+        done = plan_timing(candidate, solved, found.timings, options)
+        if done.verified or session.deadline.passed:
+            return done
+    other = _solve_over_time(start, program, session)
+    if not other.usable:
+        return done or plan_timing(candidate, solved, found.timings, options)
+    assert other.program is not None
+    adapted = SolvedProgram(other.program, (*solved.reports, *other.reports))
+    adapted = adapt_mesh(adapted, session, spline, options)
+    timings = time_phases(adapted.program, adapted.x)
+    if done is None and found.t_end < least_time(timings):
+        return plan_timing(candidate, solved, found.timings, options)
+    retimed = plan_timing(other, adapted, timings, options)
+    if retimed.verified:
+        return retimed
+    session = dataclasses.replace(session, deadline=options.deadline)
+    return refine_and_verify(other, adapted.program, adapted.reports, session, options)
+
+
+def _finish_over_time(
+    candidate: Candidate, session: SolverSession, options: RefinementOptions
+) -> Candidate:
+    """Adapt the mesh, refine and verify."""
+    start = candidate.start
+    program = candidate.program
+    assert start is not None and program is not None
+    solved = SolvedProgram(program, candidate.reports)
     target = candidate.target
-    if candidate.keeps_knots and _is_free_chart(start) and not deadline.passed:
+    is_over = session.deadline.passed
+    if candidate.keeps_knots and _is_free_chart(start) and not is_over:
         solved = best_of_joints(start.problem, solved, session)
         target = solved.program
-    adapted: SolvedProgram | None = None
-    if is_timed(start, program) and solved.usable:
-        timings = time_phases(program, solved.x)
-        tolerance = task.spline.tolerance
-        better = improve_joint_paths(solved, timings, session, tolerance)
-        best = better.timings
-        timed = dataclasses.replace(solved, reports=(*better.reports, *solved.reports))
-        if not better.is_credible:
-            adapted = adapt_mesh(solved, session, task.spline, options, target=target)
-            timings = time_phases(adapted.program, adapted.x)
-            if least_time(timings) < least_time(best):
-                best = tuple(timings)
-                timed = adapted
-        done = plan_timing(candidate, timed, best, options)
-        if done is not None:
-            return done
-    if adapted is None:
-        adapted = adapt_mesh(solved, session, task.spline, options, target=target)
-    options = dataclasses.replace(options, deadline=deadline)
+    spline = start.problem.task.spline
+    soon = dataclasses.replace(options, deadline=session.deadline)
+    adapted = adapt_mesh(solved, session, spline, soon, target=target)
     named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
-    session = dataclasses.replace(session, deadline=deadline)
+    session = dataclasses.replace(session, deadline=options.deadline)
     return refine_and_verify(named, adapted.program, adapted.reports, session, options)
 
 
@@ -281,7 +347,7 @@ def solve_by_margin_continuation(
 
 def _is_held_back(solved: SolvedProgram) -> bool:
     """Tell whether a branch margin is so near to its bound that it holds the motion back."""
-    return solved.program.safeguard_slack(solved.report.x) <= 1e-4
+    return solved.program.safeguard_slack(solved.report.x) <= HELD_BACK
 
 
 def solve_without_third_order_limits(
@@ -456,7 +522,7 @@ def _has_good_chart(solved: SolvedProgram) -> bool:
     try:
         chart, s, null = _self_motion(solved)
         least = transversality(chart.rows.at(s)[0], null).min()
-        return not _is_held_back(solved) and bool(least >= 0.5)
+        return not _is_held_back(solved) and bool(least >= TRANSVERSAL)
     except UnreachableError:
         return False
 

@@ -63,15 +63,14 @@ def plan_timing(
     solved: SolvedProgram,
     timings: Sequence[PhaseTiming | None],
     options: RefinementOptions,
-) -> Candidate | None:
-    """Give joint paths, one for each phase, their fastest timing; None if the motion is not verified."""
+) -> Candidate:
+    """Give joint paths, one for each phase, their fastest timing, and verify it."""
     assert candidate.start is not None
     spline = candidate.start.problem.task.spline
     retimed = retiming.retime(
         solved, timings, spline.tolerance, spline.points_per_interval
     )
-    done = verify_timed(candidate, retimed, options)
-    return done if done.verified else None
+    return verify_timed(candidate, retimed, options)
 
 
 def verify_timed(

@@ -15,6 +15,7 @@ from brachis.common.arrays import spread
 from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, UnreachableError
 from brachis.kinematics import ChartRows, JointMap, JointSpaceMap, chart_around
+from brachis.limits.safeguards import MARGINS
 from brachis.optimise.backends import solvers_for
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
@@ -29,7 +30,6 @@ from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import ROLL_JOINT
 from brachis.robot.task_map import JOINTS
-from brachis.search.candidates import MARGINS
 from brachis.trajectory import Trajectory
 
 _FEW_INTERVALS = 16
