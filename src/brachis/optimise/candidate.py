@@ -141,6 +141,8 @@ class Candidate(Summary):
         The first one that was solved; None where there was none, and once the search is over.
     target : Program or None
         The program over all its knots, where `program` has only some of them.
+    is_over_path : bool
+        Whether it is not solved over time: the joint path of `start` is the answer, and its estimate the end time.
     reports : tuple of SolverReport
         Of all solves: with ever smaller branch margins, on ever finer meshes, then of the refinement rounds.
     coarse : float
@@ -171,6 +173,7 @@ class Candidate(Summary):
     start: InitialGuess | None = None
     program: Program | None = None
     target: Program | None = None
+    is_over_path: bool = False
     reports: tuple[SolverReport, ...] = ()
     coarse: float = np.inf
     refined: SolvedProgram | None = None
@@ -189,7 +192,9 @@ class Candidate(Summary):
     @property
     def usable(self) -> bool:
         """True where there is a first plan that can be finished."""
-        return self.program is not None and self.reports[-1].status.usable
+        if self.program is None:
+            return False
+        return self.is_over_path or self.reports[-1].status.usable
 
     @property
     def in_chart(self) -> bool:

@@ -11,9 +11,9 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.limits.safeguards import HELD_BACK
 from brachis.optimise.backends import SolverReport, SolveStatus
-from brachis.optimise.follow import Followed, begin, follow
+from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
-from brachis.optimise.improve import SolvedProgram, SolverSession
+from brachis.optimise.improve import SolverSession
 from brachis.optimise.path_program import PathPhase, PathProgram
 from brachis.optimise.phase_timing import PLACES, PhaseTiming
 from brachis.optimise.program import Program
@@ -25,9 +25,8 @@ _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
-_LEAST_STATIONS = 120
-_STATIONS_AN_INTERVAL = 4
-"""Stations of the path at which limits hold, at least and for every interval."""
+_STATIONS_AN_INTERVAL = 3.5
+"""Stations of the path at which limits hold, for every interval."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -40,31 +39,34 @@ class PathEffort:
     ----------
     intervals : tuple of int
         Of the redundant curves over the path, one after the other.
+    stations : int
+        At which limits hold, at least.
     places : int
         At which answers are timed.
     """
 
     intervals: tuple[int, ...]
+    stations: int
     places: int
 
 
-ROUGH = PathEffort((16,), 800)
+ROUGH = PathEffort((16,), 56, 800)
 """To rank joint paths."""
-FINE = PathEffort((32, 64), PLACES)
+FINE = PathEffort((32, 64), 120, PLACES)
 """For a plan, from the answer of a rough search."""
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:
     """Solve nothing: a timing is not improved by more collocation points, but lengthened until limits hold."""
-    return report_timing(program, x, SolveStatus.STALLED, np.inf, 0.0)
+    return _report(program, x, SolveStatus.STALLED, np.inf, 0.0)
 
 
-def report_timing(
+def _report(
     program: Program,
     x: np.ndarray,
-    status: SolveStatus = SolveStatus.ACCEPTABLE,
-    violation: float = 0.0,
-    seconds: float = 0.0,
+    status: SolveStatus,
+    violation: float,
+    seconds: float,
 ) -> SolverReport:
     """Report a motion that no solver changed."""
     return SolverReport(
@@ -80,44 +82,6 @@ def report_timing(
     )
 
 
-def time_guess(
-    program: Program,
-    joint_paths: Sequence[np.ndarray],
-    tolerance: float,
-    points: int,
-) -> SolvedProgram | None:
-    """Give joint paths without redundancy their fastest timing, which is all that is to be decided.
-
-    Parameters
-    ----------
-    program : Program
-        Over any knots.
-    joint_paths : sequence of (S, c) ndarray
-        Of every phase, s and other curves.
-    tolerance, points
-        As of `retime`.
-
-    Returns
-    -------
-    SolvedProgram or None
-        As of `retime`; or where the phase plane finds no timing.
-    """
-    began = time.perf_counter()
-    if not is_timing_all(program):
-        return None
-    found = []
-    for phase, curves in zip(program.phases, joint_paths, strict=True):
-        try:
-            own = PhaseTiming.through(phase, curves)
-        except UnreachableError:
-            return None
-        followed = follow(phase, own, tolerance, points)
-        if followed is None:
-            return None
-        found.append(followed)
-    return _as_solved(program, found, (), time.perf_counter() - began)
-
-
 def begin_with_timing(
     program: Program,
     joint_paths: Sequence[np.ndarray],
@@ -129,8 +93,10 @@ def begin_with_timing(
     ----------
     program : Program
         Over any knots.
-    joint_paths, points
-        As of `time_guess`.
+    joint_paths : sequence of (S, c) ndarray
+        Of every phase, s and other curves.
+    points : int
+        Collocation points an interval.
 
     Returns
     -------
@@ -229,11 +195,13 @@ def improve_joint_paths(
     pairs = zip(program.phases, curves, strict=True)
     timings = [PhaseTiming.through(*pair, effort.places) for pair in pairs]
     best = BetterPaths(tuple(curves), tuple(timings))
+    if not program.phases[0].joint_map.r:
+        return best
     for count in effort.intervals:
         before = best.t_end
         if not np.isfinite(before) or solve.deadline.passed:
             break
-        best = _better(program, best, solve, count, effort.places)
+        best = _better(program, best, solve, count, effort)
         if not best.is_credible or best.t_end > before * (1.0 - 0.5 * tolerance):
             break
     return best
@@ -244,17 +212,17 @@ def _better(
     best: BetterPaths,
     solve: SolverSession,
     intervals: int,
-    places: int,
+    effort: PathEffort,
 ) -> BetterPaths:
     """Solve over the path from the best joint paths, and keep what is faster."""
-    stations = max(_LEAST_STATIONS, _STATIONS_AN_INTERVAL * intervals)
+    stations = max(effort.stations, int(_STATIONS_AN_INTERVAL * intervals))
     pairs = zip(program.phases, best.timings, strict=True)
     phases = [PathPhase(phase, own, intervals, stations) for phase, own in pairs]
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)
     reports = (*best.reports, report)
     try:
-        timings = tuple(over_path.timings(report.x, places))
+        timings = tuple(over_path.timings(report.x, effort.places))
         slack = over_path.safeguard_slack(report.x)
     except UnreachableError:
         return replace(best, reports=reports, is_credible=False)
@@ -275,18 +243,18 @@ def least_time(timings: Iterable[PhaseTiming | None]) -> float:
     return sum(np.inf if own is None else own.t_end for own in fastest)
 
 
-def retime(
-    solved: SolvedProgram,
+def lay_splines(
+    program: Program,
     timings: Sequence[PhaseTiming | None],
     tolerance: float,
     points: int,
-) -> SolvedProgram:
-    """Give a solved program the fastest timing of joint paths, over the knots that this needs.
+) -> tuple[Program, SolverReport] | None:
+    """Lay splines along the fastest timing of joint paths, over the knots that these need.
 
     Parameters
     ----------
-    solved : SolvedProgram
-        Of whose program `is_timing_all` holds.
+    program : Program
+        Of which `is_timing_all` holds, over any knots.
     timings : sequence of PhaseTiming or None
         Of joint paths for its phases.
     tolerance : float
@@ -296,27 +264,18 @@ def retime(
 
     Returns
     -------
-    SolvedProgram
-        A phase whose joint path has no timing stays as it is.
+    (Program, SolverReport) or None
+        None where a joint path has no timing.
     """
     began = time.perf_counter()
-    program = solved.program
     found = []
-    for (phase, x), own in zip(program.split(solved.x), timings, strict=True):
+    for phase, own in zip(program.phases, timings, strict=True):
         followed = None if own is None else follow(phase, own, tolerance, points)
-        found.append(followed or Followed(phase, x, 0.0))
-    return _as_solved(program, found, solved.reports, time.perf_counter() - began)
-
-
-def _as_solved(
-    program: Program,
-    found: Sequence[Followed],
-    reports: tuple[SolverReport, ...],
-    seconds: float,
-) -> SolvedProgram:
-    """Write timings of all phases as the answer of a program."""
+        if followed is None:
+            return None
+        found.append(followed)
     finer = program.with_phases([own.phase for own in found])
     x = np.concatenate([own.x for own in found])
     violation = max(own.violation for own in found)
-    report = report_timing(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)
-    return SolvedProgram(finer, (*reports, report))
+    seconds = time.perf_counter() - began
+    return finer, _report(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)

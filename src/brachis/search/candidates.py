@@ -56,27 +56,18 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import (
     FINE,
-    ROUGH,
     improve_joint_paths,
     least_time,
-    report_timing,
 )
-from brachis.optimise.retiming import SOLVER as TIMING
 from brachis.optimise.transcription import (
     maps_by_leg,
     program_of,
     program_over,
 )
 from brachis.problem.problem import Problem
-from brachis.search.over_path import TRANSVERSAL, improve_guess
+from brachis.search.over_path import TRANSVERSAL
 from brachis.search.phase_plane import initial_breaks, initial_guess
-from brachis.search.timed import (
-    begin_with_timing,
-    is_timed,
-    plan_timing,
-    time_alone,
-    verify_timed,
-)
+from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
@@ -104,45 +95,12 @@ def solve_candidate(
         target = program_of(problem, start.maps_by_leg(), initial_breaks(start))
     except UnreachableError as error:
         return Candidate.of(start, str(error))
-    timed = time_alone(start, target)
-    if timed is not None:
-        return Candidate.of(
-            start,
-            "planned",
-            program=timed.program,
-            target=timed.program,
-            reports=timed.reports,
-            coarse=timed.t_end,
-        )
     session = _open_session(start, deadline, listener)
     try:
-        planned = _solve_over_path(start, target, session)
+        planned = solve_over_path(start, target, session)
         return planned or _solve_over_time(start, target, session)
     except ImportError as error:
         return Candidate.of(start, f"{start.solver}: not installed ({error})")
-
-
-def _solve_over_path(
-    start: InitialGuess, target: Program, session: SolverSession
-) -> Candidate | None:
-    """Solve over the path where the phase plane knows all limits; None where they allow no timing."""
-    if not is_timed(start, target):
-        return None
-    try:
-        better = improve_guess(start, target, session.roughly(), ROUGH)
-    except UnreachableError:
-        return None
-    begun = begin_with_timing(better.start, better.program)
-    if begun is None:
-        return None
-    return Candidate.of(
-        better.start,
-        "planned",
-        program=begun[0],
-        target=begun[0],
-        reports=(*better.found.reports, report_timing(*begun)),
-        coarse=better.start.estimate,
-    )
 
 
 def _solve_over_time(
@@ -215,7 +173,7 @@ def finish_candidate(
     )
     session = _open_session(start, soon, listener)
     latest = dataclasses.replace(options, deadline=deadline)
-    if candidate.reports[-1].solver == TIMING:
+    if candidate.is_over_path:
         return _finish_over_path(candidate, session, latest)
     return _finish_over_time(candidate, session, latest)
 
@@ -230,29 +188,28 @@ def _finish_over_path(
     start = candidate.start
     program = candidate.program
     assert start is not None and program is not None
-    solved = SolvedProgram(program, candidate.reports)
-    if not start.joint_map.r:
-        return verify_timed(candidate, solved, options)
     spline = start.problem.task.spline
     found = improve_joint_paths(program, start.legs, session, spline.tolerance, FINE)
-    solved = dataclasses.replace(solved, reports=(*found.reports, *solved.reports))
+    reports = (*candidate.reports, *found.reports)
     done = None
     if found.is_credible:
-        done = plan_timing(candidate, solved, found.timings, options)
-        if done.verified or session.deadline.passed:
+        done = plan_timing(candidate, program, found.timings, reports, options)
+        if done is not None and (done.verified or session.deadline.passed):
             return done
     other = _solve_over_time(start, program, session)
-    if not other.usable:
-        return done or plan_timing(candidate, solved, found.timings, options)
-    assert other.program is not None
-    adapted = SolvedProgram(other.program, (*solved.reports, *other.reports))
-    adapted = adapt_mesh(adapted, session, spline, options)
-    timings = time_phases(adapted.program, adapted.x)
-    if done is None and found.t_end < least_time(timings):
-        return plan_timing(candidate, solved, found.timings, options)
-    retimed = plan_timing(other, adapted, timings, options)
-    if retimed.verified:
-        return retimed
+    reports = (*reports, *other.reports)
+    adapted = SolvedProgram(other.program or program, reports)
+    least = np.inf
+    if other.usable:
+        adapted = adapt_mesh(adapted, session, spline, options)
+        timings = time_phases(adapted.program, adapted.x)
+        least = least_time(timings)
+    if done is None and found.t_end < least:
+        done = plan_timing(candidate, program, found.timings, reports, options)
+    elif other.usable:
+        done = plan_timing(other, adapted.program, timings, adapted.reports, options)
+    if done is not None and (done.verified or not other.usable):
+        return done
     session = dataclasses.replace(session, deadline=options.deadline)
     return refine_and_verify(other, adapted.program, adapted.reports, session, options)
 

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from brachis.common import interrupts, tolerances
+from brachis.common.arrays import interpolate_columns
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError, write_count
@@ -48,7 +49,7 @@ NOT_TRIED = "not tried: the search ended"
 SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""
 _COMPARED = 49
-"""Even times at which motions of a phase are compared."""
+"""Even times, or places, at which motions of a phase are compared."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 
@@ -417,20 +418,32 @@ def is_same_motion(first: Candidate, second: Candidate) -> bool:
         or not -tolerances.GAIN <= difference <= slower
     ):
         return False
-    postures = []
-    for candidate in (first, second):
-        program = candidate.program
-        assert program is not None
-        motions = program.motions(candidate.reports[-1].x)
-        found = []
-        for phase, motion in zip(program.phases, motions, strict=True):
-            t = np.linspace(0.0, motion.t_end, _COMPARED)
-            try:
-                found.append(phase.joint_map.state(*motion.at(t), t=t).q)
-            except UnreachableError:
-                return False
-        postures.append(np.concatenate(found))
-    return bool(np.abs(postures[0] - postures[1]).max() < 0.1)  # rad or m
+    try:
+        pair = _postures_of(first), _postures_of(second)
+    except UnreachableError:
+        return False
+    return bool(np.abs(pair[0] - pair[1]).max() < 0.1)  # rad or m
+
+
+def _postures_of(candidate: Candidate) -> np.ndarray:
+    """Take postures at even times of every phase, or at even places of the path, (P, n), of a solved candidate.
+
+    Raises UnreachableError where it leaves its joint map.
+    """
+    start = candidate.start
+    program = candidate.program
+    assert start is not None and program is not None
+    if candidate.is_over_path:
+        curves = start.joint_path
+        s = np.linspace(0.0, 1.0, _COMPARED * len(start.problem.legs))
+        even = interpolate_columns(s, curves[:, 0], curves)
+        return start.joint_map.postures(even)
+    motions = program.motions(candidate.reports[-1].x)
+    found = []
+    for phase, motion in zip(program.phases, motions, strict=True):
+        t = np.linspace(0.0, motion.t_end, _COMPARED)
+        found.append(phase.joint_map.state(*motion.at(t), t=t).q)
+    return np.concatenate(found)
 
 
 WORDS = ("joints", "branch", "origin")

@@ -1,8 +1,8 @@
-"""Which of many guesses are worth a plan: each is solved quickly over few knots, and the fastest that differ are kept.
+"""Which of many guesses are worth a plan: each is improved over the path, and the fastest that differ are kept.
 
 The length of a joint path, and the least time along it, tell little about the motion that an optimiser makes of it if
-several redundant joints are free to move. A solve over few knots, stopped early, tells more and costs little; and the
-plan then begins at the joint path where it ended.
+several redundant joints are free to move. A rough search over the path tells more and costs little; and the plan then
+begins at the joint path where it ended.
 """
 
 from __future__ import annotations
@@ -16,20 +16,18 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
-from brachis.kinematics import ChartMap
 from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.transcription import program_of
-from brachis.search.candidates import solve_in_chart
-from brachis.search.phase_plane import initial_guess
+from brachis.optimise.retiming import ROUGH
+from brachis.optimise.transcription import breaks_of, program_of
+from brachis.search.over_path import improve_guess
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.timed import solvers_of
+from brachis.timing import is_left_out
 
-_DEGREE = 2
-"""Parabolas jump from one acceleration to the next, as fastest motions do: so few intervals say most."""
 _SAME_LEAST = 1.003
-"""End times of quick solves that differ by less than this factor are the same."""
+"""Least times that differ by less than this factor are the same."""
 
 
 def screen(
@@ -49,16 +47,14 @@ def screen(
     Returns
     -------
     list of InitialGuess
-        With the joint paths that the quick solves led to, and their end times as estimates; the fastest first.
+        With the better joint paths, and their least times as estimates; the fastest first.
     """
     if len(starts) <= most:
         return list(starts)
     jobs = process_count(starts[0].problem.task.search.jobs, deadline)
-    listener(f"solving quickly from {len(starts)} joint paths")
+    listener(f"improving {len(starts)} joint paths")
     solved: list[InitialGuess] = []
-    work = run_in_processes(
-        _solve_quickly, starts, deadline, jobs=jobs, listener=listener
-    )
+    work = run_in_processes(_improve, starts, deadline, jobs=jobs, listener=listener)
     with closing(work) as outcomes:
         for start in outcomes:
             solved.append(start)
@@ -80,47 +76,25 @@ def screen(
     return kept
 
 
-def _solve_quickly(
+def _improve(
     start: InitialGuess, deadline: Deadline, _listener: Listener
 ) -> InitialGuess:
-    """Solve from a guess over few knots; if that fails it stays as it is, with an infinite estimate."""
+    """Improve a guess over the path; one that cannot be gets an infinite estimate."""
     hopeless = dataclasses.replace(start, estimate=np.inf)
     if deadline.passed:
         return hopeless
-    # At rest in their velocity alone, without limits that parabolas cannot hold.
-    task = start.problem.task
-    spline = task.spline.model_copy(update={"degree": _DEGREE, "rest": "velocity"})
-    problem = dataclasses.replace(
-        start.problem,
-        task=task.model_copy(update={"spline": spline}),
-        limits=tuple(limit for limit in start.problem.limits if limit.order <= _DEGREE),
-    )
-    (backend,) = solvers_for(solvers_of(start.problem)[0])
-    # An answer that nearly holds the limits will do, and so will one that hardly gets any faster.
-    options = SolverOptions(1e-3, 25, np.inf, progress=5e-3, patience=3)
-    session = SolverSession(backend, options, deadline, acceptable=1e-2)
+    problem = start.problem
+    known = [limit for limit in problem.limits if not is_left_out(limit)]
+    easier = dataclasses.replace(problem, limits=tuple(known))
+    (backend,) = solvers_for(solvers_of(problem)[0])
+    session = SolverSession(backend, SolverOptions(), deadline).roughly()
     try:
         maps = start.maps_by_leg()
-        program = program_of(problem, maps, [np.linspace(0.0, 1.0, 13)] * len(maps))
-        x = initial_guess(program, start)
-        if x is None:
-            return hopeless
-        solved = solve_in_chart(problem, program, x, session)
-        if not solved.usable:
-            return hopeless
-        motions = solved.program.motions(solved.report.x)
-        chart = solved.program.phases[0].joint_map
-        assert isinstance(chart, ChartMap)
-        even = [motion.at(np.linspace(0.0, motion.t_end, 97))[0] for motion in motions]
-        return dataclasses.replace(
-            start,
-            joint_map=chart.along(problem.path, chart.start),
-            joint_path=np.concatenate(even),
-            estimate=solved.t_end,
-            durations=tuple(motion.t_end for motion in motions),
-        )
+        program = program_of(easier, maps, [breaks_of(problem)] * len(maps))
+        better = improve_guess(start, program, session, ROUGH)
     except (ImportError, UnreachableError):  # the plan says which backend is missing
         return hopeless
+    return better.start if np.isfinite(better.found.t_end) else hopeless
 
 
 def _is_same(first: InitialGuess, second: InitialGuess) -> bool:

@@ -1,4 +1,4 @@
-"""What the phase plane does with a guess and with a candidate: it times them, begins them, and times them again."""
+"""Candidates whose timing the phase plane knows: it is the plan but for the splines."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.errors import UnreachableError
 from brachis.optimise import retiming
-from brachis.optimise.backends import solvers_for
+from brachis.optimise.backends import SolverReport, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, verify
-from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.problem.problem import Problem
+from brachis.search.over_path import improve_guess
 
 _MORE = 1.2
 """Times the violation by which a timing takes longer."""
@@ -29,17 +31,6 @@ def solvers_of(problem: Problem) -> list[str]:
     return [solver.name for solver in found]
 
 
-def time_alone(start: InitialGuess, program: Program) -> SolvedProgram | None:
-    """Time a joint path where nothing else is to be decided, over the knots that this needs."""
-    spline = start.problem.task.spline
-    if start.joint_map.r or spline.intervals != "auto":
-        return None
-    if start.solver != solvers_of(start.problem)[0]:  # as a fallback others solve
-        return None
-    points = spline.points_per_interval
-    return retiming.time_guess(program, start.legs, spline.tolerance, points)
-
-
 def begin_with_timing(
     start: InitialGuess, program: Program
 ) -> tuple[Program, np.ndarray] | None:
@@ -52,41 +43,87 @@ def begin_with_timing(
     return retiming.begin_with_timing(program, start.legs, spline.points_per_interval)
 
 
-def is_timed(start: InitialGuess, program: Program) -> bool:
-    """Tell whether motions get the timing of the phase plane: where it knows all limits, and the knots are open."""
-    is_open = start.problem.task.spline.intervals == "auto"
-    return is_open and retiming.is_timing_all(program)
+def solve_over_path(
+    start: InitialGuess, program: Program, session: SolverSession
+) -> Candidate | None:
+    """Solve from a guess over the path, where its timing may be the plan.
+
+    That is where the phase plane knows all limits, and the knots are open. As a fallback other solvers solve over time.
+
+    Parameters
+    ----------
+    start : InitialGuess
+    program : Program
+        Of its joint maps, over any knots.
+    session : SolverSession
+
+    Returns
+    -------
+    Candidate or None
+        None where that is not so, or where the limits allow no timing.
+    """
+    problem = start.problem
+    is_open = problem.task.spline.intervals == "auto"
+    is_first = start.solver == solvers_of(problem)[0]
+    if not (is_open and is_first and retiming.is_timing_all(program)):
+        return None
+    try:
+        better = improve_guess(start, program, session.roughly(), retiming.ROUGH)
+    except UnreachableError:
+        return None
+    if not np.isfinite(better.found.t_end):
+        return None
+    return Candidate.of(
+        better.start,
+        "planned",
+        program=better.program,
+        target=better.program,
+        is_over_path=True,
+        reports=better.found.reports,
+        coarse=better.start.estimate,
+    )
 
 
 def plan_timing(
     candidate: Candidate,
-    solved: SolvedProgram,
+    program: Program,
     timings: Sequence[PhaseTiming | None],
+    reports: tuple[SolverReport, ...],
     options: RefinementOptions,
-) -> Candidate:
-    """Give joint paths, one for each phase, their fastest timing, and verify it."""
+) -> Candidate | None:
+    """Lay splines along the timings of all phases, and verify them.
+
+    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    program : Program
+        Over any knots.
+    timings : sequence of PhaseTiming or None
+    reports : tuple of SolverReport
+        Of earlier solves.
+    options : RefinementOptions
+
+    Returns
+    -------
+    Candidate or None
+        None where a phase has no timing.
+    """
     assert candidate.start is not None
     spline = candidate.start.problem.task.spline
-    retimed = retiming.retime(
-        solved, timings, spline.tolerance, spline.points_per_interval
+    laid = retiming.lay_splines(
+        program, timings, spline.tolerance, spline.points_per_interval
     )
-    return verify_timed(candidate, retimed, options)
-
-
-def verify_timed(
-    candidate: Candidate, timed: SolvedProgram, options: RefinementOptions
-) -> Candidate:
-    """Verify a timing; where a limit is exceeded by a little between the places looked at, it takes a little longer."""
-    reports = timed.reports
+    if laid is None:
+        return None
+    finer, report = laid
     factor = 1.0
     for number in itertools.count(1):
         own = SolvedProgram(
-            timed.program,
-            reports[-1:],
-            violation=timed.report.violation,
-            time_scaled=factor,
+            finer, (report,), violation=report.violation, time_scaled=factor
         )
-        done = verify(candidate, reports[:-1], own)
+        done = verify(candidate, reports, own)
         found = done.verification
         if done.verified or found is None:
             return done
