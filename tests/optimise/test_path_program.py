@@ -17,9 +17,9 @@ def programs():
     found = []
     find = PathProgram.timings
 
-    def keep(self, x):
+    def keep(self, x, places):
         found.append((self, x))
-        return find(self, x)
+        return find(self, x, places)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(PathProgram, "timings", keep)
@@ -55,12 +55,14 @@ def test_slopes_agree_with_differences(programs):
 
 def test_answers_are_as_fast_as_their_timings(programs):
     found, result = programs
-    assert [len(program.phases[0].breaks) - 1 for program, _ in found] == [16, 32, 64]
-    for program, x in found:
+    intervals = [len(program.phases[0].breaks) - 1 for program, _ in found]
+    assert set(intervals) == {16, 32, 64}
+    for (program, x), count in zip(found, intervals, strict=True):
         timing = retiming.least_time(program.timings(x, 4000))
-        assert timing == pytest.approx(program.objective(x), rel=2e-3)
-    # Splines may be slower by twice the tolerance.
-    assert result.t_end == pytest.approx(timing, rel=2e-3)
+        nearly = 1e-2 if count == 16 else 2e-3
+        assert timing == pytest.approx(program.objective(x), rel=nearly)
+    # Splines may be slower by the tolerance.
+    assert result.t_end == pytest.approx(timing, rel=1e-3)
 
 
 def test_values_that_are_given_stay(programs):

@@ -12,7 +12,7 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import screening
-from brachis.search.starts import SEARCH_LEVELS, chart_starts
+from brachis.search import starts as module
 from brachis.task import load_task
 
 MOST = 2
@@ -38,11 +38,13 @@ def starts():
     )
     robot = Robot.from_urdf(URDF, gravity=[0, 0, 0], limits=task.robot.limits)
     problem = Problem.of(robot, task)
-    (level,) = SEARCH_LEVELS["fast"]
+    (level,) = module.SEARCH_LEVELS["fast"]
     many = dataclasses.replace(
         level, in_charts=100, only_minima=False, cells_per_turn=24
     )
-    found = chart_starts(problem, decompositions_of(problem), many)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "screen", lambda starts, *_others: starts)
+        found = module.chart_starts(problem, decompositions_of(problem), many)
     assert isinstance(found, list)
     assert len(found) > MOST
     return found[:12]
@@ -60,8 +62,10 @@ def test_the_fastest_that_differ_are_kept(starts):
         np.testing.assert_allclose(start.problem.task_map.values(q), targets, atol=1e-9)
 
 
-def test_few_starts_are_not_looked_at(starts):
-    assert screening.screen(starts[:MOST], MOST, NEVER, quiet) == starts[:MOST]
+def test_few_starts_are_improved_too(starts):
+    (better,) = screening.screen(starts[:1], MOST, NEVER, quiet)
+    assert better.is_improved
+    assert better.estimate < starts[0].estimate
 
 
 def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatch):
@@ -71,7 +75,7 @@ def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatc
     def missing(*_arguments: object) -> None:
         raise ImportError("unopy")
 
-    monkeypatch.setattr(screening, "solve_in_chart", missing)
+    monkeypatch.setattr(screening, "improve_guess", missing)
     without = screening.screen(starts, MOST, NEVER, quiet)
     assert [start.origin for start in without] == [
         start.origin for start in starts[:MOST]
@@ -80,14 +84,14 @@ def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatc
 
 def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeypatch):
     solved = iter([True, *[False] * len(starts)])
-    honest = screening.solve_in_chart
+    honest = screening.improve_guess
 
     def once(*arguments: object) -> object:
         if next(solved):
             return honest(*arguments)
         raise ImportError("unopy")
 
-    monkeypatch.setattr(screening, "solve_in_chart", once)
+    monkeypatch.setattr(screening, "improve_guess", once)
     first, *others = screening.screen(starts, MOST, NEVER, quiet)
     assert first.origin == starts[0].origin
     assert others == [], "what was not solved is slower for all that is known"
@@ -114,7 +118,7 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
             start, estimate=[1.5, 1.0, np.inf, 1.001, 1.002, 1.0][len(looked_at) - 1]
         )
 
-    monkeypatch.setattr(screening, "_solve_quickly", quickly)
+    monkeypatch.setattr(screening, "_improve", quickly)
     monkeypatch.setattr(screening, "_is_same", lambda *_starts: False)
     kept = screening.screen(starts, MOST, NEVER, quiet)
     assert len(looked_at) == 6

@@ -71,6 +71,8 @@ class InitialGuess(Summary):
     durations : tuple of float or None
         Of every leg, s, where the joint path's values are those of a motion: for one leg after the other equally many,
         at even times. None where they are not.
+    is_improved : bool
+        Whether the joint path is the best one next to it, roughly, for the limits that the phase plane knows.
     """
 
     problem: Problem
@@ -81,6 +83,7 @@ class InitialGuess(Summary):
     family: str
     solver: str = ""
     durations: tuple[float, ...] | None = None
+    is_improved: bool = False
 
     @property
     def legs(self) -> list[np.ndarray]:

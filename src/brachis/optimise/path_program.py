@@ -24,6 +24,7 @@ from brachis.optimise.evaluator import Evaluation
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Link, is_safeguard
+from brachis.path.time_law import TimeLaw
 from brachis.timing import Course, TimedCourse
 
 _DEGREE = 3
@@ -54,6 +55,8 @@ class PathPhase:
 
     Attributes
     ----------
+    curves_count : int
+        Number of redundant curves.
     breaks : (M + 1,) ndarray
         Ends of the intervals of the splines, as parts of the way.
     ends : tuple of float
@@ -84,6 +87,8 @@ class PathPhase:
         self._middles = middles
         times = np.interp(self._s, curves[:, 0], t)
         squares = own.course.curves(timing, times)[1][:, 0] ** 2
+        if phase.time_law is not None:
+            squares = _follow(phase.time_law, self._s) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
         evenly = np.linspace(0.0, timing.t_end, intervals + 1)
         breaks = self._part(np.interp(evenly, t, curves[:, 0]))
@@ -96,17 +101,18 @@ class PathPhase:
         self._count = intervals + _DEGREE
         matrix = basis_matrix(self._knots, _DEGREE, self._part(curves[:, 0]))
         points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
-        self._curves_count = len(points)
+        self.curves_count = len(points)
         self.ends = float(self._begin), float(self._begin + self._way)
         self._set_variables(squares, points)
-        self._begin_within_limits()
+        if phase.time_law is None:
+            self._begin_within_limits()
         limits = phase.limits
         lower = np.concatenate([limit.lower for limit in limits])
         upper = np.concatenate([limit.upper for limit in limits])
         self.lower = np.tile(lower, len(middles))
         self.upper = np.tile(upper, len(middles))
         numbers = np.arange(len(middles))[:, None]
-        of_curves = [self.place_of(j, 0) + columns for j in range(self._curves_count)]
+        of_curves = [self.place_of(j, 0) + columns for j in range(self.curves_count)]
         every = np.hstack([numbers, numbers + 1, *of_curves])
         shape = (len(middles), len(lower), every.shape[1])
         self.jacobian_columns = np.broadcast_to(every[:, None], shape).ravel()
@@ -120,7 +126,9 @@ class PathPhase:
         self.x_lower = np.full(len(self.start), -np.inf)
         self.x_upper = np.full(len(self.start), np.inf)
         self.x_lower[:count] = _SLOWEST
-        given = [(0, self.start[0]), (count - 1, self.start[count - 1])]
+        has_law = self.phase.time_law is not None
+        numbers = range(count) if has_law else (0, count - 1)
+        given = [(number, self.start[number]) for number in numbers]
         boundary = self.phase.boundary
         for conditions, end in (boundary.start, 0), (boundary.end, -1):
             for j, condition in enumerate(conditions[1:]):
@@ -160,7 +168,7 @@ class PathPhase:
     def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """X at the stations, (P,), and control points, (r, M + 3)."""
         count = len(self._s)
-        points = x[count:].reshape(self._curves_count, self._count)
+        points = x[count:].reshape(self.curves_count, self._count)
         return x[:count] * self._units, points
 
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -223,7 +231,7 @@ class PathPhase:
         value, first, second, _ = self._basis
         of_rate = first * np.sqrt(mean)
         of_second = second * mean + first * u
-        for j in range(1, self._curves_count + 1):
+        for j in range(1, self.curves_count + 1):
             own = by_y[:, :, j, None] * value[:, None]
             own = own + by_rate[:, :, j, None] * of_rate[:, None]
             parts.append(own + by_second[:, :, j, None] * of_second[:, None])
@@ -246,6 +254,12 @@ class PathPhase:
             np.column_stack([np.ones(len(s)), y_ds]),
             np.column_stack([np.zeros(len(s)), y_dds]),
         )
+
+
+def _follow(law: TimeLaw, s: np.ndarray) -> np.ndarray:
+    """Rates ds/dt, (P,), 1/s, with which a time law passes path coordinates, (P,)."""
+    t = np.linspace(0.0, law.duration, _SAMPLES * len(s))
+    return np.asarray(law.at(np.interp(s, law.at(t)[0], t))[1])
 
 
 def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
@@ -284,6 +298,11 @@ class PathProgram:
             for curve in link.curves
             if curve > 0
         ]
+        first_phase = self.phases[0]
+        if first_phase.phase.boundary.periodic:
+            for curve in range(first_phase.curves_count):
+                ends = first_phase.place_of(curve, -1), first_phase.place_of(curve, 0)
+                pairs.append(ends)
         self._pairs = np.reshape(np.array(pairs, dtype=int), (-1, 2))
         joined = np.zeros(len(self._pairs))
         self.lower = np.concatenate([*(own.lower for own in self.phases), joined])

@@ -42,11 +42,21 @@ class PhaseTiming:
         Of the path's length at both ends, 1/s.
     timing : Timing or None
         None where the limits allow none, not even the motion's own, within rounding.
+    given : float or None
+        Duration where it is given, s.
     """
 
     course: TimedCourse
     rates: tuple[float, float]
     timing: Timing | None
+    given: float | None = None
+
+    @property
+    def t_end(self) -> float:
+        """Duration, s; infinite without a timing."""
+        if self.timing is None:
+            return np.inf
+        return self.timing.t_end if self.given is None else self.given
 
     @classmethod
     def of(cls, phase: Phase, x: np.ndarray) -> PhaseTiming | None:
@@ -128,7 +138,9 @@ class PhaseTiming:
         s = s[np.append(np.diff(s) > tolerances.PATH, True)]
         s[0] = begin
         course, by_length = lay(s)
-        return cls(course, by_length, course.solve(by_length))
+        law = phase.time_law
+        given = None if law is None else law.duration
+        return cls(course, by_length, course.solve(by_length), given)
 
     @classmethod
     def through(

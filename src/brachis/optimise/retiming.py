@@ -228,7 +228,10 @@ def _better(
         return replace(best, reports=reports, is_credible=False)
     found = BetterPaths(tuple(over_path.curves(report.x)), timings, reports)
     missed = abs(report.objective / found.t_end - 1.0)
-    if found.t_end >= best.t_end:
+    # The phase plane does not tell whether the limits allow a speed that is given.
+    is_given = any(own.given is not None for own in timings)
+    is_beyond = is_given and report.violation > _CREDIBLE
+    if is_beyond or (found.t_end >= best.t_end and not is_given):
         found = replace(best, reports=reports)
     return replace(
         found,
@@ -239,8 +242,7 @@ def _better(
 
 def least_time(timings: Iterable[PhaseTiming | None]) -> float:
     """Return the time of all phases, s; infinite where one has no timing."""
-    fastest = [None if own is None else own.timing for own in timings]
-    return sum(np.inf if own is None else own.t_end for own in fastest)
+    return sum(np.inf if own is None else own.t_end for own in timings)
 
 
 def lay_splines(

@@ -65,7 +65,6 @@ from brachis.optimise.transcription import (
     program_over,
 )
 from brachis.problem.problem import Problem
-from brachis.search.over_path import TRANSVERSAL
 from brachis.search.phase_plane import initial_breaks, initial_guess
 from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
@@ -122,13 +121,7 @@ def _solve_over_time(
         program, x = begun
         target = program
     x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
-    if _is_free_chart(start):
-        solved = solve_in_chart(start.problem, program, x, session)
-        maps = [phase.joint_map for phase in solved.program.phases]
-        grids = [phase.grid for phase in target.phases]
-        target = program_over(start.problem, maps, grids)
-    else:
-        solved = solve_by_margin_continuation(program, x, session, MARGINS)
+    solved = solve_by_margin_continuation(program, x, session, MARGINS)
     status = solved.report.status
     words = status.name.lower().replace("_", " ")
     if status is SolveStatus.OPTIMAL:
@@ -341,48 +334,6 @@ def solve_without_third_order_limits(
     return x, (report,)
 
 
-def solve_in_chart(
-    problem: Problem, program: Program, x: np.ndarray, solve: Solve
-) -> SolvedProgram:
-    """Solve in a chart, and go on in one around the motion if that is needed.
-
-    Parameters
-    ----------
-    problem : Problem
-    program : Program
-        In a chart.
-    x : (v,) ndarray
-        Starting point.
-    solve : callable
-
-    Returns
-    -------
-    SolvedProgram
-        In the last chart.
-    """
-
-    def solve_first(program: Program, x: np.ndarray) -> SolvedProgram:
-        return solve_by_margin_continuation(program, x, solve, MARGINS[:1])
-
-    def solve_further(program: Program, x: np.ndarray) -> SolvedProgram:
-        return solve_by_margin_continuation(program, x, solve, MARGINS[1:])
-
-    def follow(kept: SolvedProgram) -> tuple[Program, np.ndarray] | None:
-        if not kept.usable or _has_good_chart(kept):
-            return None
-        return move_to_chart(problem, kept)
-
-    out_of_time = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
-    solved = solve_first(program, x)
-    if not solved.usable and solved.report.status not in out_of_time:
-        solved = improve(solved, [_go_to((program, x))], solve_further)
-    solved = improve(solved, 3 * [follow], solve_first, go_on_above=tolerances.GAIN)
-    if solved.usable and _is_held_back(solved):
-        point = solved.program, solved.report.x
-        solved = improve(solved, [_go_to(point)], solve_further)
-    return solved
-
-
 def best_of_joints(
     problem: Problem, solved: SolvedProgram, solve: Solve
 ) -> SolvedProgram:
@@ -472,16 +423,6 @@ def _self_motion(solved: SolvedProgram) -> tuple[ChartMap, np.ndarray, np.ndarra
     jacobian = Newton(chart.task_map).task_coordinates(q)[1]
     s = np.concatenate([state.s for state in states])
     return chart, s, null_spaces(jacobian)
-
-
-def _has_good_chart(solved: SolvedProgram) -> bool:
-    """Tell whether the chart is transversal along the motion, and does not hold it back."""
-    try:
-        chart, s, null = _self_motion(solved)
-        least = transversality(chart.rows.at(s)[0], null).min()
-        return not _is_held_back(solved) and bool(least >= TRANSVERSAL)
-    except UnreachableError:
-        return False
 
 
 def _select_joints(solved: SolvedProgram) -> list[ChartRows]:

@@ -30,7 +30,7 @@ from brachis.optimise.transcription import program_over
 
 _CHARTS = 4
 """Charts in which a guess is improved, no more."""
-TRANSVERSAL = 0.5
+_TRANSVERSAL = 0.5
 """Least transversality of rows along a motion, below which its chart is left for another."""
 
 
@@ -117,6 +117,7 @@ def _along(start: InitialGuess, found: BetterPaths) -> InitialGuess:
         joint_path=curves[grows],
         estimate=found.t_end + waiting,
         durations=None,
+        is_improved=True,
     )
 
 
@@ -132,7 +133,7 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
         return None
     null = null_spaces(Newton(chart.task_map).task_coordinates(q)[1])
     least = transversality(chart.rows.at(s)[0], null).min()
-    if least >= TRANSVERSAL and not better.found.is_held_back:
+    if least >= _TRANSVERSAL and not better.found.is_held_back:
         return None
     try:
         moved = chart_around(problem.task_map, problem.path, s, q)

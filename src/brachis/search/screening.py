@@ -40,7 +40,7 @@ def screen(
     starts : sequence of InitialGuess
         At least one.
     most : int
-        How many to keep; if so few are given, all are kept without a solve.
+        How many to keep.
     deadline : Deadline
     listener : callable
 
@@ -49,8 +49,6 @@ def screen(
     list of InitialGuess
         With the better joint paths, and their least times as estimates; the fastest first.
     """
-    if len(starts) <= most:
-        return list(starts)
     jobs = process_count(starts[0].problem.task.search.jobs, deadline)
     listener(f"improving {len(starts)} joint paths")
     solved: list[InitialGuess] = []

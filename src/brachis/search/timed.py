@@ -67,20 +67,24 @@ def solve_over_path(
     is_first = start.solver == solvers_of(problem)[0]
     if not (is_open and is_first and retiming.is_timing_all(program)):
         return None
-    try:
-        better = improve_guess(start, program, session.roughly(), retiming.ROUGH)
-    except UnreachableError:
-        return None
-    if not np.isfinite(better.found.t_end):
+    reports: tuple[SolverReport, ...] = ()
+    if not start.is_improved:
+        try:
+            better = improve_guess(start, program, session.roughly(), retiming.ROUGH)
+        except UnreachableError:
+            return None
+        start, program = better.start, better.program
+        reports = better.found.reports
+    if not start.is_improved:
         return None
     return Candidate.of(
-        better.start,
+        start,
         "planned",
-        program=better.program,
-        target=better.program,
+        program=program,
+        target=program,
         is_over_path=True,
-        reports=better.found.reports,
-        coarse=better.start.estimate,
+        reports=reports,
+        coarse=start.estimate,
     )
 
 
