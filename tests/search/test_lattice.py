@@ -191,7 +191,10 @@ def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
 
 def test_advice_names_what_was_kept_low():
     given = problem(
-        scara(), solver={"max_iterations": 1, "name": "uno"}, redundant_joints=["j1"]
+        scara(),
+        solver={"max_iterations": 1, "name": "uno"},
+        redundant_joints=["j1"],
+        spline={"intervals": 20},
     )
     with pytest.raises(
         PlanningError, match=r"Raise solver.max_iterations, which is 1$"

@@ -40,7 +40,7 @@ _LOOKS = 8
 """Times in each interval at which limits are looked at."""
 _LOOKS_A_PIECE = 32
 """Times in each piece of a path."""
-_NARROWED = 4
+_NARROWED = 14
 """Timings with limits that are narrowed; what they leave is slowed down."""
 _ROUNDS = 40
 """Splines that are laid, no more."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.limits.safeguards import HELD_BACK
+from brachis.limits.safeguards import HELD_BACK, MARGIN, MARGINS
 from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
@@ -43,16 +43,19 @@ class PathEffort:
         At which limits hold, at least.
     places : int
         At which answers are timed.
+    margin : float
+        Least branch margin.
     """
 
     intervals: tuple[int, ...]
     stations: int
     places: int
+    margin: float
 
 
-ROUGH = PathEffort((16,), 56, 800)
-"""To rank joint paths."""
-FINE = PathEffort((32, 64), 120, PLACES)
+ROUGH = PathEffort((16,), 56, 800, MARGINS[1])
+"""To rank joint paths, clear of branch boundaries."""
+FINE = PathEffort((32, 64), 120, PLACES, MARGIN)
 """For a plan, from the answer of a rough search."""
 
 
@@ -201,7 +204,7 @@ def improve_joint_paths(
         before = best.t_end
         if not np.isfinite(before) or solve.deadline.passed:
             break
-        best = _better(program, best, solve, count, effort)
+        best = _better(program.with_margin(effort.margin), best, solve, count, effort)
         if not best.is_credible or best.t_end > before * (1.0 - 0.5 * tolerance):
             break
     return best
