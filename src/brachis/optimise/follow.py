@@ -30,9 +30,11 @@ _FIRST_LOSS = 6.0
 """What the intervals may lose together at first, in tolerances."""
 _ENOUGH_SLOWER = 1.0
 """Tolerances by which splines may be slower than the timing."""
-_FINER = (0.03, 0.75)
+_FINER = (0.03, 0.6)
 """Smallest and largest factor of what they may lose, where that was too slow."""
-_MESHES = 6
+_SLOWER_BY_LOSS = 1.6
+"""Power of the slowness wanted that is the factor of the loss, about."""
+_MESHES = 4
 """Choices of knots that are tried, no more."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
@@ -112,7 +114,8 @@ def follow(
         slower = needed / timing.t_end - 1.0
         if slower < enough:
             break
-        lost *= np.clip(0.9 * enough / slower, *_FINER)
+        wanted = 0.8 * enough / slower
+        lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
         return None
     return Followed(*_as_phase(phase, best[0], points), best[1])
