@@ -11,7 +11,7 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.limits.safeguards import HELD_BACK, MARGIN, MARGINS
 from brachis.optimise.backends import SolverReport, SolveStatus
-from brachis.optimise.follow import begin, follow
+from brachis.optimise.follow import Followed, begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.path_program import PathPhase, PathProgram
@@ -25,6 +25,8 @@ _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
+_WORTH = 1.5
+"""Tolerances by which a timing of the splines' own joint path is faster if it is worth to be followed."""
 _STATIONS_AN_INTERVAL = 3.5
 """Stations of the path at which limits hold, for every interval."""
 _FIRST_INTERVALS = 16
@@ -278,9 +280,21 @@ def lay_splines(
         followed = None if own is None else follow(phase, own, tolerance, points)
         if followed is None:
             return None
-        found.append(followed)
+        found.append(_follow_again(followed, tolerance, points))
     finer = program.with_phases([own.phase for own in found])
     x = np.concatenate([own.x for own in found])
     violation = max(own.violation for own in found)
     seconds = time.perf_counter() - began
     return finer, _report(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)
+
+
+def _follow_again(first: Followed, tolerance: float, points: int) -> Followed:
+    """Follow the timing of the splines' own joint path, where these cut its curves so that it is faster."""
+    t_end = first.phase.motion(first.x).t_end
+    own = PhaseTiming.of(first.phase, first.x)
+    if own is None or own.t_end > t_end * (1.0 - _WORTH * tolerance):
+        return first
+    again = follow(first.phase, own, tolerance, points)
+    if again is None or again.phase.motion(again.x).t_end > t_end:
+        return first
+    return again
