@@ -102,6 +102,12 @@ class InitialGuess(Summary):
             raise UnreachableError("the joint path leaves the branch, or the chart")
         return maps_by_leg(self.problem, self.joint_map, q[begins])
 
+    def postures_at_places(self, count: int) -> np.ndarray:
+        """Take so many postures, (count, n), at even places of the path; NaN where there are none."""
+        s = np.linspace(0.0, 1.0, count)
+        path = self.joint_path
+        return self.joint_map.postures(interpolate_columns(s, path[:, 0], path))
+
     @property
     def in_chart(self) -> bool:
         """Whether the coordinates are a chart's."""

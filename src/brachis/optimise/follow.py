@@ -34,6 +34,8 @@ _FINER = (0.03, 0.6)
 """Smallest and largest factor of what they may lose, where that was too slow."""
 _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
+_STALLED = 0.15
+"""Part of the slowness by which it has to change from mesh to mesh if more are to be tried."""
 _MESHES = 4
 """Choices of knots that are tried, no more."""
 _MOST_INTERVALS = 40_000
@@ -100,6 +102,7 @@ def follow(
         return None
     best: tuple[Motion, float] | None = None
     least = np.inf
+    slower = np.inf
     lost = _FIRST_LOSS * tolerance
     enough = _ENOUGH_SLOWER * tolerance
     for _ in range(_MESHES):
@@ -111,8 +114,9 @@ def follow(
         if needed < least:
             least = needed
             best = motion, violation
+        before = slower
         slower = needed / timing.t_end - 1.0
-        if slower < enough:
+        if slower < enough or abs(slower - before) < _STALLED * before:
             break
         wanted = 0.8 * enough / slower
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)

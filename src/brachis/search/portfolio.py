@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from brachis.common import interrupts, tolerances
-from brachis.common.arrays import interpolate_columns
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError, write_count
@@ -434,10 +433,7 @@ def _postures_of(candidate: Candidate) -> np.ndarray:
     program = candidate.program
     assert start is not None and program is not None
     if candidate.is_over_path:
-        curves = start.joint_path
-        s = np.linspace(0.0, 1.0, _COMPARED * len(start.problem.legs))
-        even = interpolate_columns(s, curves[:, 0], curves)
-        return start.joint_map.postures(even)
+        return start.postures_at_places(_COMPARED * len(start.problem.legs))
     motions = program.motions(candidate.reports[-1].x)
     found = []
     for phase, motion in zip(program.phases, motions, strict=True):

@@ -28,6 +28,10 @@ from brachis.timing import is_left_out
 
 _SAME_LEAST = 1.003
 """Least times that differ by less than this factor are the same."""
+_COMPARED = 49
+"""Even places at which joint paths are compared."""
+_SLOW = 1.03
+"""Times the least time that is slow."""
 
 
 def screen(
@@ -65,8 +69,8 @@ def screen(
     kept: list[InitialGuess] = []
     for start in sorted(solved, key=lambda start: start.estimate):
         ratio = start.estimate / kept[0].estimate if kept else 1.0
-        # Guesses slower than the fastest one by 3 % are left out, and so is the second half of equally fast ones.
-        is_slow = ratio > 1.03
+        # Of many, those slower than the fastest one are left out, and so is the second half of equally fast ones.
+        is_slow = ratio > _SLOW and len(solved) > most
         is_one_too_many = ratio <= _SAME_LEAST and len(kept) >= max(2, most // 2)
         is_known = any(_is_same(start, other) for other in kept)
         if not (is_slow or is_one_too_many or is_known) and len(kept) < most:
@@ -101,5 +105,5 @@ def _is_same(first: InitialGuess, second: InitialGuess) -> bool:
         return False
     if abs(first.estimate - second.estimate) > 0.02 * second.estimate:
         return False
-    postures = [start.joint_map.postures(start.joint_path) for start in (first, second)]
+    postures = [start.postures_at_places(_COMPARED) for start in (first, second)]
     return bool(np.abs(postures[0] - postures[1]).max() < 0.15)  # rad or m
