@@ -1,23 +1,20 @@
 """Splines along the fastest timing of a phase's joint path, within its limits.
 
 Splines follow a timing nearly (`timed_splines`). Where they exceed a limit, this is narrowed there by so much, and the
-joint path is timed anew. That leaves the motion as fast as possible, but new limits make new places at which
-accelerations jump. So what is left after a few times is slowed down instead: a factor f(p) < 1 of the rate dp/dt leaves
-f^2 of all accelerations, but for f f' (dp/dt)^2, and changes over about twice the way in which the motion could stop.
+joint path is timed anew, until the limits hold. That leaves the motion as fast as possible.
 
 Knots stand where accelerations jump. They stay there on the path, whatever its timing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
-from brachis.limits import Limit, Moments
+from brachis.limits import Limit
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
@@ -30,7 +27,7 @@ _FIRST_LOSS = 6.0
 """What the intervals may lose together at first, in tolerances."""
 _ENOUGH_SLOWER = 1.0
 """Tolerances by which splines may be slower than the timing."""
-_FINER = (0.03, 0.6)
+_FINER = (0.01, 0.6)
 """Smallest and largest factor of what they may lose, where that was too slow."""
 _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
@@ -44,19 +41,12 @@ _LOOKS = 8
 """Times in each interval at which limits are looked at."""
 _LOOKS_A_PIECE = 32
 """Times in each piece of a path."""
-_NARROWED = 14
-"""Timings with limits that are narrowed; what they leave is slowed down."""
-_ROUNDS = 40
-"""Splines that are laid, no more."""
+_ROUNDS = 20
+"""Splines that are laid over some knots, no more."""
+_PATIENCE = 3
+"""Rounds that may gain nothing, no more."""
 _ENOUGH = 5e-5
 """Violation of a limit, as a part of it, that is small enough."""
-_MORE = 1.2
-"""Part of what would do by which motions are slowed down: splines do not quite follow."""
-_MOST_SLOWED = 0.7
-"""Logarithm of the factor of the rate in one round, no more."""
-_LEASTQ = 0.1
-_QUICK = 0.9
-"""Part of the path on which accelerations are smaller than those by which the motion could stop."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +108,7 @@ def follow(
         slower = needed / timing.t_end - 1.0
         if slower < enough or abs(slower - before) < _STALLED * before:
             break
-        wanted = 0.8 * enough / slower
+        wanted = 0.5 * enough / slower
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
         return None
@@ -204,8 +194,10 @@ def _hold_limits(
     ]
     motion = _lay_splines(phase, own, timing, breaks)
     best = motion, np.inf
+    least = np.inf
+    idle = 0
     narrower: dict[Limit, np.ndarray] = {}
-    for number in range(_ROUNDS):
+    for _ in range(_ROUNDS):
         t_norm = _look_at(phase, motion, breaks)
         t = t_norm * motion.t_end
         try:
@@ -215,25 +207,20 @@ def _hold_limits(
         values = {limit: limit.values(state) for limit in limits}
         beyond = {limit: limit.violation(values[limit]).clip(0.0) for limit in limits}
         violation = max((each.max() for each in beyond.values()), default=0.0)
-        if motion.t_end * (1.0 + violation) < best[0].t_end * (1.0 + best[1]):
+        needed = motion.t_end * (1.0 + violation)
+        idle = 0 if needed < least * (1.0 - _ENOUGH) else idle + 1
+        if needed < least:
+            least = needed
             best = motion, float(violation)
-        if violation <= _ENOUGH:
+        if violation <= _ENOUGH or idle > _PATIENCE:
             break
-        slower: Timing | None
-        if number < _NARROWED:
-            for limit in limits:
-                excess = beyond[limit] / limit.violation_scale
-                more = _between_stations(excess, t_norm, breaks, timing)
-                narrower[limit] = narrower.get(limit, 0.0) + more
-            slower = own.course.solve(own.rates, narrower, most_acceleration)
-            if slower is None:
-                break
-        else:
-            at_rest = Moments.at_rest(state.q)
-            parts = _slow_down(values, beyond, at_rest)
-            slowing = _between_stations(parts, t_norm, breaks, timing)
-            factor = np.exp(-_fade(slowing, timing))
-            slower = Timing.of(timing.path, timing.rate * factor)
+        for limit in limits:
+            excess = beyond[limit] / limit.violation_scale
+            more = _between_stations(excess, t_norm, breaks, timing)
+            narrower[limit] = narrower.get(limit, 0.0) + more
+        slower = own.course.solve(own.rates, narrower, most_acceleration)
+        if slower is None:
+            break
         breaks = _move(breaks, timing, slower)
         timing = slower
         motion = _lay_splines(phase, own, timing, breaks)
@@ -245,26 +232,6 @@ def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
     places = np.interp(breaks, before.times / before.t_end, before.path.p)
     moved = np.interp(places, timing.path.p, timing.times / timing.t_end)
     return np.concatenate([[0.0], moved[1:-1], [1.0]])
-
-
-def _slow_down(
-    values: Mapping[Limit, np.ndarray],
-    beyond: Mapping[Limit, np.ndarray],
-    at_rest: Moments,
-) -> np.ndarray:
-    """Find by how much a motion has to be slower at every instant, (K, 1), as a logarithm.
-
-    What a limit measures at rest, as of gravity, it measures at any speed.
-    """
-    parts = [np.zeros((len(at_rest.q), 1))]
-    for limit, excess in beyond.items():
-        by_speed = np.abs(values[limit] - limit.values(at_rest)) * limit.violation_scale
-        order = min(max(limit.order, 1), 2)
-        part = np.divide(
-            excess, order * by_speed, out=np.zeros_like(excess), where=excess > 0.0
-        )
-        parts.append(part.max(axis=1, keepdims=True, initial=0.0))
-    return np.asarray(np.minimum(_MORE * np.max(parts, axis=0), _MOST_SLOWED))
 
 
 def _look_at(phase: Phase, motion: Motion, breaks: np.ndarray) -> np.ndarray:
@@ -299,17 +266,3 @@ def _between_stations(
     pairs = np.column_stack([first, np.maximum(last, first + 1)]).ravel()
     ended = np.pad(each, ((0, 1), (0, 0)))
     return np.asarray(np.maximum.reduceat(ended, pairs)[::2])
-
-
-def _fade(slower: np.ndarray, timing: Timing) -> np.ndarray:
-    """Spread slowing between stations, (P - 1, 1), over the stations, (P,): beside its places it fades."""
-    sizes = np.abs(timing.acceleration)
-    quick = np.maximum(sizes, _LEASTQ * np.quantile(sizes, _QUICK))
-    steps = np.diff(timing.path.p) / timing.middle_rate**2
-    way = np.append(0.0, np.cumsum(quick * steps))
-    beside = np.pad(slower[:, 0], 1)
-    with np.errstate(divide="ignore"):
-        own = np.log(np.maximum(beside[1:], beside[:-1]))
-    ahead = np.maximum.accumulate(own + way) - way
-    behind = np.maximum.accumulate((own - way)[::-1])[::-1] + way
-    return np.asarray(np.exp(np.maximum(ahead, behind)))

@@ -290,6 +290,8 @@ def lay_splines(
 
 def _follow_again(first: Followed, tolerance: float, points: int) -> Followed:
     """Follow the timing of the splines' own joint path, where these cut its curves so that it is faster."""
+    if not first.phase.joint_map.r:
+        return first
     t_end = first.phase.motion(first.x).t_end
     own = PhaseTiming.of(first.phase, first.x)
     if own is None or own.t_end > t_end * (1.0 - _WORTH * tolerance):
