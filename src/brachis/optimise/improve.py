@@ -269,7 +269,7 @@ class SolverSession:
     def roughly(self) -> SolverSession:
         """Return the session for answers that nearly hold the limits, and hardly get any faster."""
         iterations = min(_ROUGH_ITERATIONS, self.options.max_iterations)
-        rough = SolverOptions(1e-3, iterations, np.inf, progress=1e-3, patience=3)
+        rough = SolverOptions(3e-4, iterations, np.inf, progress=1e-3, patience=3)
         return dataclasses.replace(self, options=rough, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:

@@ -49,6 +49,8 @@ SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""
 _COMPARED = 49
 """Even times, or places, at which motions of a phase are compared."""
+_SAME_LATER = 4e-3
+"""Part of the end time by which a rough answer may be later, and be the same motion."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 
@@ -408,8 +410,9 @@ def round_end_time(time: float) -> float:
 
 def is_same_motion(first: Candidate, second: Candidate) -> bool:
     """Tell whether a solved candidate is the same motion as another, and not faster."""
-    # Splines of different measures of self-motion have different end times for the same motion.
-    slower = 3e-3 if first.in_chart else tolerances.END_TIME
+    # Splines of different measures of self-motion have different end times for the same motion, and some are rough.
+    is_rough = first.in_chart or first.is_over_path
+    slower = _SAME_LATER if is_rough else tolerances.END_TIME
     difference = first.coarse / second.coarse - 1.0
     if (
         first.redundant_joints != second.redundant_joints
