@@ -53,7 +53,7 @@ class InitialGuess(Summary):
     joint_path : (S, 1 + r) ndarray
         Successive values of the map's curves: s and the redundant joints, or s and the chart's sigma.
     estimate : float
-        Least time along the joint path from the phase plane, or of a quick solve, s; infinite where nobody knows.
+        Least time along the joint path from the phase plane, s; infinite where nobody knows.
     origin : str
         Where it is from, in plain words, for example ``lattice 2``.
     family : str

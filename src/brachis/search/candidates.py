@@ -1,18 +1,18 @@
 """What is done with an initial guess: it is solved, and, if it is worth it, refined and verified.
 
-1. `solve_candidate` solves from a joint path at the first collocation points.
-2. `finish_candidate` adapts the mesh, refines and verifies.
+1. `solve_candidate` solves over the path where its timing may be the plan (`timed`), else over time at the first
+   collocation points.
+2. `finish_candidate` improves the joint path and lays splines along its timing, or adapts the mesh and refines. Then it
+   verifies.
 
 In between, changes of the solved program are tried, and the better motion is kept (`improve`):
 
 Branch margins: near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early
 creeps along it. Far from it the solve is easy, and its answer is a good start for a smaller margin.
 
-Charts: a chart holds around its joint path. If a solve ends far from that path, the chart's rows may no longer be
-transversal, or the least singular value may hold the motion back. Then a new chart is laid around the motion, and the
-solve goes on in it. At the optimum any rows that are transversal along the motion describe the same motions, but
-splines of their coordinates are not the same curves: over the same knots one measure of self-motion may be a few parts
-in a thousand faster than another. So several choices of single joints are tried, and the best one is kept.
+Charts: at the optimum any rows that are transversal along the motion describe the same motions, but splines of their
+coordinates are not the same curves: over the same knots one measure of self-motion may be a few parts in a thousand
+faster than another. So several choices of single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
