@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
 import brachis
+from brachis.common.deadline import NEVER
 from brachis.optimise import retiming
+from brachis.optimise.backends import SolverOptions, solvers_for
+from brachis.optimise.improve import SolverSession
 from brachis.optimise.path_program import PathProgram
+from support.starts import starting_points
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +79,33 @@ def test_values_that_are_given_stay(programs):
     start = phase.phase.boundary.start[1].value
     assert phase.course(x, np.array([phase.ends[0]])).y[0, 1] == pytest.approx(start)
     assert x[0] == program.start[0]
+
+
+def improve(program):
+    """Improve a joint path by numeric inverse kinematics, roughly."""
+    (motion,) = program.motions(next(starting_points(program)))
+    curves = motion.at(np.linspace(0.0, motion.t_end, 201))[0]
+    (backend,) = solvers_for("uno")
+    session = SolverSession(backend, SolverOptions(), NEVER).roughly()
+    return retiming.improve_joint_paths(
+        program, [curves], session, 1e-3, retiming.ROUGH
+    )
+
+
+def test_a_periodic_motion_ends_where_it_begins():
+    program, _ = brachis.transcribe(ROOT / "examples/10_periodic_circle.yaml")
+    found = improve(program)
+    (curves,) = found.curves
+    assert curves[0, 1] == pytest.approx(curves[-1, 1], abs=1e-3)
+    assert found.reports[0].iterations > 1
+
+
+def test_limits_that_the_phase_plane_does_not_know_are_left_out():
+    task = brachis.load_task(brachis.examples.scara_line).to_dict()
+    limits = {**task["robot"].get("limits", {}), "jerk": 20.0}
+    slower = {**task, "robot": {**task["robot"], "limits": limits}}
+    times = [
+        improve(brachis.transcribe(each, redundant_joints=["j1"])[0]).t_end
+        for each in (task, slower)
+    ]
+    assert times[1] == pytest.approx(times[0], rel=5e-3)

@@ -66,6 +66,11 @@ class Followed:
     x: np.ndarray
     violation: float
 
+    @property
+    def needed(self) -> float:
+        """Time in which the limits would hold, about, s."""
+        return self.phase.motion(self.x).t_end * (1.0 + self.violation)
+
 
 def follow(
     phase: Phase, own: PhaseTiming, tolerance: float, points: int
@@ -204,8 +209,9 @@ def _hold_limits(
             state = phase.joint_map.state(*motion.at(t), t=t)
         except UnreachableError:
             break
-        values = {limit: limit.values(state) for limit in limits}
-        beyond = {limit: limit.violation(values[limit]).clip(0.0) for limit in limits}
+        beyond = {
+            limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
+        }
         violation = max((each.max() for each in beyond.values()), default=0.0)
         needed = motion.t_end * (1.0 + violation)
         idle = 0 if needed < least * (1.0 - _ENOUGH) else idle + 1

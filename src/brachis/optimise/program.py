@@ -407,5 +407,5 @@ class Program(Summary):
 
 
 def is_safeguard(limit: Limit) -> bool:
-    """Tell whether a limit keeps the solve on its branch, and is none of the robot's."""
+    """Tell whether a limit only keeps the solve on its branch."""
     return limit.role is Role.SAFEGUARD

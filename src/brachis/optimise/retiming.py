@@ -179,7 +179,7 @@ def improve_joint_paths(
     Parameters
     ----------
     program : Program
-        Of which `is_timing_all` holds, over any knots.
+        Over any knots. Limits that the phase plane does not know are left out.
     curves : sequence of (S, c) ndarray
         Of every phase: s, ascending, and the redundant curves.
     solve : SolverSession
@@ -197,6 +197,10 @@ def improve_joint_paths(
     UnreachableError
         Curves leave the joint map.
     """
+    program = program.with_phases(
+        phase.with_limits([own for own in phase.limits if not is_left_out(own)])
+        for phase in program.phases
+    )
     pairs = zip(program.phases, curves, strict=True)
     timings = [PhaseTiming.through(*pair, effort.places) for pair in pairs]
     best = BetterPaths(tuple(curves), tuple(timings))
@@ -292,11 +296,8 @@ def _follow_again(first: Followed, tolerance: float, points: int) -> Followed:
     """Follow the timing of the splines' own joint path, where these cut its curves so that it is faster."""
     if not first.phase.joint_map.r:
         return first
-    t_end = first.phase.motion(first.x).t_end
     own = PhaseTiming.of(first.phase, first.x)
-    if own is None or own.t_end > t_end * (1.0 - _WORTH * tolerance):
+    if own is None or own.t_end > first.needed * (1.0 - _WORTH * tolerance):
         return first
     again = follow(first.phase, own, tolerance, points)
-    if again is None or again.phase.motion(again.x).t_end > t_end:
-        return first
-    return again
+    return first if again is None or again.needed > first.needed else again

@@ -83,7 +83,8 @@ def improve_guess(
     found = improve_joint_paths(program, start.legs, solve, tolerance, effort)
     better = BetterGuess(_along(start, found), program, found)
     # A chart around a motion that is given is kept.
-    charts = _CHARTS if start.in_chart and start.durations is None else 1
+    is_free = start.in_chart and start.durations is None
+    charts = _CHARTS if is_free and better.start.is_improved else 1
     for _ in range(1, charts):
         moved = _lay_chart(better)
         if moved is None or solve.deadline.passed:

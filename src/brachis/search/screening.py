@@ -24,7 +24,6 @@ from brachis.optimise.transcription import breaks_of, program_of
 from brachis.search.over_path import improve_guess
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.timed import solvers_of
-from brachis.timing import is_left_out
 
 _SAME_LEAST = 1.003
 """Least times that differ by less than this factor are the same."""
@@ -86,17 +85,15 @@ def _improve(
     if deadline.passed:
         return hopeless
     problem = start.problem
-    known = [limit for limit in problem.limits if not is_left_out(limit)]
-    easier = dataclasses.replace(problem, limits=tuple(known))
     (backend,) = solvers_for(solvers_of(problem)[0])
     session = SolverSession(backend, SolverOptions(), deadline).roughly()
     try:
         maps = start.maps_by_leg()
-        program = program_of(easier, maps, [breaks_of(problem)] * len(maps))
+        program = program_of(problem, maps, [breaks_of(problem)] * len(maps))
         better = improve_guess(start, program, session, ROUGH)
     except (ImportError, UnreachableError):  # the plan says which backend is missing
         return hopeless
-    return better.start if np.isfinite(better.found.t_end) else hopeless
+    return better.start if better.start.is_improved else hopeless
 
 
 def _is_same(first: InitialGuess, second: InitialGuess) -> bool:
