@@ -282,7 +282,12 @@ class LocalBasis:
     def curves(self, control_points: np.ndarray) -> np.ndarray:
         """Value and three derivatives (4, K, c) of c splines with control points (c, N + d)."""
         points = control_points[:, self.columns]
-        return np.asarray(np.einsum("okw,ckw->okc", self.values, points))
+        # From the nearest point, so that derivatives where points are equal vanish, without rounding.
+        nearest = self.values[0].argmax(axis=1)[None, :, None]
+        beside = np.take_along_axis(points, nearest, axis=2)
+        found = np.einsum("okw,ckw->okc", self.values, points - beside)
+        found[0] += beside[:, :, 0].T
+        return np.asarray(found)
 
 
 @dataclass(frozen=True)

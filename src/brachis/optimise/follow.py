@@ -25,28 +25,28 @@ from brachis.timing import Timing
 
 _FIRST_LOSS = 6.0
 """What the intervals may lose together at first, in tolerances."""
-_ENOUGH_SLOWER = 1.0
-"""Tolerances by which splines may be slower than the timing."""
-_FINER = (0.01, 0.6)
-"""Smallest and largest factor of what they may lose, where that was too slow."""
+_AIM = 0.7
+"""Part of the tolerance that the next mesh should lose."""
+_FINER = (0.02, 0.5)
+"""Smallest and largest factor of what intervals may lose, where a mesh was too slow."""
 _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
-_STALLED = 0.15
-"""Part of the slowness by which it has to change from mesh to mesh if more are to be tried."""
-_MESHES = 4
+_MESHES = 6
 """Choices of knots that are tried, no more."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
 _LOOKS = 8
 """Times in each interval at which limits are looked at."""
-_LOOKS_A_PIECE = 32
-"""Times in each piece of a path."""
 _ROUNDS = 20
 """Splines that are laid over some knots, no more."""
 _PATIENCE = 3
 """Rounds that may gain nothing, no more."""
 _ENOUGH = 5e-5
 """Violation of a limit, as a part of it, that is small enough."""
+_SMALL = 0.01
+"""Violation from which on limits are narrowed by no more than it."""
+_MORE = 1.5
+"""Times a smaller one by which they are: splines give way by less than limits do."""
 
 
 @dataclass(frozen=True)
@@ -95,29 +95,23 @@ def follow(
     timing = own.without_spikes().timing
     if timing is None:
         return None
-    best: tuple[Motion, float] | None = None
-    least = np.inf
-    slower = np.inf
+    best = None
     lost = _FIRST_LOSS * tolerance
-    enough = _ENOUGH_SLOWER * tolerance
-    for _ in range(_MESHES):
+    for number in range(1, _MESHES + 1):
         breaks = _knots(phase, own, timing, lost)
         if len(breaks) > _MOST_INTERVALS:
             break
-        motion, violation = _hold_limits(phase, own, timing, breaks)
-        needed = motion.t_end * (1.0 + violation)
-        if needed < least:
-            least = needed
-            best = motion, violation
-        before = slower
-        slower = needed / timing.t_end - 1.0
-        if slower < enough or abs(slower - before) < _STALLED * before:
+        allowed = tolerance if number < _MESHES else np.inf
+        laid = _hold_limits(phase, own, timing, breaks, allowed)
+        if best is None or laid.needed < best.needed:
+            best = laid
+        if laid.slower < tolerance:
             break
-        wanted = 0.5 * enough / slower
+        wanted = _AIM * tolerance / laid.slower
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
         return None
-    return Followed(*_as_phase(phase, best[0], points), best[1])
+    return Followed(*_as_phase(phase, best.motion, points), best.violation)
 
 
 def begin(
@@ -187,50 +181,81 @@ def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndar
     return finer, finer.variables_from(motion)
 
 
+@dataclass(frozen=True)
+class _Laid:
+    """Splines over some knots.
+
+    Attributes
+    ----------
+    motion : Motion
+    violation : float
+        Largest violation of a limit; infinite if it is not known.
+    slower : float
+        Part of the time by which these knots make the motion slower, at least; infinite where limits cannot hold.
+    """
+
+    motion: Motion
+    violation: float = np.inf
+    slower: float = np.inf
+
+    @property
+    def needed(self) -> float:
+        """Time in which the limits would hold, about, s."""
+        return self.motion.t_end * (1.0 + self.violation)
+
+
 def _hold_limits(
-    phase: Phase, own: PhaseTiming, timing: Timing, breaks: np.ndarray
-) -> tuple[Motion, float]:
-    """Lay splines until the limits hold: the best motion, and its largest violation; infinite if it is not known."""
-    most_acceleration = largest_acceleration(timing)
+    phase: Phase,
+    own: PhaseTiming,
+    fastest: Timing,
+    breaks: np.ndarray,
+    allowed: float,
+) -> _Laid:
+    """Lay splines until the limits hold, or until they are slower by more than a part `allowed` of the time."""
+    most_acceleration = largest_acceleration(fastest)
     limits = [
         limit
         for limit in phase.limits
         if is_checked_at_points(limit) and limit.longer_time == "relieves"
     ]
-    motion = _lay_splines(phase, own, timing, breaks)
-    best = motion, np.inf
-    least = np.inf
+    timing = fastest
+    best = _Laid(_lay_splines(phase, own, timing, breaks))
+    motion = best.motion
     idle = 0
     narrower: dict[Limit, np.ndarray] = {}
     for _ in range(_ROUNDS):
-        t_norm = _look_at(phase, motion, breaks)
+        t_norm = _look_at(breaks, timing)
         t = t_norm * motion.t_end
         try:
             state = phase.joint_map.state(*motion.at(t), t=t)
         except UnreachableError:
-            break
+            return best
         beyond = {
             limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
         }
         violation = max((each.max() for each in beyond.values()), default=0.0)
-        needed = motion.t_end * (1.0 + violation)
-        idle = 0 if needed < least * (1.0 - _ENOUGH) else idle + 1
-        if needed < least:
-            least = needed
-            best = motion, float(violation)
+        laid = _Laid(motion, float(violation))
+        idle = 0 if laid.needed < best.needed * (1.0 - _ENOUGH) else idle + 1
+        if laid.needed < best.needed:
+            best = laid
+        slower = motion.t_end / fastest.t_end - 1.0
+        if slower > allowed:
+            return replace(best, slower=slower)
         if violation <= _ENOUGH or idle > _PATIENCE:
             break
+        factor = _MORE if narrower else 1.0
         for limit in limits:
-            excess = beyond[limit] / limit.violation_scale
-            more = _between_stations(excess, t_norm, breaks, timing)
-            narrower[limit] = narrower.get(limit, 0.0) + more
-        slower = own.course.solve(own.rates, narrower, most_acceleration)
-        if slower is None:
-            break
-        breaks = _move(breaks, timing, slower)
-        timing = slower
+            more = np.where(beyond[limit] < _SMALL, factor, 1.0)
+            excess = more * beyond[limit] / limit.violation_scale
+            added = _between_stations(excess, t_norm, breaks, timing)
+            narrower[limit] = narrower.get(limit, 0.0) + added
+        next_timing = own.course.solve(own.rates, narrower, most_acceleration)
+        if next_timing is None:
+            return best
+        breaks = _move(breaks, timing, next_timing)
+        timing = next_timing
         motion = _lay_splines(phase, own, timing, breaks)
-    return best
+    return replace(best, slower=best.needed / fastest.t_end - 1.0)
 
 
 def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
@@ -240,35 +265,27 @@ def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
     return np.concatenate([[0.0], moved[1:-1], [1.0]])
 
 
-def _look_at(phase: Phase, motion: Motion, breaks: np.ndarray) -> np.ndarray:
-    """List normalised times at which limits are looked at: in every knot interval, and in every piece of the path."""
-    t_norm = spread(breaks, _LOOKS)
-    path = phase.joint_map.path
-    if path is None or len(path.breaks) < 3:
-        return t_norm
-    s = np.maximum.accumulate(motion.at(t_norm * motion.t_end)[0][:, 0])
-    inside = path.breaks[(path.breaks > s[0]) & (path.breaks < s[-1])]
-    if not len(inside):
-        return t_norm
-    ends = np.concatenate([s[:1], inside, s[-1:]])
-    # Closer together beside the ends, where the curvature changes.
-    part = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _LOOKS_A_PIECE + 1))
-    pieces = ends[:-1, None] + np.diff(ends)[:, None] * part
-    return np.union1d(t_norm, np.interp(pieces.ravel(), s, t_norm))
+def _look_at(breaks: np.ndarray, timing: Timing) -> np.ndarray:
+    """List normalised times at which limits are looked at: in every knot interval, and where the path turns."""
+    t = timing.times / timing.t_end
+    return np.unique(
+        np.concatenate([spread(breaks, _LOOKS), t, 0.5 * (t[1:] + t[:-1])])
+    )
 
 
 def _between_stations(
     values: np.ndarray, t_norm: np.ndarray, breaks: np.ndarray, timing: Timing
 ) -> np.ndarray:
-    """Take the largest of values, (K, c), in the knot intervals between stations, (P - 1, c)."""
-    each = np.zeros((len(breaks) - 1, values.shape[1]))
-    for side in ("left", "right"):
-        interval = np.searchsorted(breaks, t_norm, side=side) - 1
-        np.maximum.at(each, interval.clip(0, len(each) - 1), values)
-    t_norm = timing.times / timing.t_end
-    first = np.searchsorted(breaks, t_norm[:-1], side="right") - 1
-    last = np.searchsorted(breaks, t_norm[1:], side="left")
-    first = np.clip(first, 0, len(each) - 1)
-    pairs = np.column_stack([first, np.maximum(last, first + 1)]).ravel()
-    ended = np.pad(each, ((0, 1), (0, 0)))
-    return np.asarray(np.maximum.reduceat(ended, pairs)[::2])
+    """Lay lines above values, (K, c), over the knot intervals, and take them between stations, (P - 1, c)."""
+    most = np.zeros((len(breaks) + 1, values.shape[1]))
+    np.maximum.at(most, np.searchsorted(breaks, t_norm, side="left"), values)
+    np.maximum.at(most, np.searchsorted(breaks, t_norm, side="right"), values)
+    at_breaks = np.maximum(most[1:], most[:-1])
+    t = timing.times / timing.t_end
+    first = (np.searchsorted(breaks, t, side="right") - 1).clip(0, len(breaks) - 2)
+    part = ((t - breaks[first]) / np.diff(breaks)[first])[:, None]
+    lines = (1.0 - part) * at_breaks[first] + part * at_breaks[first + 1]
+    found = np.maximum(lines[1:], lines[:-1])
+    station = (np.searchsorted(t, breaks, side="right") - 1).clip(0, len(found) - 1)
+    np.maximum.at(found, station, at_breaks)
+    return found

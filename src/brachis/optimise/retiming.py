@@ -57,7 +57,7 @@ class PathEffort:
 
 ROUGH = PathEffort((16,), 56, 800, MARGINS[1])
 """To rank joint paths, clear of branch boundaries."""
-FINE = PathEffort((32, 64, 128), 120, PLACES, MARGIN)
+FINE = PathEffort((32, 64, 128, 256), 120, PLACES, MARGIN)
 """For a plan, from the answer of a rough search."""
 
 
