@@ -27,16 +27,16 @@ _FIRST_LOSS = 6.0
 """What the intervals may lose together at first, in tolerances."""
 _AIM = 0.7
 """Part of the tolerance that the next mesh should lose."""
-_FINER = (0.02, 0.5)
+_FINER = (0.02, 0.2)
 """Smallest and largest factor of what intervals may lose, where a mesh was too slow."""
 _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
-_MESHES = 6
+_MESHES = 5
 """Choices of knots that are tried, no more."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
-_LOOKS = 8
-"""Times in each interval at which limits are looked at."""
+_LOOKS = (4, 10)
+"""Times in each interval at which limits are looked at: at first, and once they hold there."""
 _ROUNDS = 20
 """Splines that are laid over some knots, no more."""
 _PATIENCE = 3
@@ -222,9 +222,10 @@ def _hold_limits(
     best = _Laid(_lay_splines(phase, own, timing, breaks))
     motion = best.motion
     idle = 0
+    looks, closer = _LOOKS
     narrower: dict[Limit, np.ndarray] = {}
     for _ in range(_ROUNDS):
-        t_norm = _look_at(breaks, timing)
+        t_norm = np.union1d(spread(breaks, looks), timing.times / timing.t_end)
         t = t_norm * motion.t_end
         try:
             state = phase.joint_map.state(*motion.at(t), t=t)
@@ -241,6 +242,10 @@ def _hold_limits(
         slower = motion.t_end / fastest.t_end - 1.0
         if slower > allowed:
             return replace(best, slower=slower)
+        if violation <= _ENOUGH and looks < closer:
+            looks = closer
+            best = replace(best, violation=np.inf)
+            continue
         if violation <= _ENOUGH or idle > _PATIENCE:
             break
         factor = _MORE if narrower else 1.0
@@ -263,14 +268,6 @@ def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
     places = np.interp(breaks, before.times / before.t_end, before.path.p)
     moved = np.interp(places, timing.path.p, timing.times / timing.t_end)
     return np.concatenate([[0.0], moved[1:-1], [1.0]])
-
-
-def _look_at(breaks: np.ndarray, timing: Timing) -> np.ndarray:
-    """List normalised times at which limits are looked at: in every knot interval, and where the path turns."""
-    t = timing.times / timing.t_end
-    return np.unique(
-        np.concatenate([spread(breaks, _LOOKS), t, 0.5 * (t[1:] + t[:-1])])
-    )
 
 
 def _between_stations(
