@@ -184,7 +184,7 @@ def improve_joint_paths(
         Of every phase: s, ascending, and the redundant curves.
     solve : SolverSession
     tolerance : float
-        Splines get more intervals as long as that gains half of this part of the time.
+        Splines get more intervals as long as that gains this part of the time.
     effort : PathEffort
 
     Returns
@@ -211,7 +211,7 @@ def improve_joint_paths(
         if not np.isfinite(before) or solve.deadline.passed:
             break
         best = _better(program.with_margin(effort.margin), best, solve, count, effort)
-        if not best.is_credible or best.t_end > before * (1.0 - 0.5 * tolerance):
+        if not best.is_credible or best.t_end > before * (1.0 - tolerance):
             break
     return best
 
