@@ -198,18 +198,22 @@ def seams() -> list[Row]:
                 "tolerance": tolerance,
                 "corner": "blend",
             }
+            name = f"seam {seed}, {len(position)} points, corners {corner:g} mm"
             began = processor_time()
-            result = brachis.plan(
-                "tx90l_rail",
-                path=[{"csv": points}],
-                start="free",
-                task_space="pose",
-                least_motion=False,
-            )
-            seconds = processor_time() - began
-            rows.append(
-                _planned(f"seam {seed}, corners {corner:g} mm", result, seconds)
-            )
+            try:
+                result = brachis.plan(
+                    "tx90l_rail",
+                    path=[{"csv": points}],
+                    start="free",
+                    task_space="pose",
+                    least_motion=False,
+                )
+            except brachis.BrachisError as error:
+                row = name, f"refused: {str(error)[:60]}", "", "", ""
+            else:
+                row = _planned(name, result, processor_time() - began)
+            rows.append(row)
+            print(" | ".join(row), flush=True)
     return rows
 
 

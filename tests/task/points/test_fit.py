@@ -127,6 +127,20 @@ def test_corners_are_found_where_they_are(count, scatter, allowed):
     assert curves[-1].blend is None
 
 
+def test_corners_between_bends_are_found_however_far_they_may_be_rounded():
+    """Lines as long as the tolerance of corners would meet beside the corner, by ten times the scatter."""
+    t = np.linspace(0.0, 1.0, 8_001)
+    heading = np.where(t > 0.5, 0.9, 0.0) + 0.6 * np.sin(9.0 * t)
+    steps = 0.5 / 8_000 * np.column_stack([np.cos(heading), np.sin(heading)])
+    position = np.cumsum(steps[:-1], axis=0)
+    place = position[4_000]
+    position += np.random.default_rng(0).normal(size=position.shape) * 0.01 * MM
+    curves, _ = fit_curves(points(position), tolerance(0.06 * MM, corner=5.0 * MM))
+    assert len(curves) == 2
+    end = curves[0].spline(curves[0].spline.t[-1])
+    assert np.linalg.norm(end - place) < 0.08 * MM
+
+
 def test_smooth_points_have_no_corners():
     angle = np.linspace(0.0, 2.0 * np.pi, 13)
     circle = 0.3 * np.column_stack([np.cos(angle), np.sin(angle)])

@@ -63,7 +63,8 @@ def find_corners(
     spacing = u[-1] / (len(points) - 1)
     direction = 0.02  # rad: what scatter may do to a direction
     for_direction = 12.0 * spacing * (scatter.deviation / direction) ** 2
-    width = max(for_direction ** (1.0 / 3.0), 2.0 * tolerance)
+    near = for_direction ** (1.0 / 3.0)
+    width = max(near, 2.0 * tolerance)
     least = 4 if noisy else 1
     angle, uncertainty = _turning(points.position, u, width, least)
     wide, _ = _turning(points.position, u, 2.0 * width, 2 * least)
@@ -73,8 +74,9 @@ def find_corners(
     sharp |= angle > np.deg2rad(50.0)
     sharp &= angle > np.maximum(LEAST_ANGLE, 8.0 * scatter.deviation * uncertainty)
     peaks = _peaks(angle, sharp, u, width, least)
+    # Lines that are longer than scatter asks for miss the corner where the path bends.
     return tuple(
-        _locate(points, u, i, float(angle[i]), width, least, tolerance / 4.0)
+        _locate(points, u, i, float(angle[i]), near, least, tolerance / 4.0)
         for i in peaks
     )
 
