@@ -23,11 +23,11 @@ from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
 
-_FIRST_LOSS = 6.0
+_FIRST_LOSS = 5.0
 """What the intervals may lose together at first, in tolerances."""
 _AIM = 0.7
 """Part of the tolerance that the next mesh should lose."""
-_FINER = (0.02, 0.2)
+_FINER = (0.02, 0.35)
 """Smallest and largest factor of what intervals may lose, where a mesh was too slow."""
 _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
