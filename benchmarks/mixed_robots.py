@@ -40,7 +40,9 @@ def planar_chain(lengths: tuple[float, ...]) -> str:
         inertia = 10.0 * length**3 / 12.0
         parts.append(
             f'<link name="link{i}"><inertial><origin xyz="{0.5 * length} 0 0"/><mass value="{10.0 * length}"/>'
-            f'<inertia ixx="0" ixy="0" ixz="0" iyy="{inertia}" iyz="0" izz="{inertia}"/></inertial></link>'
+            f'<inertia ixx="0" ixy="0" ixz="0" iyy="{inertia}" iyz="0" izz="{inertia}"/></inertial>'
+            f'<collision><origin xyz="{0.5 * length} 0 {0.1 * i:g}"/>'
+            f'<geometry><box size="{length} 0.06 0.05"/></geometry></collision></link>'
             f'<joint name="j{i}" type="continuous"><parent link="link{i - 1}"/><child link="link{i}"/>'
             f'<origin xyz="{lengths[i - 2] if i > 1 else 0.0} 0 0"/><axis xyz="0 0 1"/>'
             '<limit effort="10" velocity="100"/></joint>'

@@ -100,9 +100,7 @@ def ur10_rail() -> str:
         element.remove(joint)
         element.remove(element.find(f"link[@name='{name}']"))
     for name, visuals in figures["visuals"].items():
-        element.find(f"link[@name='{name}']").extend(
-            visual_of(each) for each in visuals
-        )
+        element.find(f"link[@name='{name}']").extend(shapes_of(visuals))
     return commented(element)
 
 
@@ -139,7 +137,7 @@ def robot(
     """Text of the URDF with the links and visuals of `figures` and the given joints."""
     element = etree.Element("robot", name=name)
     for link, inertial in figures["links"].items():
-        parts = [visual_of(each) for each in figures["visuals"].get(link, [])]
+        parts = shapes_of(figures["visuals"].get(link, []))
         if inertial:
             parts.insert(
                 0,
@@ -188,6 +186,15 @@ def joint_of(figures: Mapping[str, Any]) -> Element:
         axis=figures.get("axis"),
         limit=limit,
     )
+
+
+def shapes_of(figures: Sequence[Mapping[str, Any]]) -> list[Element]:
+    """Primitives that are drawn, and then, without the balls that mark tools, those that must not touch anything."""
+    drawn = [visual_of(each) for each in figures]
+    solid = [
+        elements.collision(each) for each in drawn if each.find(".//sphere") is None
+    ]
+    return [*drawn, *solid]
 
 
 def visual_of(figures: Mapping[str, Any]) -> Element:

@@ -27,6 +27,7 @@ ORDER = (
     "common",
     "task",
     "robot",
+    "scene",
     "robots",
     "examples",
     "path",

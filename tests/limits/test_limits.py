@@ -18,6 +18,7 @@ from brachis.limits import (
 )
 from brachis.robot import dynamics
 from brachis.task import LimitSpec, SpeedTable, ToolLimits
+from brachis.task.scene import CollisionSettings, SceneBody
 from support.chains import planar_robot
 from support.phases import FRICTION
 
@@ -42,7 +43,16 @@ TOOL = ToolLimits(
     acceleration=2.0,
     angular_speed=1.5,
 )
-TASK = SimpleNamespace(tool_limits=TOOL, custom_limits={})
+SCENE = (
+    SceneBody(name="post", box=(0.3, 0.2, 0.4), position=(0.9, 0.3, 0.5)),
+    SceneBody(name="ball", sphere=0.1, position=(-0.4, 0.2, 0.4)),
+)
+TASK = SimpleNamespace(
+    tool_limits=TOOL,
+    custom_limits={},
+    scene=SCENE,
+    collisions=CollisionSettings(capsules="auto"),
+)
 RNG = np.random.default_rng(3)
 # The path coordinates lie off all kinks.
 STATES = Moments(
@@ -97,7 +107,7 @@ def test_every_value_has_a_label_and_a_figure(limit):
     assert len(limit.labels) == len(limit.upper) == count
     assert len({str(label) for label in limit.labels}) == count
     assert all(
-        label.unit and label.key.split(".")[0] in ("robot", "tool_limits")
+        label.unit and label.key.split(".")[0] in ("robot", "tool_limits", "collisions")
         for label in limit.labels
     )
     assert {bound.column for bound in limit.bounds} == set(range(count))
@@ -137,7 +147,12 @@ def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     assert kinds == [
         kind for kind in TABLE if kind not in ("acceleration", "jerk", "torque_rate")
     ]
-    open_task = SimpleNamespace(tool_limits=ToolLimits(), custom_limits={})
+    open_task = SimpleNamespace(
+        tool_limits=ToolLimits(),
+        custom_limits={},
+        scene=(),
+        collisions=CollisionSettings(),
+    )
     kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
     assert kinds == ["torque", "velocity", "position"]
 

@@ -22,6 +22,7 @@ def mujoco_model(robot):
         r'ixx="0(\.0)?"', 'ixx="1e-12"', text
     )  # slender rods, which MuJoCo refuses, turn about z alone
     model = mujoco.MjModel.from_xml_string(text)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     model.opt.gravity[:] = robot.model.gravity.linear
     order = [model.joint(name).qposadr[0] for name in robot.joint_names]
     assert sorted(order) == list(range(model.nq))

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from brachis.limits.checks import build_user_limits
+from brachis.limits.clearance import build_clearance
 from brachis.limits.drives import build_torque_speed, build_total_power
 from brachis.limits.joint import JOINT_LIMITS
 from brachis.limits.protocol import (
@@ -60,6 +61,7 @@ TABLE: dict[str, Build] = {}
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_LIMITS[_kind].build
     TABLE |= _AFTER.get(_kind, {})
+TABLE["clearance"] = build_clearance
 
 
 def limits_of(

@@ -275,6 +275,16 @@ class Limit(Description, ABC):
     def partials(self, motion: JointStates) -> Partials:
         """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
 
+    def near(self, q: np.ndarray) -> Limit | None:
+        """Return what matters of it while the motion stays near postures, (K, n); None where nothing does."""
+        del q
+        return self
+
+    def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
+        """Tell in which postures, (K, n), it holds within a violation of `slack` while the arm rests, (K,)."""
+        values = self.values(Moments.at_rest(q))
+        return np.all(self.violation(values) <= slack, axis=1)
+
     def relax(self, bound: Bound, amount: float) -> Self:
         """Return the limit with one figure relaxed by `amount`, in its unit."""
         other = copy.copy(self)

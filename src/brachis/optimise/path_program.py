@@ -20,7 +20,7 @@ from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
 from brachis.optimise.bspline import basis_matrix, clamped_knots, local_basis
-from brachis.optimise.evaluator import Evaluation
+from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Link, is_safeguard
@@ -106,7 +106,9 @@ class PathPhase:
         self._set_variables(squares, points)
         if phase.time_law is None:
             self._begin_within_limits()
-        limits = phase.limits
+        near = [limit.near(phase.joint_map.postures(curves)) for limit in phase.limits]
+        limits = [limit for limit in near if limit is not None]
+        self._evaluator = Evaluator(phase.joint_map, limits)
         lower = np.concatenate([limit.lower for limit in limits])
         upper = np.concatenate([limit.upper for limit in limits])
         self.lower = np.tile(lower, len(middles))
@@ -195,7 +197,7 @@ class PathPhase:
             y, y_ds, y_dds, mean, u = self._motion(x)
             orders = (y, y_ds * np.sqrt(mean), y_dds * mean + y_ds * u, 0.0 * y)
             t = self._middles - self._begin
-            self._last = (key, self.phase.evaluator.evaluate(*orders, t=t))
+            self._last = (key, self._evaluator.evaluate(*orders, t=t))
         return self._last[1]
 
     def time(self, x: np.ndarray) -> float:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from brachis.common.summary import Summary
 from brachis.errors import InputError
 from brachis.robot.urdf_elements import Element, UrdfTree, end_of, number_of, numbers_of
+from brachis.task import Placement
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,11 +58,15 @@ class UrdfDynamics(Summary):
         Placement of the tool frame in the frame of the last joint.
     friction : dict of str to (n,) ndarray
         ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N. Zero by default.
+    links : dict of str to tuple of int and (4, 4) ndarray
+        Of every link the number of the joint that moves it, from 1 on, and its placement in the joint's frame; 0 and
+        the placement in the root link where none does.
     """
 
     bodies: tuple[Body, ...]
     tool: np.ndarray
     friction: dict[str, np.ndarray]
+    links: dict[str, tuple[int, np.ndarray]]
 
 
 def read_dynamics(
@@ -89,7 +94,7 @@ def read_dynamics(
         name = tree.above[link]
         joint = tree.joints[name]
         parent = end_of(joint, "parent")
-        placement = placements[parent] @ _origin(joint, "origin")
+        placement = placements[parent] @ origin_of(joint, "origin")
         if name in chain:
             carriers[link] = name
             placements[link] = np.eye(4)
@@ -110,7 +115,9 @@ def read_dynamics(
         )
         for kind, word in (("viscous", "damping"), ("coulomb", "friction"))
     }
-    return UrdfDynamics(tuple(bodies), placements[tool], friction)
+    numbers = {None: 0} | {name: i for i, name in enumerate(chain, 1)}
+    carried = {link: (numbers[carriers[link]], placements[link]) for link in tree.links}
+    return UrdfDynamics(tuple(bodies), placements[tool], friction, carried)
 
 
 def _read_body(
@@ -125,7 +132,7 @@ def _read_body(
         inertial = tree.links[link].find("inertial")
         if inertial is None:
             continue
-        frame = placed @ _origin(inertial, "origin")
+        frame = placed @ origin_of(inertial, "origin")
         rotation = frame[:3, :3]
         lever = frame[:3, 3]
         weight = number_of(inertial, "mass", "value", 0.0)
@@ -145,6 +152,15 @@ def _read_body(
         com=com,
         inertia=second - mass * _spread(com),
     )
+
+
+def placement_matrix(placement: Placement) -> np.ndarray:
+    """Return a placement as a (4, 4) matrix."""
+    matrix = np.eye(4)
+    turn = Rotation.from_euler("xyz", placement.rpy_deg, degrees=True)
+    matrix[:3, :3] = turn.as_matrix()
+    matrix[:3, 3] = placement.xyz
+    return matrix
 
 
 def _axis(joint: Element) -> np.ndarray:
@@ -191,8 +207,8 @@ def _spread(lever: np.ndarray) -> np.ndarray:
     return np.asarray(np.dot(lever, lever) * np.eye(3) - np.outer(lever, lever))
 
 
-def _origin(owner: Element, path: str) -> np.ndarray:
-    """Placement, (4, 4), that an origin describes: roll, pitch and yaw about fixed axes."""
+def origin_of(owner: Element, path: str) -> np.ndarray:
+    """Return the placement, (4, 4), that an origin describes: roll, pitch and yaw about fixed axes."""
     placed = np.eye(4)
     angles = numbers_of(owner, path, "rpy", "0 0 0")
     placed[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()

@@ -30,7 +30,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.limits import HasLatticeWeights, Moments
+from brachis.limits import HasLatticeWeights
 from brachis.path import Path
 from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
@@ -322,12 +322,11 @@ class Lattice(ABC):
 
     def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
         """Choose among the nodes that can be held against gravity, or tell what refuses them."""
-        still = Moments.at_rest(layer.q)
         held = np.ones(len(layer.q), dtype=bool)
         cause = ""
         for limit in self.problem.limits:
             if limit.at_rest == "posture":
-                allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)
+                allowed = limit.holds_at_rest(layer.q, _SLACK)
                 held &= allowed
                 if not (cause or allowed.all()):
                     cause = f"the {limit.name} limit {limit.refusal}"

@@ -13,6 +13,7 @@ from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task
 from brachis.task.orientation import ToolPose, Transform
+from brachis.task.scene import CollisionSettings, SceneBody
 from brachis.task.segments import SegmentModel
 from brachis.task.settings import (
     BoundarySettings,
@@ -59,6 +60,8 @@ class TaskKeywords(TypedDict, total=False):
     redundant_joints: Sequence[str] | Literal["auto"]
     branch: str
     tool_limits: ToolLimits | Settings
+    scene: Sequence[SceneBody | Settings] | Settings
+    collisions: CollisionSettings | Settings
     custom_limits: Mapping[str, Settings]
     strict: bool | None
     # robot

@@ -34,6 +34,7 @@ from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import ToolPose
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
+from brachis.task.scene import CollisionSettings, SceneBody, bodies_by_name
 from brachis.task.segments import (
     CsvSegment,
     Segment,
@@ -174,6 +175,10 @@ class Task(Model):
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
     """Limits on the motion of the tool."""
+    scene: Annotated[tuple[SceneBody, ...], BeforeValidator(bodies_by_name)] = ()
+    """Bodies around the robot and on it, which it keeps clear of."""
+    collisions: CollisionSettings = Field(default_factory=CollisionSettings)
+    """How it keeps clear of them and of itself."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"

@@ -23,8 +23,7 @@ import numpy as np
 
 from brachis.common.arrays import cross, rates
 from brachis.robot import Robot
-from brachis.robot.urdf_bodies import Body
-from brachis.task import Placement
+from brachis.robot.urdf_bodies import Body, placement_matrix
 
 _AXES = np.eye(3)
 
@@ -49,7 +48,7 @@ class _Weight:
 
 def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n)."""
-    tool = robot.urdf_dynamics.tool @ _matrix(robot.settings.tool_offset)
+    tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
     roll = q[:, -1] if robot.rolls_freely else np.zeros(len(q))
     axes = [_rotate(_AXES[2], roll, axis[:, None] + 0.0 * roll) for axis in _AXES]
     # The tool's axes and its origin, (3, K) each, in the frame of one joint after the other.
@@ -62,10 +61,46 @@ def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray
             vectors[3] = vectors[3] + body.axis[:, None] * position
         vectors = _to_parent(body, position, *vectors)
         vectors[3] = vectors[3] + body.placement[:3, 3, None]
-    base = _matrix(robot.settings.mounting)
+    base = placement_matrix(robot.settings.mounting)
     *turned, origin = (base[:3, :3] @ part for part in vectors)
     rotations = np.moveaxis(np.stack(turned, axis=1), 2, 0)
     return (origin + base[:3, 3, None]).T, rotations
+
+
+def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and of all joints in postures, (K, n).
+
+    A free roll of the tool is no joint here.
+    """
+    bodies = robot.urdf_dynamics.bodies
+    base = placement_matrix(robot.settings.mounting)
+    rotation = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+    origin = np.zeros((len(q), 3))
+    rotations = [rotation]
+    origins = [origin]
+    for number, (body, position) in enumerate(zip(bodies, q.T, strict=False)):
+        placed = body.placement if number else base @ body.placement
+        origin = origin + rotation @ placed[:3, 3]
+        rotation = rotation @ placed[:3, :3]
+        if body.sliding:
+            origin = origin + (rotation @ body.axis) * position[:, None]
+        else:
+            flat = np.zeros(len(q))
+            turned = [
+                _rotate(body.axis, position, axis[:, None] + flat) for axis in _AXES
+            ]
+            rotation = rotation @ np.array(turned).transpose(2, 1, 0)
+        rotations.append(rotation)
+        origins.append(origin)
+    return np.stack(rotations, axis=1), np.stack(origins, axis=1)
+
+
+def carrier_in_text(robot: Robot, link: str) -> tuple[int, np.ndarray]:
+    """Find the joint that moves a link, and where the link is in the joint's frame, (4, 4), by the URDF's text."""
+    joint, placed = robot.urdf_dynamics.links[link]
+    if not joint:
+        placed = placement_matrix(robot.settings.mounting) @ placed
+    return joint, placed
 
 
 def _to_parent(
@@ -132,7 +167,7 @@ def _motions(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Angular velocity, angular acceleration, and acceleration less gravity of every joint's frame, (3, K) each."""
-    base = _matrix(robot.settings.mounting)[:3, :3]
+    base = placement_matrix(robot.settings.mounting)[:3, :3]
     upwards = base.T @ -np.array(robot.model.gravity.linear)
     spin = np.zeros((3, len(q)))
     gain = np.zeros((3, len(q)))
@@ -181,16 +216,6 @@ def _weights(robot: Robot, joint: int) -> list[_Weight]:
         turned = rotation @ inertia @ rotation.T
         weights.append(_Weight(payload.mass, com[:, None], turned))
     return weights
-
-
-def _matrix(placement: Placement) -> np.ndarray:
-    """Placement as a (4, 4) matrix."""
-    matrix = np.eye(4)
-    angles = np.radians(placement.rpy_deg)  # about fixed axes: x, y, z
-    for axis, angle in zip(_AXES, angles, strict=True):
-        matrix[:3, :3] = _rotate(axis, angle, matrix[:3, :3])
-    matrix[:3, 3] = placement.xyz
-    return matrix
 
 
 def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:

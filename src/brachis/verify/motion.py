@@ -140,6 +140,10 @@ class Pieces:
         """Return the times of places, s."""
         return np.asarray(self.times[piece] + u * self.lengths[piece])
 
+    def positions(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Joint positions at places, (K, n)."""
+        return np.asarray(self.nodes[piece] + values_of(self.position[:, piece], u))
+
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
         piece = np.searchsorted(self.times, t, side="right") - 1
@@ -192,7 +196,7 @@ class MotionStates:
         piece = piece[first]
         u = u[first]
         t = pieces.time(piece, u)
-        q = pieces.nodes[piece] + values_of(pieces.position[:, piece], u)
+        q = pieces.positions(piece, u)
         qdot, qddot, qdddot = (
             values_of(coefficients[:, piece], u)
             for coefficients in (pieces.velocity, pieces.acceleration, pieces.jerk)

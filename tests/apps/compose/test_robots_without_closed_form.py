@@ -59,6 +59,7 @@ def test_mujoco_agrees_with_torques_and_tool(name):
     model = mujoco.MjModel.from_xml_string(
         urdf(name).read_text().replace("</robot>", COMPILER)
     )
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     order = [model.joint(name).qposadr[0] for name in robot.joint_names]
     data, rng = mujoco.MjData(model), np.random.default_rng(1)
     for q in anywhere(robot, 50):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -87,6 +88,13 @@ def visual(
         *_origin(xyz, rpy),
         make("geometry", make(shape, **size)),
         make("material", make("color", rgba=rgba), name=name),
+    )
+
+
+def collision(drawn: Element) -> Element:
+    """Make the collision geometry that is what a visual shows."""
+    return make(
+        "collision", *(copy.deepcopy(part) for part in drawn if part.tag != "material")
     )
 
 

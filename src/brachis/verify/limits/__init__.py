@@ -13,6 +13,7 @@ import numpy as np
 from brachis.errors import InputError
 from brachis.robot.custom_limits import LimitModel, custom_limits
 from brachis.task import LIMIT_KINDS
+from brachis.verify.limits.clearance import worst_clearance
 from brachis.verify.limits.joint import (
     JOINT_CHECKS,
     worst_torque_at_speed,
@@ -35,6 +36,7 @@ TABLE: dict[str, LimitCheck] = {}
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_CHECKS[_kind]
     TABLE |= _AFTER.get(_kind, {})
+TABLE["clearance"] = worst_clearance
 
 
 def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]:

@@ -1,0 +1,116 @@
+"""Distances between solids >= the clearance: one value for every pair.
+
+A pair that is far counts as `_FAR` away. With the unit vector u between the nearest points w_a and w_b
+
+    dd/dq = u . (J_b(w_b) - J_a(w_a)).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials, Role
+from brachis.robot import Robot
+from brachis.scene import UNIT, Near, Scene, scene_of
+from brachis.scene.chain import Chain
+from brachis.task import Task
+
+_FAR = 0.1
+"""Distance from which on it is not computed, beyond the clearance, m."""
+_SPARE = 2e-4
+"""By how much the planner keeps farther away than the clearance, m: splines cut its path by so much at most."""
+_NEARBY = 2.0
+"""Pairs are left out that stay so many times `_FAR` apart in all postures that are known to be near."""
+
+
+class Clearance(Limit):
+    """Distances between solids of a scene.
+
+    Parameters
+    ----------
+    chain : Chain
+        Of the robot.
+    scene : Scene
+        Its pairs are the values.
+    clearance : float
+        m.
+    """
+
+    kind = "clearance"
+    role = Role.SCENE
+    at_rest = "posture"
+    violation_scale = UNIT
+    refusal = "is not kept: two bodies touch, or come too near"
+
+    def __init__(self, chain: Chain, scene: Scene, clearance: float) -> None:
+        count = len(scene.pairs)
+        self._chain = chain
+        self._scene = scene
+        self._clearance = clearance
+        self._last: tuple[bytes, Near] | None = None
+        self.labels = tuple(
+            Label(scene.names(pair), "clearance", "m", "collisions.clearance")
+            for pair in range(count)
+        )
+        self.lower = np.full(count, (self._clearance + _SPARE) / UNIT)
+        self.upper = np.full(count, np.inf)
+        self.bounds = tuple(
+            Bound(pair, self._clearance, self._clearance or UNIT, 1.0 / UNIT, "lower")
+            for pair in range(count)
+        )
+
+    def near(self, q: np.ndarray) -> Clearance | None:
+        """Leave out the pairs that are far apart in all postures, (K, n)."""
+        within = self._clearance + _NEARBY * _FAR
+        near = self._scene.near(self._chain.place(q), within)
+        kept = np.unique(near.pair)
+        if not len(kept):
+            return None
+        return Clearance(self._chain, self._scene.only(kept), self._clearance)
+
+    def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
+        """Tell in which postures, (K, n), no pair is too near, (K,)."""
+        within = self._clearance - slack
+        near = self._scene.near(self._chain.place(q), within)
+        return np.bincount(near.posture, minlength=len(q)) == 0
+
+    def _near(self, q: np.ndarray) -> Near:
+        key = q.tobytes()
+        if self._last is None or self._last[0] != key:
+            within = self._clearance + _FAR
+            self._last = (key, self._scene.near(self._chain.place(q), within))
+        return self._last[1]
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        """Distances, (K, P), in units of `UNIT`."""
+        near = self._near(motion.q)
+        shape = (len(motion.q), len(self.labels))
+        found = np.full(shape, (self._clearance + _FAR) / UNIT)
+        found[near.posture, near.pair] = near.distance / UNIT
+        return found
+
+    def partials(self, motion: JointStates) -> Partials:
+        near = self._near(motion.q)
+        joints = self._scene.joints[self._scene.pairs[near.pair]]
+        placed = self._chain.place(motion.q)
+        slopes = np.zeros((len(near.pair), motion.q.shape[1]))
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            moving = (near.posture, joints[:, side], near.points[:, side])
+            slopes += sign * self._chain.slopes(placed, *moving, near.normal)
+        by_q = np.zeros((len(motion.q), len(self.labels), motion.q.shape[1]))
+        by_q[near.posture, near.pair] = slopes / UNIT
+        return Partials(q=by_q)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out what was computed last."""
+        return {**vars(self), "_last": None}
+
+
+def build_clearance(robot: Robot, task: Task) -> Clearance | None:
+    """Build the limit of a task whose motion has to keep clear of something."""
+    if task.collisions.mode != "avoid":
+        return None
+    scene = scene_of(robot, task)
+    if scene is None or not len(scene.pairs):
+        return None
+    return Clearance(Chain.of(robot.model), scene, task.collisions.clearance)

@@ -1,0 +1,90 @@
+"""Where the joints of a robot are, in many postures at once, and how points on them move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+Placed = tuple[np.ndarray, np.ndarray]
+"""Rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and of all joints in K postures."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A serial chain of one-coordinate joints.
+
+    Attributes
+    ----------
+    placements : (n, 4, 4) ndarray
+        Of every joint at zero in the frame of the one before.
+    axes : (n, 3) ndarray
+        Unit vectors in the joints' own frames.
+    revolute : (n,) bool ndarray
+    """
+
+    placements: np.ndarray
+    axes: np.ndarray
+    revolute: np.ndarray
+
+    @classmethod
+    def of(cls, model: pin.Model) -> Chain:
+        """Take the chain of a Pinocchio model."""
+        joints = range(1, model.njoints)
+        placements = [model.jointPlacements[i].homogeneous for i in joints]
+        twists = np.array([model.joints[i].createData().S for i in joints])
+        twists = twists.reshape(-1, 6)
+        revolute = np.any(twists[:, 3:], axis=1)
+        axes = np.where(revolute[:, None], twists[:, 3:], twists[:, :3])
+        return cls(np.array(placements), axes, revolute)
+
+    def place(self, q: np.ndarray) -> Placed:
+        """Place the joints in postures, (K, n)."""
+        count, n = q.shape
+        rotations = np.empty((count, n + 1, 3, 3))
+        origins = np.empty((count, n + 1, 3))
+        rotations[:, 0] = np.eye(3)
+        origins[:, 0] = 0.0
+        for j in range(n):
+            placement = self.placements[j]
+            before = rotations[:, j]
+            turned = before @ placement[:3, :3]
+            origin = origins[:, j] + before @ placement[:3, 3]
+            if self.revolute[j]:
+                skew = pin.skew(self.axes[j])
+                sine = np.sin(q[:, j])[:, None, None]
+                rest = (1.0 - np.cos(q[:, j]))[:, None, None]
+                turned = turned @ (np.eye(3) + sine * skew + rest * (skew @ skew))
+            else:
+                origin = origin + (turned @ self.axes[j]) * q[:, j, None]
+            rotations[:, j + 1] = turned
+            origins[:, j + 1] = origin
+        return rotations, origins
+
+    def slopes(
+        self,
+        placed: Placed,
+        posture: np.ndarray,
+        joint: np.ndarray,
+        points: np.ndarray,
+        directions: np.ndarray,
+    ) -> np.ndarray:
+        """Differentiate the places of points on joints, along directions, by q, (M, n).
+
+        Parameters
+        ----------
+        placed : Placed
+            Of K postures.
+        posture, joint : (M,) int ndarray
+            Which of the postures, and which joint carries the point, 0 for none.
+        points, directions : (M, 3) ndarray
+            In the world, m.
+        """
+        rotations, origins = placed
+        axes = np.einsum("kjab,jb->kja", rotations[:, 1:], self.axes)[posture]
+        turning = np.cross(axes, points[:, None] - origins[posture, 1:])
+        moved = np.where(self.revolute[:, None], turning, axes)
+        along = np.einsum("mja,ma->mj", moved, directions)
+        carries = np.arange(len(self.axes)) < joint[:, None]
+        return np.asarray(np.where(carries, along, 0.0))

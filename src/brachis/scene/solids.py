@@ -1,0 +1,195 @@
+"""Solids: convex bodies of the scene and of a robot's links, from the task and from the URDF's ``<collision>``.
+
+A mesh stands for its convex hull.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import coal
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from brachis.common.files import mesh_file
+from brachis.errors import InputError, TaskError, UrdfError
+from brachis.robot.urdf_bodies import origin_of, placement_matrix
+from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of
+from brachis.task.scene import SceneBody
+
+_HULL = (True, "Qt")
+"""Keep the triangles; options of Qhull."""
+_THICKNESS = 0.03
+"""Radius of capsules along links, as a part of all their lengths."""
+Geometry: TypeAlias = Any  # coal comes without types
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A convex body in the frame that carries it.
+
+    Attributes
+    ----------
+    name : str
+    link : str or None
+        None: it is fixed to the world.
+    geometry : coal.CollisionGeometry
+    placement : (4, 4) ndarray
+        In the link's frame, or in the world.
+    """
+
+    name: str
+    link: str | None
+    geometry: Geometry
+    placement: np.ndarray
+
+    @property
+    def radius(self) -> float:
+        """Radius of a ball around it, m; infinite of a half-space."""
+        return float(self.geometry.aabb_radius)
+
+
+def solid_of(body: SceneBody, folder: Path) -> Solid:
+    """Make the solid of a scene's body; the file of a mesh is relative to `folder`.
+
+    Raises
+    ------
+    TaskError
+        A mesh cannot be read.
+    """
+    shape = getattr(body, body.shape)
+    if body.half_space is not None:
+        normal = np.array(body.half_space.normal)
+        length = float(np.linalg.norm(normal))
+        geometry = coal.Halfspace(normal / length, body.half_space.offset / length)
+    elif body.mesh is not None:
+        try:
+            geometry = _hull(folder / body.mesh, np.full(3, body.scale))
+        except InputError as error:
+            raise TaskError(str(error), where=f"scene: {body.name}") from error
+    elif body.sphere is not None:
+        geometry = coal.Sphere(shape)
+    elif body.box is not None:
+        geometry = coal.Box(*shape)
+    else:
+        kind = coal.Cylinder if body.cylinder is not None else coal.Capsule
+        geometry = kind(shape.radius, shape.length)
+    placement = placement_matrix(body.placement)
+    return _solid(body.name, body.link, geometry, placement, 0.0)
+
+
+def solids_of_links(
+    tree: UrdfTree, folder: Path, padding: Mapping[str, float]
+) -> Iterator[Solid]:
+    """Make the solids of a URDF's links, each larger by the link's padding, m.
+
+    Raises
+    ------
+    UrdfError
+        A shape cannot be read.
+    """
+    for name, link in tree.links.items():
+        found = link.findall("collision")
+        for number, collision in enumerate(found):
+            label = f"{name} {number}" if len(found) > 1 else name
+            try:
+                geometry = _geometry(collision, folder)
+            except (InputError, ValueError) as error:
+                problem = f"the collision geometry cannot be read: {error}"
+                raise UrdfError(problem, where=f"link {name!r}") from error
+            placement = origin_of(collision, "origin")
+            yield _solid(label, name, geometry, placement, padding.get(name, 0.0))
+
+
+def capsules_along(tree: UrdfTree) -> Iterator[Solid]:
+    """Make capsules from the joint of every link to the joints that hang from it, a share of all lengths thick."""
+    ends = [
+        (end_of(joint, "parent"), origin_of(joint, "origin")[:3, 3])
+        for joint in tree.joints.values()
+    ]
+    thick = _THICKNESS * sum(float(np.linalg.norm(end)) for _, end in ends)
+    for number, (link, end) in enumerate(ends):
+        length = float(np.linalg.norm(end))
+        if length <= thick:
+            continue
+        geometry = coal.Capsule(thick, length)
+        placement = np.eye(4)
+        placement[:3, :3] = _turn_to(end / length)
+        placement[:3, 3] = 0.5 * end
+        yield _solid(f"{link} {number}", link, geometry, placement, 0.0)
+
+
+def _turn_to(direction: np.ndarray) -> np.ndarray:
+    """Return a rotation, (3, 3), that turns the z axis to a direction, (3,)."""
+    turn, _ = Rotation.align_vectors(direction, [0.0, 0.0, 1.0])
+    return np.asarray(turn.as_matrix())
+
+
+def _solid(
+    name: str,
+    link: str | None,
+    geometry: Geometry,
+    placement: np.ndarray,
+    padding: float,
+) -> Solid:
+    geometry.setSweptSphereRadius(padding)
+    geometry.computeLocalAABB()
+    return Solid(name, link, geometry, placement)
+
+
+def _geometry(collision: Element, folder: Path) -> Geometry:
+    """Read a ``<collision>``."""
+    found = collision.find("geometry")
+    shapes = [] if found is None else [each for each in found if each.tag in _READERS]
+    if len(shapes) != 1:
+        raise InputError("it has no shape that is known", allowed=", ".join(_READERS))
+    (shape,) = shapes
+    return _READERS[shape.tag](shape, folder)
+
+
+def _read_box(shape: Element, _folder: Path) -> Geometry:
+    return coal.Box(*numbers_of(shape, ".", "size", ""))
+
+
+def _read_sphere(shape: Element, _folder: Path) -> Geometry:
+    return coal.Sphere(*numbers_of(shape, ".", "radius", ""))
+
+
+def _read_cylinder(shape: Element, _folder: Path) -> Geometry:
+    return coal.Cylinder(*(float(shape.get(key)) for key in ("radius", "length")))
+
+
+def _read_capsule(shape: Element, _folder: Path) -> Geometry:
+    return coal.Capsule(*(float(shape.get(key)) for key in ("radius", "length")))
+
+
+def _read_mesh(shape: Element, folder: Path) -> Geometry:
+    name = str(shape.get("filename"))
+    path = mesh_file(name, folder)
+    if path is None:
+        raise InputError("the mesh file is missing", where=name)
+    return _hull(path, np.array(numbers_of(shape, ".", "scale", "1 1 1")))
+
+
+_READERS = {
+    "box": _read_box,
+    "sphere": _read_sphere,
+    "cylinder": _read_cylinder,
+    "capsule": _read_capsule,
+    "mesh": _read_mesh,
+}
+
+
+def _hull(path: Path, scale: np.ndarray) -> Geometry:
+    """Return the convex hull of a mesh file."""
+    try:
+        mesh = coal.MeshLoader().load(str(path), scale)
+        mesh.buildConvexHull(*_HULL)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(
+            "the mesh cannot be read", where=str(path), found=str(error)
+        ) from error
+    return mesh.convex

@@ -1,0 +1,140 @@
+"""The scene of a task: bodies around the robot and on it, and how it keeps clear of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from brachis.task.fields import (
+    Flag,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    must,
+    refuse,
+)
+from brachis.task.orientation import Vector3
+from brachis.task.settings import Placement
+
+SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh")
+"""Keys of which a body has exactly one."""
+
+
+class Round(Model):
+    """A cylinder about its z axis, its middle at the origin; of a capsule without the caps."""
+
+    radius: Positive
+    """Radius, m."""
+    length: Positive
+    """Length, of a capsule without its caps, m."""
+
+
+class HalfSpaceShape(Model):
+    """All that is behind a plane."""
+
+    normal: Annotated[
+        Vector3,
+        must(
+            lambda normal: float(np.linalg.norm(normal)) > 1e-9,
+            "a normal of zero length has no direction",
+            "a direction, any length but zero",
+        ),
+    ]
+    """Direction out of the half-space."""
+    offset: Number = 0.0
+    """Distance of the plane from the origin along the normal, m."""
+
+
+class SceneBody(Model):
+    """A body that the robot keeps clear of, fixed to the world or to one of the robot's links; it has one shape."""
+
+    name: Name
+    """Name, unique."""
+    box: tuple[Positive, Positive, Positive] | None = None
+    """Lengths along x, y and z, m."""
+    sphere: Positive | None = None
+    """Radius, m."""
+    cylinder: Round | None = None
+    """Cylinder: {radius: m, length: m}."""
+    capsule: Round | None = None
+    """Cylinder with round caps: {radius: m, length: m}."""
+    half_space: HalfSpaceShape | None = None
+    """All that is behind a plane: {normal: [x, y, z], offset: m}."""
+    mesh: Name | None = None
+    """Mesh file, relative to the task file; its convex hull is used."""
+    scale: Positive = 1.0
+    """Factor from the mesh's unit to m."""
+    link: Name | None = None
+    """Link of the robot that carries it. Null: it is fixed to the world."""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    """Position of its origin in the world, or in the link's frame, m."""
+    rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw, degrees, as in a URDF."""
+
+    @property
+    def shape(self) -> str:
+        """The key of its shape."""
+        return next(key for key in SHAPES if getattr(self, key) is not None)
+
+    @property
+    def placement(self) -> Placement:
+        """Where it is in the world, or in the link's frame."""
+        return Placement(xyz=self.position, rpy_deg=self.rpy_deg)
+
+    @model_validator(mode="after")
+    def _has_one_shape(self) -> Self:
+        given = [key for key in SHAPES if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise refuse(
+                "a body has exactly one shape",
+                found=given or "none",
+                allowed=f"one of {', '.join(SHAPES)}",
+            )
+        moves = self.half_space is not None and self.link is not None
+        return self.check(
+            (moves, "link", "a half-space is fixed to the world", "null"),
+        )
+
+
+class CollisionSettings(Model):
+    """How the robot keeps clear of the scene and of itself."""
+
+    clearance: NonNegative = 0.01
+    """Least distance between bodies, m."""
+    mode: Literal["avoid", "check", "off"] = "avoid"
+    """avoid: it is a limit of the motion. check: the verification alone looks at it. off: nothing does."""
+    self_collision: Flag = True
+    """Whether the robot also keeps clear of itself."""
+    disable: tuple[tuple[Name, Name], ...] = ()
+    """Pairs of links, or names of bodies, that may touch."""
+    srdf: Name | None = None
+    """SRDF file, relative to the task file, whose disabled pairs may touch too."""
+    padding: dict[Name, NonNegative] = Field(default={})
+    """By how much the bodies of a link are larger than the URDF says, by link, m."""
+    capsules: Literal["none", "auto"] = "none"
+    """auto: a robot without collision geometry gets capsules along its links."""
+
+
+def bodies_by_name(scene: Any) -> Any:
+    """Name bodies without a name by their shape and their number.
+
+    Parameters
+    ----------
+    scene : sequence or object
+        What a task has under ``scene``; what is no sequence of mappings stays.
+    """
+    if not isinstance(scene, list | tuple):
+        return scene
+    return [_with_name(number, body) for number, body in enumerate(scene)]
+
+
+def _with_name(number: int, body: Any) -> Any:
+    if not isinstance(body, Mapping) or "name" in body:
+        return body
+    shape = next((key for key in SHAPES if key in body), "body")
+    return {"name": f"{shape} {number}", **body}

@@ -1,0 +1,171 @@
+"""The smallest distance between solids on the whole motion, by branch and bound over time.
+
+Between two instants no distance shrinks faster than the joints between both solids carry one towards the other. With
+distances d_0 and d_1 at the ends of a step, joints that turn by D_i within it, and points at most r_i from their axes,
+
+    d >= (d_0 + d_1 - sum_i r_i D_i) / 2        at all instants of the step.
+
+Steps are halved until that tells enough.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.scene import UNIT, Scene, scene_of
+from brachis.verify.limits.protocol import Worst
+from brachis.verify.mechanics import carrier_in_text, joint_placements
+from brachis.verify.motion import Given, MotionStates
+
+_LOOK = 0.05
+"""Distances up to so much above the clearance are computed, m."""
+_ROUNDING = 1e-5
+"""By how much the smallest distance may be less than what is proven, m, near the clearance."""
+_FINE = 1e-3
+"""The same, farther away, m."""
+_MOST = 300_000
+"""Steps that are halved, no more."""
+_STATES = 2_000
+"""States that are looked at in one go."""
+
+
+def worst_clearance(given: Given) -> Worst | None:
+    """Find the smallest distance between solids, as a ratio: 1 at the clearance, above it where it is less."""
+    settings = given.task.collisions
+    scene = scene_of(given.robot, given.task, carrier_in_text)
+    if scene is None or not len(scene.pairs):
+        return None
+    wanted = settings.clearance
+    search = _Search(given, scene, wanted)
+    least, known, time, pair = search.smallest()
+    far = wanted + _LOOK
+    found = f"smallest distance {1e3 * least:.2f} mm"
+    if least >= far:
+        found = f"nothing is nearer than {1e3 * far:.0f} mm"
+    if known < wanted - _ROUNDING <= least:
+        found = f"not searched to the end: {found}, and more than {1e3 * known:.2f} mm is proven"
+    ratio = max(1.0 + (wanted - min(least, known + _ROUNDING)) / UNIT, 0.0)
+    return Worst(ratio, scene.names(pair), time, found)
+
+
+class _Search:
+    """Branch and bound over time."""
+
+    def __init__(self, given: Given, scene: Scene, wanted: float) -> None:
+        self._given = given
+        self._scene = scene
+        self._wanted = wanted
+        self._reach = _reaches(given, scene)
+        self._fastest = np.abs(given.pieces.velocity).max(axis=0)[:, : len(self._reach)]
+        self._least = wanted + _LOOK
+        self._place = (float(given.states.t[0]), 0)
+        self._halved = 0
+
+    def smallest(self) -> tuple[float, float, float, int]:
+        """Smallest distance found, what is proven, m, and time, s, and pair of the former."""
+        states = self._given.states
+        known = np.inf
+        starts = range(0, max(len(states.t) - 1, 1), _STATES)
+        for first in starts:
+            part = states.only(slice(first, first + _STATES + 1))
+            known = min(known, self._within(part))
+        return self._least, min(known, self._least), *self._place
+
+    def _within(self, states: MotionStates) -> float:
+        """Prove what the distances between states are at least, m."""
+        placed = joint_placements(self._given.robot, states.q)
+        far = self._wanted + _LOOK
+        distance = np.maximum(self._scene.bounds(placed), far)
+        near = self._scene.near(placed, far)
+        distance[near.posture, near.pair] = near.distance
+        self._note(near.distance, states.t[near.posture], near.pair)
+        inside = states.piece[1:] == states.piece[:-1]
+        step = np.where(inside, np.diff(states.u), 0.0)
+        piece = states.piece[:-1]
+        travel = step[:, None] * self._given.pieces.lengths[piece, None]
+        moved = (travel * self._fastest[piece]) @ self._reach
+        lower = 0.5 * (distance[1:] + distance[:-1] - moved)
+        index, pair = np.nonzero(lower < self._goal)
+        known = lower.min(initial=np.inf, where=lower >= self._goal)
+        ends = states.u[index], states.u[index + 1]
+        values = distance[index, pair], distance[index + 1, pair]
+        return min(known, self._halve(piece[index], pair, ends, values))
+
+    def _halve(
+        self,
+        piece: np.ndarray,
+        pair: np.ndarray,
+        ends: tuple[np.ndarray, np.ndarray],
+        values: tuple[np.ndarray, np.ndarray],
+    ) -> float:
+        """Halve steps of pairs, (M,), until enough is known of each; return what is proven, m."""
+        pieces = self._given.pieces
+        known = np.inf
+        u = np.array(ends)
+        d = np.array(values)
+        while len(piece):
+            lower = 0.5 * (d.sum(axis=0) - self._moved(piece, pair, u[1] - u[0]))
+            is_open = lower < self._goal
+            self._halved += int(is_open.sum())
+            if self._halved > _MOST:
+                return min(known, float(lower.min()))
+            known = min(known, float(lower.min(initial=np.inf, where=~is_open)))
+            piece, pair, u, d = (
+                piece[is_open],
+                pair[is_open],
+                u[:, is_open],
+                d[:, is_open],
+            )
+            middle = 0.5 * (u[0] + u[1])
+            states = pieces.positions(piece, middle)
+            placed = joint_placements(self._given.robot, states)
+            found = self._scene.measure(placed, np.arange(len(piece)), pair).distance
+            self._note(found, pieces.time(piece, middle), pair)
+            u = np.hstack([[u[0], middle], [middle, u[1]]])
+            d = np.hstack([[d[0], found], [found, d[1]]])
+            piece = np.tile(piece, 2)
+            pair = np.tile(pair, 2)
+        return known
+
+    def _moved(
+        self, piece: np.ndarray, pair: np.ndarray, step: np.ndarray
+    ) -> np.ndarray:
+        """How far the solids of pairs move towards each other within steps at most, (M,), m."""
+        travel = (step * self._given.pieces.lengths[piece])[:, None]
+        return np.einsum(
+            "mj,jm->m", travel * self._fastest[piece], self._reach[:, pair]
+        )
+
+    @property
+    def _goal(self) -> float:
+        """What has to be proven of a step, m."""
+        near = min(self._least, self._wanted) - _ROUNDING
+        return max(near, self._least - _FINE)
+
+    def _note(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
+        """Keep the smallest distance."""
+        if distance.min(initial=np.inf) < self._least:
+            best = int(np.argmin(distance))
+            self._least = float(distance[best])
+            self._place = float(t[best]), int(pair[best])
+
+
+def _reaches(given: Given, scene: Scene) -> np.ndarray:
+    """Distances that points of pairs can have from the joints' axes, (n, P), m; 1 of sliding joints, 0 of others."""
+    bodies = given.robot.urdf_dynamics.bodies
+    lengths = [np.linalg.norm(body.placement[:3, 3]) for body in bodies]
+    slides = [
+        np.abs(given.states.q[:, j]).max() + 1e-3 if body.sliding else 0.0
+        for j, body in enumerate(bodies)
+    ]
+    along = np.cumsum(np.array(lengths) + slides)
+    centres, radii = scene.balls
+    reach = np.zeros((len(bodies), len(scene.pairs)))
+    for number, pair in enumerate(scene.pairs):
+        inner, outer = sorted(pair, key=lambda solid: scene.joints[solid])
+        last = scene.joints[outer]
+        size = np.linalg.norm(centres[outer]) + radii[outer]
+        for j in range(scene.joints[inner], last):
+            far = along[last - 1] - along[j] + size
+            reach[j, number] = 1.0 if bodies[j].sliding else far
+    return reach
