@@ -10,6 +10,7 @@
 To plan            plan, plan_many, transcribe (the nonlinear program itself)
 Many plans         sweep, SweepResult: keys of a task varied over grids and draws, also on a cluster
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
+A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
 What comes out     Result, Trajectory, Samples, Candidate, Verification, BottleneckReport
@@ -63,6 +64,12 @@ if TYPE_CHECKING:
     from brachis.task import fit_path as fit_path
     from brachis.task import load_task as load_task
     from brachis.task import read_limits as read_limits
+    from brachis.task.bodies import Box as Box
+    from brachis.task.bodies import Capsule as Capsule
+    from brachis.task.bodies import Cylinder as Cylinder
+    from brachis.task.bodies import HalfSpace as HalfSpace
+    from brachis.task.bodies import Mesh as Mesh
+    from brachis.task.bodies import Sphere as Sphere
     from brachis.task.constructors import Arc as Arc
     from brachis.task.constructors import Circle as Circle
     from brachis.task.constructors import Helix as Helix
@@ -103,6 +110,7 @@ _NAMES = {
     "robot.plausibility": "PlausibilityWarning",
     "timing": "SlowTimingWarning",
     "task": "LimitSpec Task fit_path load_task read_limits",
+    "task.bodies": "Box Capsule Cylinder HalfSpace Mesh Sphere",
     "task.constructors": "Arc Circle Helix Line Spline",
     "trajectory": "Samples Trajectory",
     "verify": "Verification verify_trajectory",

@@ -154,7 +154,7 @@ REASONS = {
     "gravity": (
         {"gravity": [0, -9.81, 0], "limits": {"torque": [280.0, 200.0, 100.0]}},
         {"path": [{"line": {"to": [2.8, 0.0]}}]},
-        "the torque limit cannot hold",
+        "the torque limit of j1 cannot hold",
         "the torque limit cannot hold",
     ),
 }

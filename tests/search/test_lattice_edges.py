@@ -128,7 +128,7 @@ def test_a_free_start_that_no_torque_holds_says_so():
     end = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(end, DeadEnd)
     assert end.s == 0.0
-    assert "the torque limit cannot hold the arm against gravity" in end.cause
+    assert "the torque limit of j1 cannot hold the arm against gravity" in end.cause
 
 
 def test_acceleration_limits_alone_have_shortest_courses():

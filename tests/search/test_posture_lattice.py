@@ -390,7 +390,7 @@ def test_back_from_a_given_end_of_a_circle_of_positions_in_ranges_of_two_turns()
                 START,
                 [1.1, 0.0],
             ),
-            "the torque limit cannot hold",
+            "the torque limit of j1 cannot hold",
         ),
     ],
     ids=["reach", "ranges", "gravity"],

@@ -23,6 +23,12 @@ _NEARBY = 2.0
 """Pairs are left out that stay so many times `_FAR` apart in all postures that are known to be near."""
 
 
+_STRIDE = 0.05
+"""Way of the solids in a step between postures after which it is looked whether they are free, m."""
+_MOST_STRIDES = 16
+"""Strides in a step, no more."""
+
+
 class Clearance(Limit):
     """Distances between solids of a scene.
 
@@ -40,7 +46,7 @@ class Clearance(Limit):
     role = Role.SCENE
     at_rest = "posture"
     violation_scale = UNIT
-    refusal = "is not kept: two bodies touch, or come too near"
+    refusal = "is not kept"
 
     def __init__(self, chain: Chain, scene: Scene, clearance: float) -> None:
         count = len(scene.pairs)
@@ -73,6 +79,22 @@ class Clearance(Limit):
         within = self._clearance - slack
         near = self._scene.near(self._chain.place(q), within)
         return np.bincount(near.posture, minlength=len(q)) == 0
+
+    def holds_between(
+        self, first: np.ndarray, last: np.ndarray, slack: float
+    ) -> np.ndarray:
+        """Tell on which straight steps no pair is too near, where the solids have moved on by `_STRIDE`."""
+        ends = [self._scene.centres(self._chain.place(q)) for q in (first, last)]
+        moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1, initial=0.0)
+        count = np.ceil(moved / _STRIDE).clip(1, _MOST_STRIDES).astype(int) - 1
+        number = np.repeat(np.arange(len(count)), count)
+        begins = np.repeat(np.cumsum(count) - count, count)
+        part = (np.arange(len(number)) - begins + 1) / (count[number] + 1)
+        q = first[number] + part[:, None] * (last - first)[number]
+        holds = self.holds_at_rest(q, slack)
+        free = np.ones(len(first), dtype=bool)
+        free[number[~holds]] = False
+        return free
 
     def _near(self, q: np.ndarray) -> Near:
         key = q.tobytes()

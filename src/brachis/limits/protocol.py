@@ -285,6 +285,13 @@ class Limit(Description, ABC):
         values = self.values(Moments.at_rest(q))
         return np.all(self.violation(values) <= slack, axis=1)
 
+    def holds_between(
+        self, first: np.ndarray, last: np.ndarray, slack: float
+    ) -> np.ndarray:
+        """Tell on which straight steps from postures to others, (E, n), it holds as at both ends, (E,)."""
+        del last, slack
+        return np.ones(len(first), dtype=bool)
+
     def relax(self, bound: Bound, amount: float) -> Self:
         """Return the limit with one figure relaxed by `amount`, in its unit."""
         other = copy.copy(self)

@@ -16,7 +16,9 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
+from lxml import etree
 
+from brachis.common.files import read_text
 from brachis.errors import TaskError, UnknownNameError
 from brachis.robot import Robot
 from brachis.robot.urdf_bodies import placement_matrix
@@ -35,7 +37,7 @@ Carrier = Callable[[Robot, str], tuple[int, np.ndarray]]
 UNIT = 0.1
 """Distance of which ratios and values of limits are multiples, m."""
 _EXACT = 1e-10
-"""Tolerance of Coal's distances, m."""
+"""Tolerance of Coal's distances of solids that are apart, m."""
 _ITERATIONS = 500
 _POSTURES = 100
 """Random postures in which a pair that always touches is found."""
@@ -111,12 +113,16 @@ class Scene:
         centres = np.einsum("sij,sj->si", self.placements[:, :3, :3], local)
         return centres + self.placements[:, :3, 3], radii
 
+    def centres(self, placed: Placed) -> np.ndarray:
+        """Place the centres of the balls around the solids, (K, S, 3), m."""
+        rotations, origins = placed
+        turned = np.einsum("ksij,sj->ksi", rotations[:, self.joints], self.balls[0])
+        return np.asarray(turned + origins[:, self.joints])
+
     def bounds(self, placed: Placed) -> np.ndarray:
         """Return least distances that the pairs can have, (K, P), by the balls around them, m."""
-        rotations, origins = placed
-        local, radii = self.balls
-        centres = np.einsum("ksij,sj->ksi", rotations[:, self.joints], local)
-        centres += origins[:, self.joints]
+        centres = self.centres(placed)
+        radii = self.balls[1]
         first, second = self.pairs.T
         apart = np.linalg.norm(centres[:, first] - centres[:, second], axis=2)
         half_spaces = np.flatnonzero(np.isinf(radii))
@@ -130,12 +136,53 @@ class Scene:
                 bounds[:, own] = height - radii[other[own]]
         return np.asarray(bounds)
 
+    @cached_property
+    def _boxes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Boxes around the solids in their own axes: middles, (S, 3), and half lengths, (S, 3), m."""
+        boxes = [solid.geometry.aabb_local for solid in self.solids]
+        low = np.array([box.min_ for box in boxes])
+        high = np.array([box.max_ for box in boxes])
+        is_endless = np.isinf([solid.radius for solid in self.solids])[:, None]
+        middle = np.where(is_endless, 0.0, 0.5 * low + 0.5 * high)
+        return middle, np.where(is_endless, np.inf, 0.5 * high - 0.5 * low)
+
+    def _place(self, placed: Placed) -> Placed:
+        """Place the solids: rotations, (K, S, 3, 3), and origins, (K, S, 3), m."""
+        rotations = placed[0][:, self.joints]
+        origins = np.einsum("ksij,sj->ksi", rotations, self.placements[:, :3, 3])
+        turned = rotations @ self.placements[:, :3, :3]
+        return turned, origins + placed[1][:, self.joints]
+
     def near(self, placed: Placed, within: float) -> Near:
         """Find the pairs that are nearer than `within`, m, where the joints are placed so."""
         posture, pair = np.nonzero(self.bounds(placed) < within)
-        found = self.measure(placed, posture, pair)
+        kept = self._gaps(placed, posture, pair) < within
+        found = self.measure(placed, posture[kept], pair[kept])
         kept = found.distance < within
         return Near(*(part[kept] for part in vars(found).values()))
+
+    def _gaps(
+        self, placed: Placed, posture: np.ndarray, pair: np.ndarray
+    ) -> np.ndarray:
+        """Gaps, (M,), m, between the boxes around the solids of pairs along the boxes' axes; no distance is less."""
+        turned, origins = self._place(placed)
+        middles, halves = self._boxes
+        origins = origins + np.einsum("ksij,sj->ksi", turned, middles)
+        first, second = self.pairs[pair].T
+        apart = origins[posture, second] - origins[posture, first]
+        axes = turned[posture, first], turned[posture, second]
+        across = np.abs(np.swapaxes(axes[0], 1, 2) @ axes[1])
+        with np.errstate(invalid="ignore"):  # a half-space has no end
+            sides = (
+                halves[first] + np.einsum("mij,mj->mi", across, halves[second]),
+                halves[second] + np.einsum("mij,mi->mj", across, halves[first]),
+            )
+            gaps = [
+                np.abs(np.einsum("mij,mi->mj", own, apart))
+                - np.nan_to_num(side, nan=np.inf)
+                for own, side in zip(axes, sides, strict=True)
+            ]
+        return np.asarray(np.maximum(*gaps).max(axis=1))
 
     def measure(self, placed: Placed, posture: np.ndarray, pair: np.ndarray) -> Near:
         """Compute the distances of pairs, (M,), in so many of the postures, (M,), in which the joints are placed."""
@@ -143,22 +190,20 @@ class Scene:
         distance = np.empty(count)
         points = np.empty((count, 2, 3))
         normal = np.empty((count, 3))
-        rotations = placed[0][:, self.joints]
-        turned = rotations @ self.placements[:, :3, :3]
-        moved = np.einsum("ksij,sj->ksi", rotations, self.placements[:, :3, 3])
-        moved += placed[1][:, self.joints]
+        turned, origins = self._place(placed)
         first = coal.Transform3s()
         second = coal.Transform3s()
         request = coal.DistanceRequest()
-        request.gjk_tolerance = request.epa_tolerance = _EXACT
-        request.gjk_max_iterations = request.epa_max_iterations = _ITERATIONS
+        # That of solids that overlap is less exact: Coal gives up there where it is asked for more.
+        request.gjk_tolerance = _EXACT
+        request.gjk_max_iterations = _ITERATIONS
         result = coal.DistanceResult()
         chosen = self.pairs[pair]
         for m in range(count):
             k = posture[m]
             a, b = chosen[m]
-            first.setTransform(turned[k, a], moved[k, a])
-            second.setTransform(turned[k, b], moved[k, b])
+            first.setTransform(turned[k, a], origins[k, a])
+            second.setTransform(turned[k, b], origins[k, b])
             result.clear()
             distance[m] = self._functors[pair[m]](first, second, request, result)
             points[m, 0] = result.getNearestPoint1()
@@ -213,7 +258,7 @@ def scene_of(
             allowed="a URDF with <collision> elements",
             hint="Add them, or set collisions.capsules: auto, or collisions.mode: off",
         )
-    solids = (*own, *(solid_of(body, Path()) for body in task.scene))
+    solids = (*own, *(solid_of(body) for body in task.scene))
     joints = np.zeros(len(solids), dtype=int)
     placements = np.array([solid.placement for solid in solids])
     for number, solid in enumerate(solids):
@@ -225,10 +270,11 @@ def scene_of(
         joints[number], placed = carrier(robot, solid.link)
         placements[number] = placed @ solid.placement
     scene = Scene(solids, joints, placements, np.empty((0, 2), dtype=int))
+    disabled = [*settings.disable, *_disabled_in(settings.srdf)]
     pairs = [
         pair
         for pair in _moving_pairs(scene, len(own), settings.self_collision)
-        if not _may_touch(scene, pair, settings.disable)
+        if not _may_touch(scene, pair, disabled)
     ]
     scene = Scene(solids, joints, placements, np.reshape(pairs, (-1, 2)).astype(int))
     return scene.only(np.flatnonzero(~_always_touch(scene, robot)))
@@ -243,6 +289,21 @@ def _moving_pairs(scene: Scene, own: int, with_itself: bool) -> list[tuple[int, 
         if apart > (1 if are_links else 0) and (with_itself or not are_links):
             pairs.append((first, second))
     return pairs
+
+
+def _disabled_in(srdf: str | None) -> list[tuple[str, str]]:
+    """List the pairs of links that an SRDF file disables."""
+    if srdf is None:
+        return []
+    where = f"collisions.srdf: {srdf}"
+    text = read_text(Path(srdf), where=where, folder=Path.cwd())
+    try:
+        root = etree.fromstring(text.encode())
+    except etree.XMLSyntaxError as error:
+        problem = "the SRDF file is not XML"
+        raise TaskError(problem, where=where, found=str(error)) from error
+    found = root.iter("disable_collisions")
+    return [(str(each.get("link1")), str(each.get("link2"))) for each in found]
 
 
 def _may_touch(

@@ -52,8 +52,8 @@ class Solid:
         return float(self.geometry.aabb_radius)
 
 
-def solid_of(body: SceneBody, folder: Path) -> Solid:
-    """Make the solid of a scene's body; the file of a mesh is relative to `folder`.
+def solid_of(body: SceneBody) -> Solid:
+    """Make the solid of a scene's body.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def solid_of(body: SceneBody, folder: Path) -> Solid:
         geometry = coal.Halfspace(normal / length, body.half_space.offset / length)
     elif body.mesh is not None:
         try:
-            geometry = _hull(folder / body.mesh, np.full(3, body.scale))
+            geometry = _hull(Path(body.mesh), np.full(3, body.scale))
         except InputError as error:
             raise TaskError(str(error), where=f"scene: {body.name}") from error
     elif body.sphere is not None:
@@ -78,7 +78,7 @@ def solid_of(body: SceneBody, folder: Path) -> Solid:
         kind = coal.Cylinder if body.cylinder is not None else coal.Capsule
         geometry = kind(shape.radius, shape.length)
     placement = placement_matrix(body.placement)
-    return _solid(body.name, body.link, geometry, placement, 0.0)
+    return _solid(str(body.name), body.link, geometry, placement, 0.0)
 
 
 def solids_of_links(

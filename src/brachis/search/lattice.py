@@ -30,7 +30,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
-from brachis.limits import HasLatticeWeights
+from brachis.limits import HasLatticeWeights, Moments
 from brachis.path import Path
 from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
@@ -48,6 +48,10 @@ from brachis.search.joint_path import (
 
 LARGEST_STEP = 0.8
 """Largest step of a joint between stations, rad or m."""
+_LOOKS = 9
+"""Postures on a step that are looked at, to name what is in the way."""
+_OTHER_WAYS = 3
+"""Ways to a node, after the shortest one, that are tried where something is in the way."""
 _SLACK = 1e-9
 """Rounding of joint positions, rad or m, and of ratios to limits."""
 
@@ -318,19 +322,67 @@ class Lattice(ABC):
         length = before.length[parent] + steps
         branch = before.branch[parent]
         layer = Layer(branch, q[good], low[good], high[good], length, parent)
-        return self._keep(layer[shortest(length, edges.key[good])], self._thin)
+        chosen = self._shortest_free(before, layer, edges.key[good])
+        if not len(chosen):
+            ways = np.linspace(before.q[parent], q[good], _LOOKS, axis=1)
+            return self._blame(ways)
+        return self._keep(layer[chosen], self._thin)
+
+    def _shortest_free(
+        self, before: Layer, layer: Layer, keys: np.ndarray
+    ) -> np.ndarray:
+        """Choose the shortest way to each node, (E, k), of those on which nothing is in the way."""
+        chosen = shortest(layer.length, keys)
+        free = self._are_free(before, layer, chosen)
+        if free.all():
+            return chosen
+        found = [chosen[free]]
+        numbers = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+        left = np.arange(len(keys))
+        for _ in range(_OTHER_WAYS):
+            is_lost = np.isin(numbers[left], numbers[chosen[~free]])
+            left = np.setdiff1d(left[is_lost], chosen)
+            if not len(left):
+                break
+            chosen = left[shortest(layer.length[left], numbers[left, None])]
+            free = self._are_free(before, layer, chosen)
+            found.append(chosen[free])
+        return np.sort(np.concatenate(found))
+
+    def _are_free(self, before: Layer, layer: Layer, chosen: np.ndarray) -> np.ndarray:
+        """Tell on which of the chosen steps to a layer nothing is in the way, (C,)."""
+        first = before.q[layer.parent[chosen]]
+        free = np.ones(len(chosen), dtype=bool)
+        for limit in self.problem.limits:
+            free &= limit.holds_between(first, layer.q[chosen], _SLACK)
+        return free
 
     def _keep(self, layer: Layer, choose: Callable[[Layer], Layer]) -> Layer | str:
-        """Choose among the nodes that can be held against gravity, or tell what refuses them."""
+        """Choose among the nodes in which the arm may rest, or tell what refuses them."""
         held = np.ones(len(layer.q), dtype=bool)
-        cause = ""
         for limit in self.problem.limits:
             if limit.at_rest == "posture":
-                allowed = limit.holds_at_rest(layer.q, _SLACK)
-                held &= allowed
-                if not (cause or allowed.all()):
-                    cause = f"the {limit.name} limit {limit.refusal}"
-        return choose(layer[held]) if held.any() else cause
+                held &= limit.holds_at_rest(layer.q, _SLACK)
+        return choose(layer[held]) if held.any() else self._blame(layer.q[:, None])
+
+    def _blame(self, q: np.ndarray) -> str:
+        """Name the limit that is exceeded most in the best of postures, or on the best way, (K, L, n), and by what."""
+        if not len(q):
+            return ""
+        still = Moments.at_rest(q.reshape(-1, q.shape[-1]))
+        worst = -np.inf
+        cause = ""
+        for limit in self.problem.limits:
+            if limit.at_rest != "posture":
+                continue
+            beyond = limit.violation(limit.values(still))
+            beyond = beyond.reshape(*q.shape[:2], -1).max(axis=1)
+            best = beyond[np.argmin(beyond.max(axis=1))]
+            if best.max() > worst:
+                worst = best.max()
+                subject = limit.labels[int(np.argmax(best))].subject
+                cause = f"the {limit.name} limit of {subject} {limit.refusal}"
+        return cause
 
     def _choose_some(self, layer: Layer, most: int, cost: np.ndarray) -> np.ndarray:
         """Choose `most` nodes: half of least `cost`, (K,), the others far from each other."""

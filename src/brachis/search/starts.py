@@ -25,7 +25,7 @@ from brachis.kinematics import (
     Newton,
     chart_around,
 )
-from brachis.limits import Limit
+from brachis.limits import Limit, Role
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
@@ -89,6 +89,8 @@ class SearchLevel:
     fallback: bool = False
 
 
+_NEARLY = 0.02
+"""Violation of a limit of the scene up to which a joint path is a guess."""
 _SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
 _FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
 _THOROUGH = SearchLevel(
@@ -188,6 +190,8 @@ def numeric_starts(
 ) -> list[InitialGuess]:
     """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
 
+    Those that hit something are left out.
+
     Parameters
     ----------
     decomposition : Decomposition
@@ -205,12 +209,20 @@ def numeric_starts(
     joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
     joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
     family = decomposition.match.family
+    scene = [limit for limit in problem.limits if limit.role is Role.SCENE]
     return [
         InitialGuess(
             problem, joint_map, joint_path, np.inf, f"numeric {number}", family
         )
         for number, joint_path in enumerate(joint_paths, 1)
+        if all(_passes(limit, joint_map.postures(joint_path)) for limit in scene)
     ]
+
+
+def _passes(limit: Limit, q: np.ndarray) -> bool:
+    """Tell whether a limit holds along a joint path, (S, n), nearly."""
+    exists = np.isfinite(q).all(axis=1)
+    return bool(limit.holds_at_rest(q[exists], _NEARLY).all())
 
 
 def chart_starts(

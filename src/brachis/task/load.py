@@ -20,6 +20,7 @@ from brachis.task.fitted import expand_csv_files
 from brachis.task.limits_file import with_limits_of_file
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
+from brachis.task.scene_file import with_absolute_files, with_scene_of_file
 from brachis.task.settings import RobotSettings
 from brachis.task.yaml_reader import read_yaml
 
@@ -263,7 +264,9 @@ def task_from(
         content = with_keys(content, changes)
         source = f"{source} with {', '.join(changes)} set"
     try:
-        task = Task.model_validate(plain(with_limits_of_file(content, source, folder)))
+        content = with_limits_of_file(content, source, folder)
+        content = with_scene_of_file(content, source, folder)
+        task = Task.model_validate(plain(content))
     except ValidationError as error:
         raise task_error(error, source, Task) from None
     except RecursionError:
@@ -272,6 +275,7 @@ def task_from(
             where=source,
         ) from None
     task = _with_start(expand_csv_files(task, source, folder), source)
+    task = with_absolute_files(task, folder)
     if task.robot.urdf is None:
         return task
     # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.

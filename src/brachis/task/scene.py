@@ -53,8 +53,8 @@ class HalfSpaceShape(Model):
 class SceneBody(Model):
     """A body that the robot keeps clear of, fixed to the world or to one of the robot's links; it has one shape."""
 
-    name: Name
-    """Name, unique."""
+    name: Name | None = None
+    """Name, unique. Null: its shape and its number in the scene."""
     box: tuple[Positive, Positive, Positive] | None = None
     """Lengths along x, y and z, m."""
     sphere: Positive | None = None
@@ -134,7 +134,11 @@ def bodies_by_name(scene: Any) -> Any:
 
 
 def _with_name(number: int, body: Any) -> Any:
-    if not isinstance(body, Mapping) or "name" in body:
+    if isinstance(body, SceneBody):
+        if body.name is not None:
+            return body
+        return body.model_copy(update={"name": f"{body.shape} {number}"})
+    if not isinstance(body, Mapping) or body.get("name") is not None:
         return body
-    shape = next((key for key in SHAPES if key in body), "body")
-    return {"name": f"{shape} {number}", **body}
+    shape = next((key for key in SHAPES if body.get(key) is not None), "body")
+    return {**body, "name": f"{shape} {number}"}

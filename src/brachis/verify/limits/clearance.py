@@ -23,6 +23,8 @@ _ROUNDING = 1e-5
 """By how much the smallest distance may be less than what is proven, m, near the clearance."""
 _FINE = 1e-3
 """The same, farther away, m."""
+_BETWEEN = 0.05
+"""How far a joint moves between the states, at most, m."""
 _MOST = 300_000
 """Steps that are halved, no more."""
 _STATES = 2_000
@@ -44,7 +46,8 @@ def worst_clearance(given: Given) -> Worst | None:
         found = f"nothing is nearer than {1e3 * far:.0f} mm"
     if known < wanted - _ROUNDING <= least:
         found = f"not searched to the end: {found}, and more than {1e3 * known:.2f} mm is proven"
-    ratio = max(1.0 + (wanted - min(least, known + _ROUNDING)) / UNIT, 0.0)
+        least = known
+    ratio = max(1.0 + (wanted - least) / UNIT, 0.0)
     return Worst(ratio, scene.names(pair), time, found)
 
 
@@ -151,13 +154,16 @@ class _Search:
 
 
 def _reaches(given: Given, scene: Scene) -> np.ndarray:
-    """Distances that points of pairs can have from the joints' axes, (n, P), m; 1 of sliding joints, 0 of others."""
+    """Distances that points of pairs can have from the axes of the joints between them, (n, P), m; 1 where they slide.
+
+    Joints that move both solids of a pair, or none, have no part in it.
+    """
     bodies = given.robot.urdf_dynamics.bodies
-    lengths = [np.linalg.norm(body.placement[:3, 3]) for body in bodies]
     slides = [
-        np.abs(given.states.q[:, j]).max() + 1e-3 if body.sliding else 0.0
+        np.abs(given.states.q[:, j]).max() + _BETWEEN if body.sliding else 0.0
         for j, body in enumerate(bodies)
     ]
+    lengths = [np.linalg.norm(body.placement[:3, 3]) for body in bodies]
     along = np.cumsum(np.array(lengths) + slides)
     centres, radii = scene.balls
     reach = np.zeros((len(bodies), len(scene.pairs)))

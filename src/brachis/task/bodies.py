@@ -1,0 +1,125 @@
+"""Bodies of a scene as a program makes them: ``scene=[brachis.Box([0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6])]``.
+
+All lengths are in m, angles in degrees. A body is fixed to the world, or to the link of the robot that ``link`` names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike, fspath
+from typing import Any, TypedDict, Unpack
+
+from pydantic import ValidationError
+
+from brachis.task.fields import plain
+from brachis.task.messages import task_error
+from brachis.task.scene import SceneBody
+
+
+class Where(TypedDict, total=False):
+    """What every body takes besides its shape."""
+
+    name: str
+    """Unique; left out: its shape and its number in the scene."""
+    link: str
+    """Link that carries it; left out: it stands still."""
+    position: Sequence[float]
+    """In the world, or in the link's frame, m."""
+    rpy_deg: Sequence[float]
+    """Roll, pitch, yaw about fixed axes, degrees."""
+
+
+def Box(size: Sequence[float], **where: Unpack[Where]) -> SceneBody:  # noqa: N802
+    """Make a box with lengths along x, y and z, m; `where`: see `Where`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Box([0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6])
+    SceneBody(box=[0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6])
+    """
+    return _make("Box", box=size, **where)
+
+
+def Sphere(radius: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
+    """Make a ball with a radius, m; `where`: see `Where`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Sphere(0.04, position=[0.35, 0.16, 0.53])
+    SceneBody(sphere=0.04, position=[0.35, 0.16, 0.53])
+    """
+    return _make("Sphere", sphere=radius, **where)
+
+
+def Cylinder(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
+    """Make a cylinder about its z axis, its middle at the origin, m; `where`: see `Where`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Cylinder(0.05, 1.2, name="post").shape
+    'cylinder'
+    """
+    shape = {"radius": radius, "length": length}
+    return _make("Cylinder", cylinder=shape, **where)
+
+
+def Capsule(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
+    """Make a cylinder with round caps, which its length leaves out, m; `where`: see `Where`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Capsule(0.03, 0.3, link="tool0", position=[0, 0, 0.15]).link
+    'tool0'
+    """
+    shape = {"radius": radius, "length": length}
+    return _make("Capsule", capsule=shape, **where)
+
+
+def HalfSpace(  # noqa: N802
+    normal: Sequence[float], offset: float = 0.0, *, name: str | None = None
+) -> SceneBody:
+    """Make all that is behind a plane, such as a floor.
+
+    Parameters
+    ----------
+    normal : sequence of float
+        Direction out of the half-space, any length.
+    offset : float, optional
+        Distance of the plane from the world's origin along the normal, m.
+    name : str, optional
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.HalfSpace([0, 0, 1], offset=-0.1).half_space.offset
+    -0.1
+    """
+    return _make(
+        "HalfSpace", half_space={"normal": normal, "offset": offset}, name=name
+    )
+
+
+def Mesh(  # noqa: N802
+    file: str | PathLike[str], scale: float = 1.0, **where: Unpack[Where]
+) -> SceneBody:
+    """Make the convex hull of a mesh file; `scale` turns its unit into m; `where`: see `Where`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Mesh("body.stl", scale=0.001, name="body").mesh
+    'body.stl'
+    """
+    return _make("Mesh", mesh=fspath(file), scale=scale, **where)
+
+
+def _make(maker: str, **keys: Any) -> SceneBody:
+    given = {key: plain(value) for key, value in keys.items() if value is not None}
+    try:
+        return SceneBody.model_validate(given)
+    except ValidationError as error:
+        raise task_error(error, maker, SceneBody) from None

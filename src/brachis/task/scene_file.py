@@ -1,0 +1,84 @@
+"""Scenes from a file of their own, and the files that a scene names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, ValidationError
+
+from brachis.common.files import read_text
+from brachis.errors import TaskError
+from brachis.task.fields import Model
+from brachis.task.messages import show, task_error
+from brachis.task.models import Task
+from brachis.task.scene import SceneBody, bodies_by_name
+from brachis.task.yaml_reader import read_yaml
+
+
+class SceneFile(Model):
+    """What a scene file says."""
+
+    brachis_scene: Literal[1]
+    """Version of the format."""
+    bodies: Annotated[tuple[SceneBody, ...], BeforeValidator(bodies_by_name)]
+    """Bodies as in scene; mesh files are relative to this file."""
+
+
+def with_scene_of_file(
+    content: Mapping[str, Any], source: str, folder: Path
+) -> Mapping[str, Any]:
+    """Return a task as it is written with the bodies of the file that its ``scene`` names.
+
+    Parameters
+    ----------
+    content : mapping
+        A task, not checked yet.
+    source : str
+        File name, or what else the task came from, for messages.
+    folder : Path
+        What the file's path is relative to.
+    """
+    scene = content.get("scene")
+    if not isinstance(scene, Mapping):
+        return content
+    if set(scene) != {"file"}:
+        raise TaskError(
+            "a scene is a list of bodies, or a file",
+            where=f"{source}: scene",
+            found=show(scene),
+            allowed="[{box: [...], position: [...]}, ...] or {file: cell.yaml}",
+        )
+    path = folder / str(scene["file"])
+    text = read_text(path, where=f"{source}: scene.file", folder=folder)
+    try:
+        file = SceneFile.model_validate(read_yaml(text, str(path)))
+    except ValidationError as error:
+        raise task_error(error, str(path), SceneFile) from None
+    return {**content, "scene": _with_paths(file.bodies, path.absolute().parent)}
+
+
+def with_absolute_files(task: Task, folder: Path) -> Task:
+    """Return the task with the paths of meshes and of an SRDF, relative to `folder`, made absolute."""
+    changes: dict[str, object] = {}
+    if task.scene:
+        changes["scene"] = _with_paths(task.scene, folder)
+    if task.collisions.srdf is not None:
+        srdf = {"srdf": _absolute(task.collisions.srdf, folder)}
+        changes["collisions"] = task.collisions.model_copy(update=srdf)
+    return task.model_copy(update=changes) if changes else task
+
+
+def _with_paths(bodies: tuple[SceneBody, ...], folder: Path) -> tuple[SceneBody, ...]:
+    return tuple(
+        body
+        if body.mesh is None
+        else body.model_copy(update={"mesh": _absolute(body.mesh, folder)})
+        for body in bodies
+    )
+
+
+def _absolute(name: str, folder: Path) -> str:
+    return os.path.abspath(folder / name)  # noqa: PTH100  (linked folders keep their names)

@@ -1,0 +1,262 @@
+"""Distances of a scene against formulas, Pinocchio and MuJoCo; bounds; which pairs there are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import brachis
+from brachis.errors import InputError
+from brachis.limits import Moments
+from brachis.limits.clearance import build_clearance
+from brachis.robot.from_task import robot_for
+from brachis.scene import UNIT, scene_of
+from brachis.scene.chain import Chain
+from brachis.verify.mechanics import carrier_in_text, joint_placements
+from support.mujoco_models import mujoco_model
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+BODIES = [
+    {"name": "box", "box": [0.2, 0.3, 0.4], "position": [0.5, 0.1, 0.6]},
+    {"name": "ball", "sphere": 0.1, "position": [-0.3, 0.4, 0.5]},
+    {"name": "floor", "half_space": {"normal": [0, 0, 2], "offset": -0.5}},
+    {
+        "name": "rod",
+        "capsule": {"radius": 0.05, "length": 0.3},
+        "position": [0.2, -0.5, 0.4],
+        "rpy_deg": [90, 20, 0],
+    },
+    {
+        "name": "drum",
+        "cylinder": {"radius": 0.1, "length": 0.3},
+        "position": [0.2, 0.5, 0.9],
+        "rpy_deg": [30, 60, 10],
+    },
+]
+NAMES = ("iiwa14", "tx90l_rail", "ur10_rail", "gen3_rails", "arm8", "scara3")
+
+
+def task(name="iiwa14", scene=BODIES, mounting="floor", **collisions):
+    urdf = ROBOTS / name / "robot.urdf"
+    n = brachis.Robot.from_urdf(urdf).n
+    return brachis.load_task(
+        {
+            "brachis": 1,
+            "robot": {"urdf": str(urdf), "mounting": mounting},
+            "start": {"joints": [0.0] * n},
+            "task_space": "position",
+            "path": [{"line": {"to": [0, 0, 0]}}],
+            "scene": scene,
+            "collisions": collisions,
+        }
+    )
+
+
+def scene(name="iiwa14", bodies=BODIES, **collisions):
+    given = task(name, bodies, **collisions)
+    robot = robot_for(None, given.robot)
+    return robot, scene_of(robot, given)
+
+
+def postures(robot, count=40):
+    return np.random.default_rng(1).uniform(-1.5, 1.5, (count, robot.n))
+
+
+def everything(found, placed):
+    """All pairs in all postures."""
+    count = len(found.pairs)
+    posture = np.arange(len(placed[0])).repeat(count)
+    return found.measure(placed, posture, np.tile(np.arange(count), len(placed[0])))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_joints_and_solids_stand_where_pinocchio_and_the_text_say(name):
+    given = task(name, mounting={"xyz": [0.1, 0.2, 0.3], "rpy_deg": [5, 6, 7]})
+    robot = robot_for(None, given.robot)
+    q = postures(robot)
+    placed = Chain.of(robot.model).place(q)
+    for k, data in enumerate(robot.place_joints(q)):
+        for joint, placement in enumerate(data.oMi):
+            np.testing.assert_allclose(
+                placed[0][k, joint], placement.rotation, atol=1e-12
+            )
+            np.testing.assert_allclose(
+                placed[1][k, joint], placement.translation, atol=1e-12
+            )
+    for mine, other in zip(placed, joint_placements(robot, q), strict=True):
+        np.testing.assert_allclose(mine, other, atol=1e-12)
+    planned, verified = (
+        scene_of(robot, given, *how) for how in ((), (carrier_in_text,))
+    )
+    np.testing.assert_allclose(planned.placements, verified.placements, atol=1e-12)
+    np.testing.assert_array_equal(planned.joints, verified.joints)
+
+
+def test_distances_of_balls_and_planes_are_those_of_formulas():
+    bodies = [
+        {"name": "ball", "sphere": 0.1, "position": [0.5, 0.3, 0.7]},
+        {"name": "held", "sphere": 0.05, "link": "tool", "position": [0, 0, 0.2]},
+        {"name": "floor", "half_space": {"normal": [0, 0, 2], "offset": 0.2}},
+    ]
+    robot, found = scene(bodies=bodies)
+    q = postures(robot)
+    position, turned = robot.tool_placements(q)
+    held = position + turned @ [0.0, 0.0, 0.2]
+    near = everything(found, Chain.of(robot.model).place(q))
+    names = [found.names(pair) for pair in near.pair]
+    apart = {
+        "ball and held": np.linalg.norm(held - [0.5, 0.3, 0.7], axis=1) - 0.15,
+        "held and floor": held[:, 2] - 0.1 - 0.05,
+    }
+    for pair, expected in apart.items():
+        own = [each == pair for each in names]
+        np.testing.assert_allclose(near.distance[own], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_bound_is_above_the_distance(name):
+    robot, found = scene(name)
+    placed = Chain.of(robot.model).place(postures(robot))
+    near = everything(found, placed)
+    bounds = found.bounds(placed)[near.posture, near.pair]
+    assert np.all(bounds <= near.distance + 1e-6)
+    for within in (0.0, 0.1, 0.5):
+        few = found.near(placed, within)
+        assert len(few.pair) == np.count_nonzero(near.distance < within)
+        assert np.all(few.distance < within)
+
+
+@pytest.mark.parametrize("name", ["iiwa14", "tx90l_rail", "gen3_rails"])
+def test_mujoco_finds_the_same_distances(name):
+    mujoco = pytest.importorskip("mujoco")
+    robot, found = scene(name, [{"name": "far", "sphere": 0.1, "position": [9, 9, 9]}])
+    model, order = mujoco_model(robot)
+    data = mujoco.MjData(model)
+    q = postures(robot, 10)
+    near = everything(found, Chain.of(robot.model).place(q))
+    geoms = {}
+    for geom in range(model.ngeom):
+        link = model.body(model.geom_bodyid[geom]).name
+        geoms.setdefault(link, []).append(geom)
+    checked = 0
+    for k, posture in enumerate(q):
+        data.qpos[order] = posture
+        mujoco.mj_forward(model, data)
+        for pair, distance in zip(
+            near.pair[near.posture == k], near.distance[near.posture == k], strict=True
+        ):
+            solids = [found.solids[i] for i in found.pairs[pair]]
+            links = [geoms.get(solid.link or "", []) for solid in solids]
+            if any(len(own) != 1 for own in links) or distance < 0.01:
+                continue
+            other = mujoco.mj_geomDistance(
+                model, data, links[0][0], links[1][0], 5.0, None
+            )
+            assert distance == pytest.approx(other, abs=2e-5)
+            checked += 1
+    assert checked > 5
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_slopes_agree_with_differences(name):
+    given = task(name)
+    robot = robot_for(None, given.robot)
+    limit = build_clearance(robot, given)
+    q = postures(robot)
+    values = limit.values(Moments.at_rest(q))
+    exact = limit.partials(Moments.at_rest(q)).q
+    step = 1e-5
+    for joint in range(robot.n):
+        moved = []
+        for sign in (1.0, -1.0):
+            other = q.copy()
+            other[:, joint] += sign * step
+            moved.append(limit.values(Moments.at_rest(other)))
+        far = values.max() - 1e-9
+        is_near = (values > 0.0) & (values < far) & (moved[0] < far) & (moved[1] < far)
+        slopes = (moved[0] - moved[1]) / (2.0 * step)
+        off = np.abs(slopes - exact[:, :, joint])[is_near] * UNIT
+        # Coal's nearest points are exact to about 1e-5 m.
+        assert off.max(initial=0.0) < 1e-4
+        assert np.count_nonzero(off > 1e-5) <= 0.05 * len(off)
+
+
+def test_links_that_meet_or_always_touch_are_no_pairs():
+    robot, found = scene()
+    links = {
+        frozenset(found.solids[i].link for i in pair)
+        for pair in found.pairs
+        if all(found.solids[i].link for i in pair)
+    }
+    assert frozenset({"link_2", "link_5"}) in links
+    assert frozenset({"link_3", "link_4"}) not in links
+    near = everything(found, Chain.of(robot.model).place(postures(robot, 300)))
+    touching = np.bincount(near.pair[near.distance < 0.0], minlength=len(found.pairs))
+    assert touching.max() < 300
+
+
+def test_pairs_are_disabled_by_link_and_by_name():
+    _, found = scene()
+    _, fewer = scene(disable=[["link_2", "link_5"], ["ball", "link_7"]])
+    names = {found.names(pair) for pair in range(len(found.pairs))}
+    kept = {fewer.names(pair) for pair in range(len(fewer.pairs))}
+    assert names - kept == {
+        "link_2 and link_5 0",
+        "link_2 and link_5 1",
+        "link_7 and ball",
+    }
+    _, alone = scene(self_collision=False)
+    assert all(any(alone.solids[i].link is None for i in pair) for pair in alone.pairs)
+
+
+def test_padding_makes_links_larger():
+    robot, found = scene()
+    _, padded = scene(padding={"link_6": 0.02})
+    placed = Chain.of(robot.model).place(postures(robot, 5))
+    apart = everything(found, placed).distance - everything(padded, placed).distance
+    own = np.array(
+        ["link_6" in found.names(pair) for pair in range(len(found.pairs))] * 5
+    )
+    is_apart = everything(padded, placed).distance > 0.0
+    np.testing.assert_allclose(apart[own & is_apart], 0.02, atol=1e-8)
+    np.testing.assert_allclose(apart[~own], 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ({"box": [1, 1, 1], "sphere": 1.0}, "exactly one shape"),
+        ({"name": "post"}, "exactly one shape"),
+        ({"box": [1, 1]}, "box"),
+        ({"sphere": -1.0}, "sphere"),
+        ({"half_space": {"normal": [0, 0, 0]}}, "no direction"),
+        ({"half_space": {"normal": [0, 0, 1]}, "link": "tool"}, "fixed to the world"),
+        ({"sphere": 1.0, "link": "tol"}, "tool"),
+        ({"mesh": "missing.stl"}, "missing.stl"),
+    ],
+)
+def test_wrong_bodies_are_refused(body, says):
+    with pytest.raises(InputError, match=says):
+        scene(bodies=[body])
+
+
+def test_a_robot_without_collision_geometry_is_refused_or_gets_capsules(tmp_path):
+    urdf = tmp_path / "robot.urdf"
+    text = (ROBOTS / "iiwa14/robot.urdf").read_text()
+    urdf.write_text(text.replace("collision>", "other>"))
+    given = task()
+    robot = brachis.Robot.from_urdf(urdf)
+    with pytest.raises(InputError, match="capsules: auto"):
+        scene_of(robot, given)
+    given = task(capsules="auto")
+    found = scene_of(robot, given)
+    assert {type(solid.geometry).__name__ for solid in found.solids[:7]} == {"Capsule"}
+    data = next(iter(robot.place_joints(np.zeros((1, 7)))))
+    (first,) = (solid for solid in found.solids if solid.link == "link_2")
+    joint = pin.SE3(first.placement)
+    middle = data.oMi[2].act(joint.translation)
+    ends = data.oMi[2].translation, data.oMi[3].translation
+    np.testing.assert_allclose(middle, 0.5 * (ends[0] + ends[1]), atol=1e-9)
