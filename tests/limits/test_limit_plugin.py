@@ -150,7 +150,7 @@ def test_wrong_parameters_are_said(parameters, said):
 
 def test_a_start_posture_beyond_it_is_refused(plugin):
     model = plugin.CoupledRange(("j2", "j3"), 0.5, 0.7)
-    said = "the range limit of 'j2 + j3' is exceeded at rest; found 0 rad needed at rest; allowed: 0.5 to 0.7 rad"
+    said = "the range limit of 'j2 + j3' is exceeded at rest; found 0 rad at rest; allowed: 0.5 to 0.7 rad"
     with pytest.raises(brachis.errors.StartError, match=re.escape(said)):
         brachis.plan(ROOT / "examples/01_scara_line.yaml", own_limits=[model])
 

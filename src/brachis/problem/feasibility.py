@@ -161,16 +161,16 @@ def _check_at_rest(
         more = ""
         if others:
             # No number for one of several joints is enough.
-            more = f"; too low as well: {others}"
+            more = f"; likewise {others}"
             remedies = [remedy for remedy in remedies if remedy.key != label.key]
         hint = "Choose another posture"
         keys = dict.fromkeys(one.key for one in weak if one.key)
         if keys and label.key not in {one.key for one in remedies}:
-            hint += f", or raise {', '.join(keys)}"
+            hint += f", or change {', '.join(keys)}"
         raise StartError(
             f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
             where=f"{name}.joints",
-            found=f"{found} {label.unit} needed at rest{more}",
+            found=f"{found} {label.unit} at rest{more}",
             allowed=f"{allowed} {label.unit}",
             hint=hint,
         ).with_remedies(*remedies)

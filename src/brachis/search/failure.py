@@ -256,7 +256,7 @@ def _check_at_rest(
             label = limit.labels[column]
             remedies = load_remedies(robot, limit, column, 1.0 + worst)
             needed, bound = in_figures(limit, column, float(values[best, column]))
-            lack = f" ({label.subject} needs {needed} {label.unit} and has {bound} {label.unit})"
+            lack = f" ({label.subject}: {needed} {label.unit} at best, allowed: {bound} {label.unit})"
     return allowed, lack, remedies
 
 

@@ -113,7 +113,7 @@ def test_torque_cannot_hold_the_arm(run, task, write):
     assert outcome.code == 2
     for part in (
         "the torque limit of 'j1' cannot hold the arm against gravity",
-        "Nm needed at rest",
+        "Nm at rest",
         "10 Nm",
         "robot.limits.torque.j1",
     ):

@@ -43,6 +43,8 @@ _OTHER_TASKS = (
     "this family solves only the position: x, y and z",
 )
 """Reasons of families for other task spaces; shown only without other reasons."""
+_PAIRS = 12
+"""Pairs that may collide that are shown, no more."""
 
 
 def inspect(
@@ -136,6 +138,7 @@ def inspect(
         "in_use": in_use(robot),
         "joints": _joint_rows(robot),
         "guarantees": describe_guarantees(limits),
+        "collisions": _collisions(robot, task),
         "decompositions": [_decomposition(candidate) for candidate in candidates],
         "fits": [fit.to_dict() for fit in task.fits] if task else [],
     }
@@ -160,6 +163,14 @@ def _print_robot(
     print_lines(*(f"{name}: {text}" for name, text in data["in_use"].items()))
     guarantees = data["guarantees"].items()
     print_lines(*(f"{name} limit: {text}" for name, text in guarantees))
+    pairs = data["collisions"]["pairs"]
+    if pairs:
+        print_lines(
+            f"{write_count(len(pairs), 'pair')} that may collide (all: --json):"
+        )
+        print_lines(
+            "  " + "; ".join(pairs[:_PAIRS]) + (", ..." if len(pairs) > _PAIRS else "")
+        )
     if task is not None and not task.fits:
         print_lines("no part of the path comes from points")
     for fit in task.fits if task is not None else ():
@@ -173,6 +184,19 @@ def _print_robot(
         )
     else:
         _print_decompositions(data["decompositions"])
+
+
+def _collisions(robot: Robot, task: Task | None) -> dict[str, list[str]]:
+    """List the solids of robot and scene, and the pairs of them that may collide, by name."""
+    from brachis.scene import scene_of
+
+    scene = None if task is None else scene_of(robot, task)
+    if scene is None:
+        return {"solids": [], "pairs": []}
+    return {
+        "solids": [solid.name for solid in scene.solids],
+        "pairs": [scene.names(pair) for pair in range(len(scene.pairs))],
+    }
 
 
 def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:

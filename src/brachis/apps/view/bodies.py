@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from lxml import etree
 
+from brachis.apps.view.solids import scene_meshes
 from brachis.common.files import mesh_file
 from brachis.errors import InputError
 from brachis.path import path_of
@@ -32,6 +33,7 @@ _COLOURS = {
     "bone": (72, 101, 129, 255),
     "joint": (230, 159, 0, 255),
     "axis": (120, 130, 140, 255),
+    "scene": (190, 120, 90, 255),
 }
 """RGBA from 0 to 255."""
 _LARGEST = 200_000_000
@@ -258,6 +260,9 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         for mesh in meshes:
             mesh.apply_transform(frame.placement.homogeneous)
         links.setdefault(int(frame.parentJoint), []).extend(meshes)
+    for joint, meshes in scene_meshes(trajectory).items():
+        coloured = [with_colour(mesh, _COLOURS["scene"]) for mesh in meshes]
+        links.setdefault(joint, []).extend(coloured)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     positions, quaternions = placements(robot, q)
     size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
