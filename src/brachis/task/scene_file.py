@@ -51,8 +51,10 @@ def with_scene_of_file(
             found=show(scene),
             allowed="[{box: [...], position: [...]}, ...] or {file: cell.yaml}",
         )
-    path = folder / str(scene["file"])
-    text = read_text(path, where=f"{source}: scene.file", folder=folder)
+    name = str(scene["file"])
+    path = folder / name
+    where = f"{source}: scene.file"
+    text = read_text(path, where=where, folder=folder, found=name)
     try:
         file = SceneFile.model_validate(read_yaml(text, str(path)))
     except ValidationError as error:

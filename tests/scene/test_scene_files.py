@@ -1,0 +1,194 @@
+"""Scenes from files and from Python, meshes, SRDF; what inspect and the viewer show of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import brachis
+from brachis.errors import TaskError
+from brachis.robot.from_task import robot_for
+from brachis.scene import scene_of
+from support.command_line import code_of, interrupts_kept
+
+IIWA = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
+TASK = {
+    "brachis": 1,
+    "robot": {"urdf": str(IIWA)},
+    "start": {"joints": [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0]},
+    "task_space": "pose",
+    "path": [{"line": {"by": [0, 0.2, 0]}}],
+}
+TETRAHEDRON = """solid t
+facet normal 0 0 -1
+outer loop
+vertex 0 0 0
+vertex 0 100 0
+vertex 100 0 0
+endloop
+endfacet
+facet normal 0 -1 0
+outer loop
+vertex 0 0 0
+vertex 100 0 0
+vertex 0 0 100
+endloop
+endfacet
+facet normal -1 0 0
+outer loop
+vertex 0 0 0
+vertex 0 0 100
+vertex 0 100 0
+endloop
+endfacet
+facet normal 1 1 1
+outer loop
+vertex 100 0 0
+vertex 0 100 0
+vertex 0 0 100
+endloop
+endfacet
+endsolid t
+"""
+
+
+def found(task):
+    return scene_of(robot_for(None, task.robot), task)
+
+
+def write(folder, name, content):
+    file = folder / name
+    text = content if isinstance(content, str) else yaml.safe_dump(content)
+    file.write_text(text)
+    return file
+
+
+def test_bodies_in_python_are_those_of_a_file(tmp_path):
+    content = {
+        "brachis_scene": 1,
+        "bodies": [
+            {
+                "box": [0.1, 0.1, 1.2],
+                "position": [0.5, 0.2, 0.6],
+                "rpy_deg": [0, 0, 30],
+            },
+            {"name": "ball", "sphere": 0.04, "position": [0.4, 0.2, 0.5]},
+            {
+                "name": "torch",
+                "capsule": {"radius": 0.03, "length": 0.3},
+                "link": "tool",
+            },
+            {"name": "drum", "cylinder": {"radius": 0.3, "length": 0.1}},
+            {"name": "floor", "half_space": {"normal": [0, 0, 1], "offset": -0.1}},
+        ],
+    }
+    write(tmp_path, "cell.yaml", content)
+    file = write(tmp_path, "task.yaml", {**TASK, "scene": {"file": "cell.yaml"}})
+    in_file = brachis.load_task(file).scene
+    in_python = [
+        brachis.Box([0.1, 0.1, 1.2], position=[0.5, 0.2, 0.6], rpy_deg=[0, 0, 30]),
+        brachis.Sphere(0.04, name="ball", position=np.array([0.4, 0.2, 0.5])),
+        brachis.Capsule(0.03, 0.3, name="torch", link="tool"),
+        brachis.Cylinder(0.3, 0.1, name="drum"),
+        brachis.HalfSpace([0, 0, 1], -0.1, name="floor"),
+    ]
+    assert in_file == brachis.load_task({**TASK, "scene": in_python}).scene
+    assert in_file[0].name == "box 0"
+    again = brachis.load_task(brachis.load_task(file).to_dict())
+    assert again.scene == in_file
+
+
+def test_a_mesh_is_its_hull_and_its_file_is_beside_the_scene(tmp_path):
+    (tmp_path / "cell").mkdir()
+    write(tmp_path / "cell", "body.stl", TETRAHEDRON)
+    body = {"name": "body", "mesh": "body.stl", "scale": 0.001, "position": [1, 0, 0]}
+    write(tmp_path / "cell", "cell.yaml", {"brachis_scene": 1, "bodies": [body]})
+    file = write(tmp_path, "task.yaml", {**TASK, "scene": {"file": "cell/cell.yaml"}})
+    task = brachis.load_task(file)
+    assert Path(task.scene[0].mesh) == tmp_path / "cell/body.stl"
+    solid = found(task).solids[-1]
+    corners = np.array(solid.geometry.points())
+    assert sorted(corners.round(6).tolist()) == [
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.1],
+        [0.0, 0.1, 0.0],
+        [0.1, 0.0, 0.0],
+    ]
+
+
+def test_an_srdf_disables_pairs(tmp_path):
+    write(
+        tmp_path,
+        "arm.srdf",
+        '<robot><disable_collisions link1="link_2" link2="link_5" reason="Never"/></robot>',
+    )
+    ball = [{"sphere": 0.1, "position": [2, 0, 0]}]
+    file = write(
+        tmp_path,
+        "task.yaml",
+        {**TASK, "scene": ball, "collisions": {"srdf": "arm.srdf"}},
+    )
+    scene = found(brachis.load_task(file))
+    names = {scene.names(pair) for pair in range(len(scene.pairs))}
+    assert "link_2 and link_5 0" not in names
+    assert "link_2 and link_6" in names
+
+
+@pytest.mark.parametrize(
+    ("scene", "says"),
+    [
+        (
+            {"fil": "cell.yaml"},
+            r"a list of bodies, or a file.*allowed: .*file: cell.yaml",
+        ),
+        ({"file": "absent.yaml"}, r"absent.yaml"),
+        ([{"bx": [1, 1, 1]}], r"scene\[0\].*bx"),
+        ([{"name": "a", "sphere": "1"}], r"scene\[0\].sphere.*a number"),
+    ],
+)
+def test_a_wrong_scene_is_refused(scene, says):
+    with pytest.raises(TaskError, match=says):
+        brachis.load_task({**TASK, "scene": scene})
+
+
+def test_inspect_lists_pairs_and_json_has_all(tmp_path, capfd):
+    ball = [{"name": "ball", "sphere": 0.1, "position": [2, 0, 0]}]
+    file = write(tmp_path, "task.yaml", {**TASK, "scene": ball})
+    with interrupts_kept():
+        assert code_of("inspect", file) == 0
+        assert "pairs that may collide" in capfd.readouterr().out
+        assert code_of("inspect", file, "--json") == 0
+    data = json.loads(capfd.readouterr().out)
+    assert "link_7 and ball" in data["collisions"]["pairs"]
+    assert data["collisions"]["solids"][-1] == "ball"
+
+
+def test_the_viewer_draws_the_bodies_where_they_are():
+    trimesh = pytest.importorskip("trimesh")
+    from brachis.apps.view.solids import scene_meshes
+
+    scene = [
+        brachis.Box([0.2, 0.4, 0.6], position=[1, 0, 0], name="box"),
+        brachis.Capsule(0.1, 0.2, link="tool", position=[0, 0, 0.3], name="rod"),
+        brachis.HalfSpace([0, 0, 1], -0.5, name="floor"),
+    ]
+    result = brachis.plan(
+        {**TASK, "scene": scene}, effort="single", intervals=8, least_motion=False
+    )
+    meshes = scene_meshes(result.trajectory)
+    assert {joint: len(own) for joint, own in meshes.items()} == {0: 2, 7: 1}
+    box, floor = meshes[0]
+    assert isinstance(box, trimesh.Trimesh)
+    np.testing.assert_allclose(box.bounds, [[0.9, -0.2, -0.3], [1.1, 0.2, 0.3]])
+    assert floor.bounds[1, 2] == pytest.approx(-0.5)
+    # The tool is 45 mm in front of joint 7.
+    np.testing.assert_allclose(
+        meshes[7][0].bounds.mean(axis=0), [0, 0, 0.345], atol=1e-6
+    )
+    np.testing.assert_allclose(
+        np.ptp(meshes[7][0].bounds, axis=0), [0.2, 0.2, 0.4], atol=2e-3
+    )
