@@ -41,11 +41,10 @@ SIZES = (0.03, 0.15)
 LIMIT = 60.0
 """Time that a plan may take, s."""
 AUTO = {"spline.intervals": "auto", "spline.rest": "velocity"}
-rng_type = np.random.Generator
 
 
 def obstacle(
-    rng: rng_type, centre: np.ndarray, radius: float, *, tall: bool
+    rng: np.random.Generator, centre: np.ndarray, radius: float, *, tall: bool
 ) -> dict[str, object]:
     """Draw an obstacle within a ball, or for an arm in the plane a tall one within a circle."""
     placed = {"position": centre.tolist()}
@@ -61,20 +60,27 @@ def obstacle(
     return {"capsule": {"radius": 0.5 * radius, "length": radius}, **placed}
 
 
-def room(task: Task, q: np.ndarray, body: dict[str, object]) -> tuple[float, Scene]:
+def distance_to(
+    task: Task, q: np.ndarray, body: dict[str, object]
+) -> tuple[float, Scene]:
     """Least distance of a body from the robot in postures, (K, n), m, and the scene with it alone."""
     own = load_task({**task.to_dict(), "scene": [body]})
     robot = robot_for(None, own.robot)
     scene = scene_of(robot, own)
     assert scene is not None
     last = len(scene.solids) - 1
-    scene = scene.only(np.flatnonzero((scene.pairs == last).any(axis=1)))
-    near = scene.near(Chain.of(robot.model).place(q), 1.0)
-    return float(near.distance.min(initial=1.0)), scene
+    scene = scene.with_pairs(np.flatnonzero((scene.pairs == last).any(axis=1)))
+    close = scene.find_close(Chain.of(robot.model).place(q), 1.0)
+    return float(close.distance.min(initial=1.0)), scene
 
 
 def draw(
-    rng: rng_type, task: Task, known: np.ndarray, planned: np.ndarray, *, tall: bool
+    rng: np.random.Generator,
+    task: Task,
+    known: np.ndarray,
+    planned: np.ndarray,
+    *,
+    tall: bool,
 ) -> list[dict[str, object]] | None:
     """Draw the obstacles of a scene; None where the plan is everywhere too near to the known motion."""
     robot = robot_for(None, task.robot)
@@ -95,13 +101,13 @@ def draw(
         if tall:
             centre[2] = 0.0
         point = obstacle(rng, centre, 1e-3, tall=tall)
-        radius = min(room(task, known, point)[0] - clearance, SIZES[1])
+        radius = min(distance_to(task, known, point)[0] - clearance, SIZES[1])
         if radius < SIZES[0]:
             continue
         body = obstacle(rng, centre, radius, tall=tall)
-        if room(task, known, body)[0] < task.collisions.clearance:
+        if distance_to(task, known, body)[0] < task.collisions.clearance:
             continue
-        if not bodies and room(task, planned, body)[0] > -0.01:
+        if not bodies and distance_to(task, planned, body)[0] > -0.01:
             continue
         bodies.append(body)
         if len(bodies) == wanted:
@@ -118,7 +124,7 @@ def known_time(task: Task, s: np.ndarray, q: np.ndarray) -> float:
     return np.inf if timing is None else timing.t_end
 
 
-def smallest(task: Task, trajectory: brachis.Trajectory) -> float:
+def find_smallest(task: Task, trajectory: brachis.Trajectory) -> float:
     """Smallest distance at 2,000 instants by Pinocchio, without the self-collisions, m."""
     robot = trajectory.robot
     scene = scene_of(robot, task)
@@ -143,7 +149,9 @@ def smallest(task: Task, trajectory: brachis.Trajectory) -> float:
     return least
 
 
-def tried(robot: str, seed: int, number: int, folder: Path) -> tuple[str, ...] | None:
+def plan_scene(
+    robot: str, seed: int, number: int, folder: Path
+) -> tuple[str, ...] | None:
     """Plan one scene; None where none could be made."""
     made = mixed_cases.case(robot, seed, number, folder)
     task = load_task(made.task, changes=AUTO)
@@ -152,7 +160,7 @@ def tried(robot: str, seed: int, number: int, folder: Path) -> tuple[str, ...] |
     rng = np.random.default_rng([seed, number, ROBOTS.index(robot)])
     bare = robot_for(None, task.robot)
     arm = known[:, : bare.n]  # without a free roll
-    if room(task, arm, {"sphere": 0.01, "position": [50.0, 0.0, 0.0]})[0] < 1.0:
+    if distance_to(task, arm, {"sphere": 0.01, "position": [50.0, 0.0, 0.0]})[0] < 1.0:
         return None
     try:
         free = brachis.plan(task, strict=False)
@@ -175,7 +183,7 @@ def tried(robot: str, seed: int, number: int, folder: Path) -> tuple[str, ...] |
         seconds = f"{time.perf_counter() - began:.1f} s"
         return name, f"{type(error).__name__}: {str(error)[:200]}", *times, "", seconds
     seconds = f"{time.perf_counter() - began:.1f} s ({processor_time() - busy:.1f} s)"
-    distance = f"{1e3 * smallest(task, result.trajectory):.2f} mm"
+    distance = f"{1e3 * find_smallest(task, result.trajectory):.2f} mm"
     verdict = f"{result.t_end:.4f} s" + ("" if result.verified else " NOT verified")
     if result.t_end > least:
         verdict += " SLOWER than known"
@@ -196,7 +204,7 @@ def main() -> None:
         for robot in [given.robot] if given.robot else ROBOTS:
             made = 0
             for number in range(6 * given.count):
-                row = tried(robot, given.seed, number, Path(folder))
+                row = plan_scene(robot, given.seed, number, Path(folder))
                 if row is None:
                     continue
                 rows.append(row)

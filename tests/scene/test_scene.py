@@ -15,7 +15,7 @@ from brachis.limits.clearance import build_clearance
 from brachis.robot.from_task import robot_for
 from brachis.scene import UNIT, scene_of
 from brachis.scene.chain import Chain
-from brachis.verify.mechanics import carrier_in_text, joint_placements
+from brachis.verify.mechanics import joint_placements
 from support.mujoco_models import mujoco_model
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -88,11 +88,15 @@ def test_joints_and_solids_stand_where_pinocchio_and_the_text_say(name):
             )
     for mine, other in zip(placed, joint_placements(robot, q), strict=True):
         np.testing.assert_allclose(mine, other, atol=1e-12)
-    planned, verified = (
-        scene_of(robot, given, *how) for how in ((), (carrier_in_text,))
-    )
-    np.testing.assert_allclose(planned.placements, verified.placements, atol=1e-12)
-    np.testing.assert_array_equal(planned.joints, verified.joints)
+    found = scene_of(robot, given)
+    for solid, joint, placed in zip(
+        found.solids, found.joints, found.placements, strict=True
+    ):
+        if solid.link is not None:
+            frame = robot.model.frames[robot.model.getFrameId(solid.link)]
+            expected = frame.placement.homogeneous @ solid.placement
+            assert joint == frame.parentJoint
+            np.testing.assert_allclose(placed, expected, atol=1e-12)
 
 
 def test_distances_of_balls_and_planes_are_those_of_formulas():
@@ -124,7 +128,7 @@ def test_no_bound_is_above_the_distance(name):
     bounds = found.bounds(placed)[near.posture, near.pair]
     assert np.all(bounds <= near.distance + 1e-6)
     for within in (0.0, 0.1, 0.5):
-        few = found.near(placed, within)
+        few = found.find_close(placed, within)
         assert len(few.pair) == np.count_nonzero(near.distance < within)
         assert np.all(few.distance < within)
 
@@ -235,12 +239,63 @@ def test_padding_makes_links_larger():
         ({"half_space": {"normal": [0, 0, 0]}}, "no direction"),
         ({"half_space": {"normal": [0, 0, 1]}, "link": "tool"}, "fixed to the world"),
         ({"sphere": 1.0, "link": "tol"}, "tool"),
+        (
+            {"half_space": {"normal": [0, 0, 1]}, "position": [0, 0, 1]},
+            "no other place",
+        ),
         ({"mesh": "missing.stl"}, "missing.stl"),
     ],
 )
 def test_wrong_bodies_are_refused(body, says):
     with pytest.raises(InputError, match=says):
         scene(bodies=[body])
+
+
+def test_names_are_unique_and_known():
+    twice = [{"name": "a", "sphere": 0.1}, {"name": "a", "sphere": 0.2}]
+    with pytest.raises(InputError, match="two bodies have this name"):
+        scene(bodies=twice)
+    with pytest.raises(InputError, match="link_6"):
+        scene(padding={"link_66": 0.1})
+    with pytest.raises(InputError, match="link_6"):
+        scene(disable=[["link_66", "ball"]])
+
+
+def test_a_link_that_is_disabled_does_not_free_what_it_holds():
+    held = {"name": "torch", "sphere": 0.05, "link": "link_7", "position": [0, 0, 0.2]}
+    _, found = scene(bodies=[held, BODIES[0]], disable=[["link_7", "box"]])
+    names = {found.names(pair) for pair in range(len(found.pairs))}
+    assert "torch and box" in names
+    assert "link_7 and box" not in names
+
+
+def test_a_body_that_is_always_hit_stays():
+    """Only the robot's own links that always touch are left out."""
+    stand = {"name": "stand", "box": [0.5, 0.5, 0.8], "position": [0, 0, 0.4]}
+    _, found = scene(bodies=[stand])
+    names = {found.names(pair) for pair in range(len(found.pairs))}
+    assert "link_1 0 and stand" in names
+    assert "link_0 and stand" not in names
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        '<box size="1 1"/>',
+        "<sphere/>",
+        '<cylinder radius="1"/>',
+        '<sphere radius="-1"/>',
+    ],
+)
+def test_wrong_collision_geometry_is_refused(shape, tmp_path):
+    text = (ROBOTS / "iiwa14/robot.urdf").read_text()
+    first = '<cylinder radius="0.1" length="0.1575"/>'
+    begin = text.index("<collision>")
+    assert text.index(first, begin) < text.index("</collision>", begin)
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(text[:begin] + text[begin:].replace(first, shape, 1))
+    with pytest.raises(InputError, match="collision geometry cannot be read"):
+        scene_of(brachis.Robot.from_urdf(urdf), task())
 
 
 def test_a_robot_without_collision_geometry_is_refused_or_gets_capsules(tmp_path):

@@ -44,7 +44,7 @@ def dense(result, count=20_000):
     robot = robot_for(None, trajectory.task.robot)
     found = scene_of(robot, trajectory.task)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, count))
-    return found.near(Chain.of(robot.model).place(q), 1.0).distance.min()
+    return found.find_close(Chain.of(robot.model).place(q), 1.0).distance.min()
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_what_is_proven_is_never_more_than_what_is_there(elbow):
         if least < 0.06:
             assert check.value == pytest.approx(1.0 + (0.01 - least) / 0.1, abs=2e-4)
         else:
-            assert "nothing is nearer than 60 mm" in check.remark
+            assert "nothing is closer than 60 mm" in check.remark
 
 
 def test_bodies_on_a_link_move_with_it():

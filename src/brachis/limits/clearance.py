@@ -11,22 +11,22 @@ import numpy as np
 
 from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials, Role
 from brachis.robot import Robot
-from brachis.scene import UNIT, Near, Scene, scene_of
+from brachis.scene import UNIT, ClosePairs, Scene, scene_of
 from brachis.scene.chain import Chain
 from brachis.task import Task
 
 _FAR = 0.1
 """Distance from which on it is not computed, beyond the clearance, m."""
 _SPARE = 2e-4
-"""By how much the planner keeps farther away than the clearance, m: splines cut its path by so much at most."""
+"""Distance that joint paths keep beside the clearance, m: splines leave them by so much at most."""
 _NEARBY = 2.0
-"""Pairs are left out that stay so many times `_FAR` apart in all postures that are known to be near."""
+"""Pairs are left out that stay so many times `_FAR` apart where the motion begins."""
 
 
 _STRIDE = 0.05
-"""Way of the solids in a step between postures after which it is looked whether they are free, m."""
+"""Distance that solids move between two checks on a step of the lattice, m."""
 _MOST_STRIDES = 16
-"""Strides in a step, no more."""
+"""Checks on a step, no more."""
 
 
 class Clearance(Limit):
@@ -40,50 +40,60 @@ class Clearance(Limit):
         Its pairs are the values.
     clearance : float
         m.
+    lower : (P,) ndarray, optional
+        Bounds of the values, where they are not the clearance.
     """
 
     kind = "clearance"
     role = Role.SCENE
     at_rest = "posture"
-    violation_scale = UNIT
     refusal = "is not kept"
 
-    def __init__(self, chain: Chain, scene: Scene, clearance: float) -> None:
+    def __init__(
+        self,
+        chain: Chain,
+        scene: Scene,
+        clearance: float,
+        lower: np.ndarray | None = None,
+    ) -> None:
         count = len(scene.pairs)
         self._chain = chain
         self._scene = scene
         self._clearance = clearance
-        self._last: tuple[bytes, Near] | None = None
+        self._last: tuple[bytes, ClosePairs] | None = None
         self.labels = tuple(
             Label(scene.names(pair), "clearance", "m", "collisions.clearance")
             for pair in range(count)
         )
-        self.lower = np.full(count, (self._clearance + _SPARE) / UNIT)
+        self.lower = np.full(count, clearance / UNIT) if lower is None else lower
         self.upper = np.full(count, np.inf)
         self.bounds = tuple(
             Bound(pair, self._clearance, self._clearance or UNIT, 1.0 / UNIT, "lower")
             for pair in range(count)
         )
 
-    def near(self, q: np.ndarray) -> Clearance | None:
-        """Leave out the pairs that are far apart in all postures, (K, n)."""
+    def restrict_to(self, q: np.ndarray) -> Clearance | None:
+        """Keep the pairs that come close in postures, (K, n), and a little more than the clearance between them."""
+        q = q[np.isfinite(q).all(axis=1)]
         within = self._clearance + _NEARBY * _FAR
-        near = self._scene.near(self._chain.place(q), within)
-        kept = np.unique(near.pair)
+        close = self._scene.find_close(self._chain.place(q), within)
+        kept = np.unique(close.pair)
         if not len(kept):
             return None
-        return Clearance(self._chain, self._scene.only(kept), self._clearance)
+        lower = self.lower[kept] + _SPARE / UNIT
+        scene = self._scene.with_pairs(kept)
+        return Clearance(self._chain, scene, self._clearance, lower)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
-        """Tell in which postures, (K, n), no pair is too near, (K,)."""
-        within = self._clearance - slack
-        near = self._scene.near(self._chain.place(q), within)
-        return np.bincount(near.posture, minlength=len(q)) == 0
+        """Tell in which postures, (K, n), no pair is too close, (K,)."""
+        within = (self.lower.min(initial=np.inf) - slack) * UNIT
+        close = self._scene.find_close(self._chain.place(q), within)
+        return np.bincount(close.posture, minlength=len(q)) == 0
 
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
-        """Tell on which straight steps no pair is too near, where the solids have moved on by `_STRIDE`."""
+        """Tell on which straight steps no pair is too close, where the solids have moved on by `_STRIDE`."""
         ends = [self._scene.centres(self._chain.place(q)) for q in (first, last)]
         moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1, initial=0.0)
         count = np.ceil(moved / _STRIDE).clip(1, _MOST_STRIDES).astype(int) - 1
@@ -96,31 +106,31 @@ class Clearance(Limit):
         free[number[~holds]] = False
         return free
 
-    def _near(self, q: np.ndarray) -> Near:
+    def _close_pairs(self, q: np.ndarray) -> ClosePairs:
         key = q.tobytes()
         if self._last is None or self._last[0] != key:
             within = self._clearance + _FAR
-            self._last = (key, self._scene.near(self._chain.place(q), within))
+            self._last = (key, self._scene.find_close(self._chain.place(q), within))
         return self._last[1]
 
     def values(self, motion: JointStates) -> np.ndarray:
         """Distances, (K, P), in units of `UNIT`."""
-        near = self._near(motion.q)
+        close = self._close_pairs(motion.q)
         shape = (len(motion.q), len(self.labels))
         found = np.full(shape, (self._clearance + _FAR) / UNIT)
-        found[near.posture, near.pair] = near.distance / UNIT
+        found[close.posture, close.pair] = close.distance / UNIT
         return found
 
     def partials(self, motion: JointStates) -> Partials:
-        near = self._near(motion.q)
-        joints = self._scene.joints[self._scene.pairs[near.pair]]
+        close = self._close_pairs(motion.q)
+        joints = self._scene.joints[self._scene.pairs[close.pair]]
         placed = self._chain.place(motion.q)
-        slopes = np.zeros((len(near.pair), motion.q.shape[1]))
+        slopes = np.zeros((len(close.pair), motion.q.shape[1]))
         for side, sign in ((0, -1.0), (1, 1.0)):
-            moving = (near.posture, joints[:, side], near.points[:, side])
-            slopes += sign * self._chain.slopes(placed, *moving, near.normal)
+            moving = (close.posture, joints[:, side], close.points[:, side])
+            slopes += sign * self._chain.slopes(placed, *moving, close.normal)
         by_q = np.zeros((len(motion.q), len(self.labels), motion.q.shape[1]))
-        by_q[near.posture, near.pair] = slopes / UNIT
+        by_q[close.posture, close.pair] = slopes / UNIT
         return Partials(q=by_q)
 
     def __getstate__(self) -> dict[str, object]:

@@ -275,8 +275,8 @@ class Limit(Description, ABC):
     def partials(self, motion: JointStates) -> Partials:
         """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
 
-    def near(self, q: np.ndarray) -> Limit | None:
-        """Return what matters of it while the motion stays near postures, (K, n); None where nothing does."""
+    def restrict_to(self, q: np.ndarray) -> Limit | None:
+        """Return what matters of it while the motion stays close to postures, (K, n); None where nothing does."""
         del q
         return self
 

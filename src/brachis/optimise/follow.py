@@ -46,7 +46,7 @@ _ENOUGH = 5e-5
 _SMALL = 0.01
 """Violation from which on limits are narrowed by no more than it."""
 _MORE = 1.5
-"""Times a smaller one by which they are: splines give way by less than limits do."""
+"""Factor on smaller ones: splines give way by less than limits are narrowed."""
 
 
 @dataclass(frozen=True)

@@ -207,10 +207,12 @@ def improve_joint_paths(
     timings = [PhaseTiming.through(*pair, effort.places) for pair in pairs]
     best = BetterPaths(tuple(curves), tuple(timings))
     r = program.phases[0].joint_map.r
+    if not r:
+        return best
     for count in effort.intervals:
         before = best.t_end
-        is_hopeless = not r or not np.isfinite(before) or count * r > _MOST_INTERVALS
-        if is_hopeless or solve.deadline.passed:
+        is_too_large = count * r > _MOST_INTERVALS
+        if is_too_large or not np.isfinite(before) or solve.deadline.passed:
             break
         best = _better(program.with_margin(effort.margin), best, solve, count, effort)
         if not best.is_credible or best.t_end > before * (1.0 - tolerance):

@@ -1,6 +1,7 @@
 """Bodies of the robot and around it, and the distances between them."""
 
-from brachis.scene.scene import UNIT, Near, Scene, scene_of
+from brachis.scene.build import find_carrier, scene_of
+from brachis.scene.scene import UNIT, ClosePairs, Scene
 from brachis.scene.solids import Solid
 
-__all__ = ["UNIT", "Near", "Scene", "Solid", "scene_of"]
+__all__ = ["UNIT", "ClosePairs", "Scene", "Solid", "find_carrier", "scene_of"]

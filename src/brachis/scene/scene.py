@@ -1,51 +1,33 @@
 """The scene: solids on the joints that carry them, pairs of them that must not touch, and the distances of pairs.
 
-Balls around the solids tell which pairs are near. Of these alone Coal computes the distance, negative where they
-overlap, with its two nearest points.
+Balls and boxes around the solids select close pairs. Coal computes the signed distance of these only, with its
+two nearest points.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import coal
 import numpy as np
-import pinocchio as pin
-from lxml import etree
 
-from brachis.common.files import read_text
-from brachis.errors import TaskError, UnknownNameError
-from brachis.robot import Robot
-from brachis.robot.urdf_bodies import placement_matrix
-from brachis.robot.urdf_elements import read_tree
-from brachis.scene.chain import Chain, Placed
-from brachis.scene.solids import (
-    Solid,
-    capsules_along,
-    solid_of,
-    solids_of_links,
-)
-from brachis.task import Task
+from brachis.scene.chain import Placed
+from brachis.scene.solids import Solid
 
-Carrier = Callable[[Robot, str], tuple[int, np.ndarray]]
-"""Returns the joint that moves a link, 0 for none, and where the link is in the joint's frame, (4, 4)."""
 UNIT = 0.1
-"""Distance of which ratios and values of limits are multiples, m."""
+"""Scale of the values of limits and of ratios: 1 means so many m."""
 _EXACT = 1e-10
 """Tolerance of Coal's distances of solids that are apart, m."""
 _ITERATIONS = 500
-_POSTURES = 100
-"""Random postures in which a pair that always touches is found."""
+_DEEPEST = 1.0
+"""Deepest overlap that counts, m."""
 
 
 @dataclass(frozen=True, eq=False)
-class Near:
-    """Pairs that are near each other in some postures: M of them.
+class ClosePairs:
+    """Pairs that are close to each other in some postures: M of them.
 
     Attributes
     ----------
@@ -89,12 +71,12 @@ class Scene:
         first, second = self.pairs[pair]
         return f"{self.solids[first].name} and {self.solids[second].name}"
 
-    def only(self, pairs: Sequence[int] | np.ndarray) -> Scene:
-        """Return the scene with some of its pairs."""
-        return Scene(self.solids, self.joints, self.placements, self.pairs[pairs])
+    def with_pairs(self, chosen: np.ndarray) -> Scene:
+        """Return the scene with some of its pairs, by number."""
+        return Scene(self.solids, self.joints, self.placements, self.pairs[chosen])
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out what Coal made of it."""
+        """Leave out cached objects of Coal."""
         return {key: vars(self)[key] for key in self.__dataclass_fields__}
 
     @cached_property
@@ -153,13 +135,19 @@ class Scene:
         turned = rotations @ self.placements[:, :3, :3]
         return turned, origins + placed[1][:, self.joints]
 
-    def near(self, placed: Placed, within: float) -> Near:
-        """Find the pairs that are nearer than `within`, m, where the joints are placed so."""
+    def find_close(self, placed: Placed, within: float) -> ClosePairs:
+        """Find the pairs that are closer than `within`, m, where the joints are placed so."""
         posture, pair = np.nonzero(self.bounds(placed) < within)
         kept = self._gaps(placed, posture, pair) < within
         found = self.measure(placed, posture[kept], pair[kept])
         kept = found.distance < within
-        return Near(*(part[kept] for part in vars(found).values()))
+        return ClosePairs(
+            found.posture[kept],
+            found.pair[kept],
+            found.distance[kept],
+            found.points[kept],
+            found.normal[kept],
+        )
 
     def _gaps(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
@@ -184,7 +172,9 @@ class Scene:
             ]
         return np.asarray(np.maximum(*gaps).max(axis=1))
 
-    def measure(self, placed: Placed, posture: np.ndarray, pair: np.ndarray) -> Near:
+    def measure(
+        self, placed: Placed, posture: np.ndarray, pair: np.ndarray
+    ) -> ClosePairs:
         """Compute the distances of pairs, (M,), in so many of the postures, (M,), in which the joints are placed."""
         count = len(posture)
         distance = np.empty(count)
@@ -209,118 +199,6 @@ class Scene:
             points[m, 0] = result.getNearestPoint1()
             points[m, 1] = result.getNearestPoint2()
             normal[m] = result.normal
-        return Near(posture, pair, distance, points, normal)
-
-
-def carrier_by_pinocchio(robot: Robot, link: str) -> tuple[int, np.ndarray]:
-    """Find the joint that moves a link, and where the link is in the joint's frame."""
-    frame = robot.model.frames[robot.model.getFrameId(link, pin.FrameType.BODY)]
-    placed = frame.placement.homogeneous
-    if link == robot.tool_frame:
-        # The tool offset moves the tool frame, and not the link.
-        offset = placement_matrix(robot.settings.tool_offset)
-        placed = placed @ np.linalg.inv(offset)
-    return int(frame.parentJoint), placed
-
-
-def scene_of(
-    robot: Robot, task: Task, carrier: Carrier = carrier_by_pinocchio
-) -> Scene | None:
-    """Put the bodies of a task's scene and of the robot together; None where nothing can collide.
-
-    Parameters
-    ----------
-    robot : Robot
-    task : Task
-    carrier : callable, optional
-        Tells what moves a link.
-
-    Raises
-    ------
-    TaskError
-        A body's link does not exist; the robot has no collision geometry; a mesh cannot be read.
-    UrdfError
-        The URDF's collision geometry cannot be read.
-    """
-    settings = task.collisions
-    if settings.mode == "off" or not task.scene:
-        return None
-    folder = Path(robot.source).absolute().parent
-    tree = read_tree(robot.urdf, robot.source)
-    own = list(solids_of_links(tree, folder, settings.padding))
-    if not own and settings.capsules == "auto":
-        own = list(capsules_along(tree))
-    if not own:
-        raise TaskError(
-            "the robot has no collision geometry",
-            where="scene",
-            found=f"no <collision> in {robot.source}",
-            allowed="a URDF with <collision> elements",
-            hint="Add them, or set collisions.capsules: auto, or collisions.mode: off",
-        )
-    solids = (*own, *(solid_of(body) for body in task.scene))
-    joints = np.zeros(len(solids), dtype=int)
-    placements = np.array([solid.placement for solid in solids])
-    for number, solid in enumerate(solids):
-        if solid.link is None:
-            continue
-        if solid.link not in tree.links:
-            where = f"scene: {solid.name}.link"
-            raise UnknownNameError("link", solid.link, tree.links, where=where)
-        joints[number], placed = carrier(robot, solid.link)
-        placements[number] = placed @ solid.placement
-    scene = Scene(solids, joints, placements, np.empty((0, 2), dtype=int))
-    disabled = [*settings.disable, *_disabled_in(settings.srdf)]
-    pairs = [
-        pair
-        for pair in _moving_pairs(scene, len(own), settings.self_collision)
-        if not _may_touch(scene, pair, disabled)
-    ]
-    scene = Scene(solids, joints, placements, np.reshape(pairs, (-1, 2)).astype(int))
-    return scene.only(np.flatnonzero(~_always_touch(scene, robot)))
-
-
-def _moving_pairs(scene: Scene, own: int, with_itself: bool) -> list[tuple[int, int]]:
-    """List pairs that move relative to each other; links that meet at a joint may touch."""
-    pairs = []
-    for first, second in itertools.combinations(range(len(scene.solids)), 2):
-        apart = abs(int(scene.joints[first] - scene.joints[second]))
-        are_links = second < own
-        if apart > (1 if are_links else 0) and (with_itself or not are_links):
-            pairs.append((first, second))
-    return pairs
-
-
-def _disabled_in(srdf: str | None) -> list[tuple[str, str]]:
-    """List the pairs of links that an SRDF file disables."""
-    if srdf is None:
-        return []
-    where = f"collisions.srdf: {srdf}"
-    text = read_text(Path(srdf), where=where, folder=Path.cwd())
-    try:
-        root = etree.fromstring(text.encode())
-    except etree.XMLSyntaxError as error:
-        problem = "the SRDF file is not XML"
-        raise TaskError(problem, where=where, found=str(error)) from error
-    found = root.iter("disable_collisions")
-    return [(str(each.get("link1")), str(each.get("link2"))) for each in found]
-
-
-def _may_touch(
-    scene: Scene, pair: tuple[int, int], disabled: Sequence[tuple[str, str]]
-) -> bool:
-    """Tell whether a pair of solids, by their names or their links, is among those that are disabled."""
-    first, second = ({scene.solids[i].name, scene.solids[i].link} for i in pair)
-    return any(
-        (a in first and b in second) or (a in second and b in first)
-        for a, b in disabled
-    )
-
-
-def _always_touch(scene: Scene, robot: Robot) -> np.ndarray:
-    """Tell which pairs overlap in every one of many random postures, (P,)."""
-    low = np.maximum(robot.limits.position_lower, -np.pi)
-    high = np.minimum(robot.limits.position_upper, np.pi)
-    q = np.random.default_rng(0).uniform(low, high, (_POSTURES, robot.n))
-    near = scene.near(Chain.of(robot.model).place(q), 0.0)
-    return np.bincount(near.pair, minlength=len(scene.pairs)) == _POSTURES
+        # Where Coal gives up, the solids overlap deeply.
+        distance = np.maximum(np.nan_to_num(distance, nan=-np.inf), -_DEEPEST)
+        return ClosePairs(posture, pair, distance, points, normal)

@@ -23,7 +23,7 @@ from brachis.task.scene import SceneBody
 _HULL = (True, "Qt")
 """Keep the triangles; options of Qhull."""
 _THICKNESS = 0.03
-"""Radius of capsules along links, as a part of all their lengths."""
+"""Radius of capsules along links, as a part of the lengths of all links together."""
 Geometry: TypeAlias = Any  # coal comes without types
 
 
@@ -52,7 +52,7 @@ class Solid:
         return float(self.geometry.aabb_radius)
 
 
-def solid_of(body: SceneBody) -> Solid:
+def build_solid(body: SceneBody) -> Solid:
     """Make the solid of a scene's body.
 
     Raises
@@ -81,7 +81,7 @@ def solid_of(body: SceneBody) -> Solid:
     return _solid(str(body.name), body.link, geometry, placement, 0.0)
 
 
-def solids_of_links(
+def read_solids(
     tree: UrdfTree, folder: Path, padding: Mapping[str, float]
 ) -> Iterator[Solid]:
     """Make the solids of a URDF's links, each larger by the link's padding, m.
@@ -104,7 +104,7 @@ def solids_of_links(
             yield _solid(label, name, geometry, placement, padding.get(name, 0.0))
 
 
-def capsules_along(tree: UrdfTree) -> Iterator[Solid]:
+def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Solid]:
     """Make capsules from the joint of every link to the joints that hang from it, a share of all lengths thick."""
     ends = [
         (end_of(joint, "parent"), origin_of(joint, "origin")[:3, 3])
@@ -119,7 +119,9 @@ def capsules_along(tree: UrdfTree) -> Iterator[Solid]:
         placement = np.eye(4)
         placement[:3, :3] = _turn_to(end / length)
         placement[:3, 3] = 0.5 * end
-        yield _solid(f"{link} {number}", link, geometry, placement, 0.0)
+        yield _solid(
+            f"{link} {number}", link, geometry, placement, padding.get(link, 0.0)
+        )
 
 
 def _turn_to(direction: np.ndarray) -> np.ndarray:
@@ -145,25 +147,45 @@ def _geometry(collision: Element, folder: Path) -> Geometry:
     found = collision.find("geometry")
     shapes = [] if found is None else [each for each in found if each.tag in _READERS]
     if len(shapes) != 1:
-        raise InputError("it has no shape that is known", allowed=", ".join(_READERS))
+        raise InputError(
+            "<geometry> must contain exactly one known shape",
+            found=f"{len(shapes)} of them",
+            allowed=", ".join(_READERS),
+        )
     (shape,) = shapes
     return _READERS[shape.tag](shape, folder)
 
 
 def _read_box(shape: Element, _folder: Path) -> Geometry:
-    return coal.Box(*numbers_of(shape, ".", "size", ""))
+    return coal.Box(*_lengths(shape, ("size",), 3))
 
 
 def _read_sphere(shape: Element, _folder: Path) -> Geometry:
-    return coal.Sphere(*numbers_of(shape, ".", "radius", ""))
+    return coal.Sphere(*_lengths(shape, ("radius",), 1))
 
 
 def _read_cylinder(shape: Element, _folder: Path) -> Geometry:
-    return coal.Cylinder(*(float(shape.get(key)) for key in ("radius", "length")))
+    return coal.Cylinder(*_lengths(shape, ("radius", "length"), 2))
 
 
 def _read_capsule(shape: Element, _folder: Path) -> Geometry:
-    return coal.Capsule(*(float(shape.get(key)) for key in ("radius", "length")))
+    return coal.Capsule(*_lengths(shape, ("radius", "length"), 2))
+
+
+def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[float]:
+    """Read so many lengths from attributes."""
+    words = " ".join(shape.get(attribute, "") for attribute in attributes).split()
+    try:
+        found = [float(word) for word in words]
+    except ValueError:
+        found = []
+    if len(found) != count or not all(0.0 < length < np.inf for length in found):
+        raise InputError(
+            f"<{shape.tag}> is wrong",
+            found=" ".join(words) or "nothing",
+            allowed=f"{count} numbers > 0, m, under {' and '.join(attributes)}",
+        )
+    return found
 
 
 def _read_mesh(shape: Element, folder: Path) -> Geometry:

@@ -16,7 +16,7 @@ from brachis import ik
 from brachis.common import tolerances
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import BrachisError, PathError, PlanningError, Remedy
-from brachis.limits import Limit, Moments
+from brachis.limits import Limit, Moments, Role
 from brachis.optimise.candidate import Candidate
 from brachis.problem.feasibility import in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
@@ -144,7 +144,8 @@ def explain_reach(
         )
     )
     for limit in problem.limits:
-        if failure is None and limit.at_rest == "posture":
+        is_load = limit.at_rest == "posture" and limit.role is not Role.SCENE
+        if failure is None and is_load:
             allowed, nearest, remedies = _check_at_rest(robot, limit, own)
             cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
             failure = fail(allowed, cause, "Move the path", remedies)

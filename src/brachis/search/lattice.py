@@ -324,8 +324,9 @@ class Lattice(ABC):
         layer = Layer(branch, q[good], low[good], high[good], length, parent)
         chosen = self._shortest_free(before, layer, edges.key[good])
         if not len(chosen):
-            ways = np.linspace(before.q[parent], q[good], _LOOKS, axis=1)
-            return self._blame(ways)
+            some = shortest(length, edges.key[good])
+            ways = before.q[parent[some]], layer.q[some]
+            return self._blame(np.linspace(*ways, _LOOKS, axis=1)) or JUMPS
         return self._keep(layer[chosen], self._thin)
 
     def _shortest_free(
@@ -366,11 +367,11 @@ class Lattice(ABC):
         return choose(layer[held]) if held.any() else self._blame(layer.q[:, None])
 
     def _blame(self, q: np.ndarray) -> str:
-        """Name the limit that is exceeded most in the best of postures, or on the best way, (K, L, n), and by what."""
+        """Name the limit that is exceeded most in the best posture, or on the best way, (K, L, n), and its subject."""
         if not len(q):
             return ""
         still = Moments.at_rest(q.reshape(-1, q.shape[-1]))
-        worst = -np.inf
+        worst = 0.0
         cause = ""
         for limit in self.problem.limits:
             if limit.at_rest != "posture":

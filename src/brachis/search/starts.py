@@ -89,8 +89,8 @@ class SearchLevel:
     fallback: bool = False
 
 
-_NEARLY = 0.02
-"""Violation of a limit of the scene up to which a joint path is a guess."""
+_NEARLY = 0.2
+"""Violation of a limit of the scene with which a joint path still is a guess."""
 _SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
 _FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
 _THOROUGH = SearchLevel(
@@ -215,11 +215,11 @@ def numeric_starts(
             problem, joint_map, joint_path, np.inf, f"numeric {number}", family
         )
         for number, joint_path in enumerate(joint_paths, 1)
-        if all(_passes(limit, joint_map.postures(joint_path)) for limit in scene)
+        if all(_is_clear(limit, joint_map.postures(joint_path)) for limit in scene)
     ]
 
 
-def _passes(limit: Limit, q: np.ndarray) -> bool:
+def _is_clear(limit: Limit, q: np.ndarray) -> bool:
     """Tell whether a limit holds along a joint path, (S, n), nearly."""
     exists = np.isfinite(q).all(axis=1)
     return bool(limit.holds_at_rest(q[exists], _NEARLY).all())

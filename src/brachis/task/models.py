@@ -34,7 +34,12 @@ from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import ToolPose
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
-from brachis.task.scene import CollisionSettings, SceneBody, bodies_by_name
+from brachis.task.scene import (
+    CollisionSettings,
+    SceneBody,
+    bodies_by_name,
+    check_names,
+)
 from brachis.task.segments import (
     CsvSegment,
     Segment,
@@ -175,10 +180,14 @@ class Task(Model):
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
     """Limits on the motion of the tool."""
-    scene: Annotated[tuple[SceneBody, ...], BeforeValidator(bodies_by_name)] = ()
+    scene: Annotated[
+        tuple[SceneBody, ...],
+        BeforeValidator(bodies_by_name),
+        AfterValidator(check_names),
+    ] = ()
     """Bodies around the robot and on it, which it keeps clear of."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
-    """How it keeps clear of them and of itself."""
+    """The clearance, and the pairs of bodies that keep it."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"

@@ -95,19 +95,24 @@ class SceneBody(Model):
                 found=given or "none",
                 allowed=f"one of {', '.join(SHAPES)}",
             )
-        moves = self.half_space is not None and self.link is not None
+        is_plane = self.half_space is not None
+        allowed = "normal and offset in half_space"
+        fixed = "a half-space is fixed to the world"
+        stands = "a half-space has no other place than its plane"
         return self.check(
-            (moves, "link", "a half-space is fixed to the world", "null"),
+            (is_plane and self.link is not None, "link", fixed, "null"),
+            (is_plane and any(self.position), "position", stands, allowed),
+            (is_plane and any(self.rpy_deg), "rpy_deg", stands, allowed),
         )
 
 
 class CollisionSettings(Model):
-    """How the robot keeps clear of the scene and of itself."""
+    """The clearance, and the pairs of bodies that keep it."""
 
     clearance: NonNegative = 0.01
     """Least distance between bodies, m."""
     mode: Literal["avoid", "check", "off"] = "avoid"
-    """avoid: it is a limit of the motion. check: the verification alone looks at it. off: nothing does."""
+    """avoid: distances are a limit of the plan. check: only the verification looks at them. off: nothing is checked."""
     self_collision: Flag = True
     """Whether the robot also keeps clear of itself."""
     disable: tuple[tuple[Name, Name], ...] = ()
@@ -131,6 +136,15 @@ def bodies_by_name(scene: Any) -> Any:
     if not isinstance(scene, list | tuple):
         return scene
     return [_with_name(number, body) for number, body in enumerate(scene)]
+
+
+def check_names(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
+    """Refuse two bodies of one name."""
+    names = [body.name for body in scene]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise refuse("two bodies have this name", found=twice[0], allowed="each once")
+    return scene
 
 
 def _with_name(number: int, body: Any) -> Any:

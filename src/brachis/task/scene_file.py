@@ -46,7 +46,7 @@ def with_scene_of_file(
         return content
     if set(scene) != {"file"}:
         raise TaskError(
-            "a scene is a list of bodies, or a file",
+            "scene must be a list of bodies or a file",
             where=f"{source}: scene",
             found=show(scene),
             allowed="[{box: [...], position: [...]}, ...] or {file: cell.yaml}",

@@ -95,14 +95,6 @@ def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.stack(rotations, axis=1), np.stack(origins, axis=1)
 
 
-def carrier_in_text(robot: Robot, link: str) -> tuple[int, np.ndarray]:
-    """Find the joint that moves a link, and where the link is in the joint's frame, (4, 4), by the URDF's text."""
-    joint, placed = robot.urdf_dynamics.links[link]
-    if not joint:
-        placed = placement_matrix(robot.settings.mounting) @ placed
-    return joint, placed
-
-
 def _to_parent(
     body: Body, position: np.ndarray, *vectors: np.ndarray
 ) -> list[np.ndarray]:

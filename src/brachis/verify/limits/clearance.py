@@ -5,7 +5,7 @@ distances d_0 and d_1 at the ends of a step, joints that turn by D_i within it, 
 
     d >= (d_0 + d_1 - sum_i r_i D_i) / 2        at all instants of the step.
 
-Steps are halved until that tells enough.
+Steps are halved until the bound is tight enough.
 """
 
 from __future__ import annotations
@@ -14,41 +14,37 @@ import numpy as np
 
 from brachis.scene import UNIT, Scene, scene_of
 from brachis.verify.limits.protocol import Worst
-from brachis.verify.mechanics import carrier_in_text, joint_placements
+from brachis.verify.mechanics import joint_placements
 from brachis.verify.motion import Given, MotionStates
 
 _LOOK = 0.05
 """Distances up to so much above the clearance are computed, m."""
 _ROUNDING = 1e-5
-"""By how much the smallest distance may be less than what is proven, m, near the clearance."""
+"""Largest gap between found and proven distance where it is about the clearance, m."""
 _FINE = 1e-3
-"""The same, farther away, m."""
-_BETWEEN = 0.05
-"""How far a joint moves between the states, at most, m."""
+"""Largest gap where it is well above it, m."""
 _MOST = 300_000
-"""Steps that are halved, no more."""
+"""Largest number of steps that are halved."""
 _STATES = 2_000
 """States that are looked at in one go."""
 
 
 def worst_clearance(given: Given) -> Worst | None:
     """Find the smallest distance between solids, as a ratio: 1 at the clearance, above it where it is less."""
-    settings = given.task.collisions
-    scene = scene_of(given.robot, given.task, carrier_in_text)
+    wanted = given.task.collisions.clearance
+    scene = scene_of(given.robot, given.task)
     if scene is None or not len(scene.pairs):
         return None
-    wanted = settings.clearance
-    search = _Search(given, scene, wanted)
-    least, known, time, pair = search.smallest()
-    far = wanted + _LOOK
+    least, known, time, pair = _Search(given, scene, wanted).smallest()
     found = f"smallest distance {1e3 * least:.2f} mm"
-    if least >= far:
-        found = f"nothing is nearer than {1e3 * far:.0f} mm"
-    if known < wanted - _ROUNDING <= least:
-        found = f"not searched to the end: {found}, and more than {1e3 * known:.2f} mm is proven"
+    subject = scene.names(pair)
+    if least >= wanted + _LOOK:
+        found = f"nothing is closer than {1e3 * least:.0f} mm"
+        subject = "scene"
+    if known < min(wanted, least) - 2.0 * _ROUNDING:
+        found = f"search stopped early: {found}, the proven lower bound is {1e3 * known:.2f} mm"
         least = known
-    ratio = max(1.0 + (wanted - least) / UNIT, 0.0)
-    return Worst(ratio, scene.names(pair), time, found)
+    return Worst(max(1.0 + (wanted - least) / UNIT, 0.0), subject, time, found)
 
 
 class _Search:
@@ -79,9 +75,10 @@ class _Search:
         placed = joint_placements(self._given.robot, states.q)
         far = self._wanted + _LOOK
         distance = np.maximum(self._scene.bounds(placed), far)
-        near = self._scene.near(placed, far)
-        distance[near.posture, near.pair] = near.distance
-        self._note(near.distance, states.t[near.posture], near.pair)
+        close = self._scene.find_close(placed, far)
+        distance[close.posture, close.pair] = close.distance
+        self._record(close.distance, states.t[close.posture], close.pair)
+        # Both sides of a node are one instant: nothing moves between them.
         inside = states.piece[1:] == states.piece[:-1]
         step = np.where(inside, np.diff(states.u), 0.0)
         piece = states.piece[:-1]
@@ -113,17 +110,15 @@ class _Search:
             if self._halved > _MOST:
                 return min(known, float(lower.min()))
             known = min(known, float(lower.min(initial=np.inf, where=~is_open)))
-            piece, pair, u, d = (
-                piece[is_open],
-                pair[is_open],
-                u[:, is_open],
-                d[:, is_open],
-            )
+            piece = piece[is_open]
+            pair = pair[is_open]
+            u = u[:, is_open]
+            d = d[:, is_open]
             middle = 0.5 * (u[0] + u[1])
             states = pieces.positions(piece, middle)
             placed = joint_placements(self._given.robot, states)
             found = self._scene.measure(placed, np.arange(len(piece)), pair).distance
-            self._note(found, pieces.time(piece, middle), pair)
+            self._record(found, pieces.time(piece, middle), pair)
             u = np.hstack([[u[0], middle], [middle, u[1]]])
             d = np.hstack([[d[0], found], [found, d[1]]])
             piece = np.tile(piece, 2)
@@ -145,7 +140,7 @@ class _Search:
         near = min(self._least, self._wanted) - _ROUNDING
         return max(near, self._least - _FINE)
 
-    def _note(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
+    def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
         """Keep the smallest distance."""
         if distance.min(initial=np.inf) < self._least:
             best = int(np.argmin(distance))
@@ -159,10 +154,8 @@ def _reaches(given: Given, scene: Scene) -> np.ndarray:
     Joints that move both solids of a pair, or none, have no part in it.
     """
     bodies = given.robot.urdf_dynamics.bodies
-    slides = [
-        np.abs(given.states.q[:, j]).max() + _BETWEEN if body.sliding else 0.0
-        for j, body in enumerate(bodies)
-    ]
+    farthest = np.abs(given.pieces.nodes + given.pieces.position).max(axis=(0, 1))
+    slides = [farthest[j] if body.sliding else 0.0 for j, body in enumerate(bodies)]
     lengths = [np.linalg.norm(body.placement[:3, 3]) for body in bodies]
     along = np.cumsum(np.array(lengths) + slides)
     centres, radii = scene.balls
