@@ -10,7 +10,7 @@ from brachis.optimise.program import Program
 from support.jacobians import dense, differences, told
 from support.phases import CASES, phase_of, reachable_points
 
-KINDS = [*limits.TABLE, "branch_margin"]
+KINDS = [*(kind for kind in limits.TABLE if kind != "clearance"), "branch_margin"]
 UNTIMED = ("position", "branch_margin")
 
 
