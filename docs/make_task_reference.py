@@ -31,6 +31,7 @@ from brachis.task import (
 )
 from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
+from brachis.task.scene import CollisionSettings, HalfSpaceShape, Round, SceneBody
 from brachis.task.segments import (
     ArcCenter,
     ArcVia,
@@ -62,6 +63,10 @@ PARTS: dict[str, type] = {
     "tool_limits": ToolLimits,
     "tool_limits.speed": SpeedTable,
     "tool_limits.process_speed": ProcessSpeed,
+    "scene[i]": SceneBody,
+    "scene[i].cylinder, scene[i].capsule": Round,
+    "scene[i].half_space": HalfSpaceShape,
+    "collisions": CollisionSettings,
     "spline": SplineSettings,
     "search": SearchSettings,
     "solver": SolverSettings,

@@ -52,6 +52,7 @@ TASK = SimpleNamespace(
     custom_limits={},
     scene=SCENE,
     collisions=CollisionSettings(capsules="auto"),
+    collision_mode="avoid",
 )
 RNG = np.random.default_rng(3)
 # The path coordinates lie off all kinks.
@@ -152,6 +153,7 @@ def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
         custom_limits={},
         scene=(),
         collisions=CollisionSettings(),
+        collision_mode="off",
     )
     kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
     assert kinds == ["torque", "velocity", "position"]

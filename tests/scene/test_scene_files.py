@@ -11,6 +11,7 @@ import yaml
 
 import brachis
 from brachis.errors import TaskError
+from brachis.problem.plausibility import of_task
 from brachis.robot.from_task import robot_for
 from brachis.scene import scene_of
 from support.command_line import code_of, interrupts_kept
@@ -153,6 +154,36 @@ def test_an_srdf_disables_pairs(tmp_path):
 def test_a_wrong_scene_is_refused(scene, says):
     with pytest.raises(TaskError, match=says):
         brachis.load_task({**TASK, "scene": scene})
+
+
+@pytest.mark.parametrize(
+    ("changes", "where"),
+    [
+        ({"scene": [{"name": "post", "box": [100, 100, 1200]}]}, "scene: post"),
+        (
+            {"scene": [{"name": "a", "sphere": 0.1, "position": [400, 0, 0]}]},
+            "scene: a",
+        ),
+        ({"collisions": {"clearance": 10.0}}, "collisions.clearance"),
+        ({"collisions": {"padding": {"link_6": 20.0}}}, "collisions.padding.link_6"),
+    ],
+)
+def test_lengths_that_look_like_mm_are_implausible(changes, where):
+    issues = of_task(brachis.load_task({**TASK, **changes}))
+    assert [issue.where for issue in issues] == [where]
+    assert "mm" in issues[0].message
+
+
+def test_without_a_scene_the_mode_decides_about_self_collisions():
+    assert found(brachis.load_task(TASK)) is None
+    assert found(brachis.load_task({**TASK, "collisions": {"clearance": 0.02}})) is None
+    scene = found(brachis.load_task({**TASK, "collisions": {"mode": "avoid"}}))
+    assert {solid.link for solid in scene.solids} >= {"link_0", "link_7"}
+    body = brachis.Sphere(0.1, position=[2, 0, 0])
+    task = brachis.load_task({**TASK, "scene": body})
+    assert found(task).solids[-1].name == "sphere 0"
+    off = brachis.load_task({**TASK, "scene": body, "collisions": {"mode": "off"}})
+    assert found(off) is None
 
 
 def test_inspect_lists_pairs_and_json_has_all(tmp_path, capfd):

@@ -140,7 +140,7 @@ class Clearance(Limit):
 
 def build_clearance(robot: Robot, task: Task) -> Clearance | None:
     """Build the limit of a task whose motion has to keep clear of something."""
-    if task.collisions.mode != "avoid":
+    if task.collision_mode != "avoid":
         return None
     scene = scene_of(robot, task)
     if scene is None or not len(scene.pairs):

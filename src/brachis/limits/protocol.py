@@ -29,9 +29,7 @@ from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
 class Guarantee(Enum):
     """Where a limit holds; each value is the sentence that a user reads."""
 
-    AT_ALL_INSTANTS = (
-        "It holds at all instants, which the verification checks on a dense grid."
-    )
+    AT_ALL_INSTANTS = "It holds at all instants, which the verification checks."
     AT_COLLOCATION_POINTS = (
         "It holds at the collocation points of the optimiser, and is not verified."
     )

@@ -19,7 +19,6 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
-from brachis.limits import Limit
 from brachis.optimise.bspline import basis_matrix, clamped_knots, local_basis
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.phase import Phase
@@ -107,7 +106,7 @@ class PathPhase:
         self._set_variables(squares, points)
         if phase.time_law is None:
             self._begin_within_limits()
-        limits = _restrict(phase, curves)
+        limits = phase.limits_near(curves)
         self._evaluator = Evaluator(phase.joint_map, limits)
         lower = np.concatenate([limit.lower for limit in limits])
         upper = np.concatenate([limit.upper for limit in limits])
@@ -256,13 +255,6 @@ class PathPhase:
             np.column_stack([np.ones(len(s)), y_ds]),
             np.column_stack([np.zeros(len(s)), y_dds]),
         )
-
-
-def _restrict(phase: Phase, curves: np.ndarray) -> list[Limit]:
-    """Return what matters of the limits of a phase near curves, (S, c)."""
-    q = phase.joint_map.postures(curves)
-    restricted = [limit.restrict_to(q) for limit in phase.limits]
-    return [limit for limit in restricted if limit is not None]
 
 
 def _follow(law: TimeLaw, s: np.ndarray) -> np.ndarray:

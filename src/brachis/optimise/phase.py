@@ -12,6 +12,7 @@ Slopes of the limits by y and its derivatives come from the `evaluator`.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -165,6 +166,19 @@ class Phase:
             margin=None,
             pause=self.pause,
         )
+
+    def limits_near(self, curves: np.ndarray) -> list[Limit]:
+        """Return what matters of the limits while the motion stays close to curves, (S, c); see `Limit.restrict_to`."""
+        q = self.joint_map.postures(curves)
+        restricted = [limit.restrict_to(q) for limit in self.limits]
+        return [limit for limit in restricted if limit is not None]
+
+    def restrict_to(self, curves: np.ndarray) -> Phase:
+        """Return the same phase with `limits_near` curves, (S, c)."""
+        limits = self.limits_near(curves)
+        pairs = itertools.zip_longest(limits, self.limits)
+        is_same = all(own is other for own, other in pairs)
+        return self if is_same else self.with_limits(limits)
 
     def with_margin(self, margin: float) -> Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""

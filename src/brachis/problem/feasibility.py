@@ -16,7 +16,7 @@ from brachis.errors import (
     write_apart,
 )
 from brachis.ik import Match
-from brachis.limits import Limit, Moments
+from brachis.limits import Limit, Moments, Role
 from brachis.limits.joint import PositionLimit, position_measure
 from brachis.path import Path, check_on_path
 from brachis.robot import Robot, TaskMap
@@ -27,6 +27,12 @@ from brachis.task import SplineSettings
 
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+
+
+_MOVE_BODIES = (
+    "Move the body, choose another posture, or let the pair touch with collisions.disable; "
+    "bodies of links are the <collision> elements of the URDF"
+)
 
 
 def check_postures(
@@ -167,6 +173,8 @@ def _check_at_rest(
         keys = dict.fromkeys(one.key for one in weak if one.key)
         if keys and label.key not in {one.key for one in remedies}:
             hint += f", or change {', '.join(keys)}"
+        if limit.role is Role.SCENE:
+            hint = _MOVE_BODIES
         raise StartError(
             f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
             where=f"{name}.joints",

@@ -55,6 +55,7 @@ USUAL = {
     # Times the arm's length.
     "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
     "robot.mounting.xyz": ("the distance looks like mm", 200.0, "m", ""),
+    "scene": ("the length looks like mm", 30.0, "m", ""),
     "robot.gravity": ("the acceleration looks like mm/s^2", 100.0, "m/s^2", ""),
     # The strongest arms of 1 m reach carry 130 kg, and more with the square of the reach.
     "robot.payload.mass": ("the mass looks like g", 150.0, "kg", _OF_SIZE),
@@ -101,7 +102,24 @@ def of_task(task: Task) -> tuple[Issue, ...]:
         for fit in task.fits
         if fit.doubt
     ]
-    return (*find_issues(_tool(task)), *_angles(task), *of_points)
+    figures = [*_tool(task), *_bodies(task)]
+    return (*find_issues(figures), *_angles(task), *of_points)
+
+
+def _bodies(task: Task) -> Iterator[Check]:
+    """Compare sizes and places of a scene's bodies, and what keeps clear of them, with a large cell."""
+    for body in task.scene:
+        shape = getattr(body, body.shape)
+        sizes = np.ravel(shape) if body.shape in {"box", "sphere"} else [0.0]
+        sizes = [getattr(shape, key, 0.0) for key in ("radius", "length", "offset")] + [
+            *sizes
+        ]
+        largest = max(np.abs([*sizes, *body.position]))
+        yield _figure("scene", float(largest), where=f"scene: {body.name}")
+    settings = task.collisions
+    for key, figure in {"clearance": settings.clearance, **settings.padding}.items():
+        name = key if key == "clearance" else f"padding.{key}"
+        yield _figure("scene", figure, 1.0 / 60.0, where=f"collisions.{name}")
 
 
 def of_places(

@@ -26,7 +26,7 @@ _FARTHEST = 1.0
 
 
 def scene_of(robot: Robot, task: Task) -> Scene | None:
-    """Put the bodies of a task's scene and of the robot together; None where the task has no scene, or looks at none.
+    """Put the bodies of a task's scene and of the robot together; None where the task looks at none.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         The URDF's collision geometry cannot be read.
     """
     settings = task.collisions
-    if settings.mode == "off" or not task.scene:
+    if task.collision_mode == "off":
         return None
     folder = Path(robot.source).absolute().parent
     tree = read_tree(robot.urdf, robot.source)
@@ -62,7 +62,9 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         joints[number], placed = find_carrier(robot, solid.link)
         placements[number] = placed @ solid.placement
     names = {*tree.links, *(solid.name for solid in solids)}
-    _check_names("disable", itertools.chain(*settings.disable), names)
+    _check_names(
+        "disable", itertools.chain(*settings.disable), sorted(names), "link or body"
+    )
     disabled = [*settings.disable, *_read_srdf(settings.srdf)]
     links = {solid.name: solid.link for solid in own}
     pairs = [
@@ -84,13 +86,15 @@ def find_carrier(robot: Robot, link: str) -> tuple[int, np.ndarray]:
     return joint, placed
 
 
-def _check_names(where: str, names: Iterable[str], known: Iterable[str]) -> None:
+def _check_names(
+    where: str, names: Iterable[str], known: Iterable[str], kind: str = "link"
+) -> None:
     """Refuse names that are not known."""
     known = tuple(known)
     for name in names:
         if name not in known:
             place = where if where.startswith("scene") else f"collisions.{where}"
-            raise UnknownNameError("link or body", name, known, where=place)
+            raise UnknownNameError(kind, name, known, where=place)
 
 
 def _find_hazards(

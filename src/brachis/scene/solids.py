@@ -22,7 +22,7 @@ from brachis.task.scene import SceneBody
 
 _HULL = (True, "Qt")
 """Keep the triangles; options of Qhull."""
-_THICKNESS = 0.03
+_THICKNESS = 0.02
 """Radius of capsules along links, as a part of the lengths of all links together."""
 Geometry: TypeAlias = Any  # coal comes without types
 
@@ -207,11 +207,13 @@ _READERS = {
 
 def _hull(path: Path, scale: np.ndarray) -> Geometry:
     """Return the convex hull of a mesh file."""
+    if not path.is_file():
+        raise InputError("the mesh file does not exist", where=str(path))
     try:
         mesh = coal.MeshLoader().load(str(path), scale)
         mesh.buildConvexHull(*_HULL)
     except (ValueError, RuntimeError) as error:
         raise InputError(
-            "the mesh cannot be read", where=str(path), found=str(error)
+            "the mesh cannot be read", where=str(path), hint="Write it as STL or OBJ"
         ) from error
     return mesh.convex

@@ -106,6 +106,10 @@ def _solve_over_time(
     start: InitialGuess, target: Program, session: SolverSession
 ) -> Candidate:
     """Solve over time: with the coarsest knots of those given, or with knots that the fastest timing needs."""
+    target = target.with_phases(
+        phase.restrict_to(curves)
+        for phase, curves in zip(target.phases, start.legs, strict=True)
+    )
     begun = begin_with_timing(start, target)
     if begun is None:
         # With more variables a cold solve takes seconds: it is first solved over some of its knots.

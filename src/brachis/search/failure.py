@@ -326,7 +326,8 @@ def explain_no_motion(
         own = name if name == ALL_POSTURES else f"redundant joints {name}"
         others = f" ({own}; the furthest of {len(dead_ends)} lattices)"
         start = "" if problem.start is None else "start in another posture, "
-        hint = f"{start}shorten or move the path, or widen the joint ranges"
+        scene = ", move bodies of the scene" if problem.task.scene else ""
+        hint = f"{start}shorten or move the path{scene}, or widen the joint ranges"
         return Failure(
             f"no joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
             phase="path",

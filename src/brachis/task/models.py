@@ -118,6 +118,14 @@ RedundantJoints = Annotated[
 ]
 
 
+_SCENE_FILE: Final[dict[str, Any]] = {
+    "type": "object",
+    "required": ["file"],
+    "additionalProperties": False,
+    "properties": {"file": {"type": "string"}},
+}
+
+
 def _is_matrix(row: object) -> bool:
     return isinstance(row, list) and any(isinstance(each, list) for each in row)
 
@@ -184,10 +192,10 @@ class Task(Model):
         tuple[SceneBody, ...],
         BeforeValidator(bodies_by_name),
         AfterValidator(check_names),
-    ] = ()
-    """Bodies around the robot and on it, which it keeps clear of."""
+    ] = Field(default=(), json_schema_extra=or_form(_SCENE_FILE))
+    """Bodies around the robot and on it, which it keeps clear of; or {file: cell.yaml} (see docs/my_cell.md)."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
-    """The clearance, and the pairs of bodies that keep it."""
+    """The clearance, which pairs of bodies keep it, and whether it is a limit of the plan."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"
@@ -414,6 +422,13 @@ class Task(Model):
                 f">= {least}, or auto",
             ),
         )
+
+    @property
+    def collision_mode(self) -> str:
+        """How collisions are treated: ``avoid``, ``check`` or ``off``."""
+        if self.collisions.mode != "auto":
+            return self.collisions.mode
+        return "avoid" if self.scene else "off"
 
     @property
     def of_poses(self) -> bool:

@@ -111,8 +111,9 @@ class CollisionSettings(Model):
 
     clearance: NonNegative = 0.01
     """Least distance between bodies, m."""
-    mode: Literal["avoid", "check", "off"] = "avoid"
-    """avoid: distances are a limit of the plan. check: only the verification looks at them. off: nothing is checked."""
+    mode: Literal["auto", "avoid", "check", "off"] = "auto"
+    """avoid: distances are a limit of the plan, also those of the robot's own links without a scene. check: only the
+    verification looks at them. off: nothing is checked. auto: avoid if there is a scene, otherwise off."""
     self_collision: Flag = True
     """Whether the robot also keeps clear of itself."""
     disable: tuple[tuple[Name, Name], ...] = ()
@@ -133,6 +134,8 @@ def bodies_by_name(scene: Any) -> Any:
     scene : sequence or object
         What a task has under ``scene``; what is no sequence of mappings stays.
     """
+    if isinstance(scene, SceneBody):
+        scene = (scene,)
     if not isinstance(scene, list | tuple):
         return scene
     return [_with_name(number, body) for number, body in enumerate(scene)]

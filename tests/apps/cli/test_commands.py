@@ -422,7 +422,7 @@ def test_inspect(run):
 
 
 def test_inspect_says_where_every_limit_holds(run, tmp_path):
-    everywhere = "at all instants, which the verification checks on a dense grid."
+    everywhere = "at all instants, which the verification checks."
     data = json.loads(run("inspect", SCARA, "--task-space", "x,y", "--json").out)
     assert data["guarantees"]["torque"] == f"It holds {everywhere}"
     task = yaml.safe_load(

@@ -193,9 +193,11 @@ def _collisions(robot: Robot, task: Task | None) -> dict[str, list[str]]:
     scene = None if task is None else scene_of(robot, task)
     if scene is None:
         return {"solids": [], "pairs": []}
+    # Those with bodies of the scene first.
+    pairs = sorted(range(len(scene.pairs)), key=lambda pair: -scene.pairs[pair].max())
     return {
         "solids": [solid.name for solid in scene.solids],
-        "pairs": [scene.names(pair) for pair in range(len(scene.pairs))],
+        "pairs": [scene.names(pair) for pair in pairs],
     }
 
 
