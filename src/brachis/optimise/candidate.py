@@ -41,6 +41,10 @@ def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
+_CLEARANCE_CHECK = "clearance ratio"
+"""Name of the check of distances."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class InitialGuess(Summary):
     """A joint path from which a plan is begun.
@@ -222,6 +226,15 @@ class Candidate(Summary):
         return self.verification is not None and self.verification.passed
 
     @property
+    def is_settled(self) -> bool:
+        """Whether it is verified, or fails only at a clearance that the task wants checked and not kept."""
+        if self.trajectory is None or self.verification is None:
+            return False
+        failed = {check.name for check in self.verification.checks if not check.passed}
+        only_checked = self.trajectory.task.collision_mode == "check"
+        return failed <= ({_CLEARANCE_CHECK} if only_checked else set())
+
+    @property
     def refinement_rounds(self) -> int:
         """How many of the solves were refinement rounds."""
         return 0 if self.refined is None else len(self.refined.reports) - 1
@@ -305,7 +318,7 @@ def refine_and_verify(
 def with_points_at_violations(candidate: Candidate) -> Program | None:
     """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
     refined = candidate.refined
-    if refined is None or candidate.verification is None:
+    if refined is None or candidate.verification is None or candidate.is_settled:
         return None
     failed = [check for check in candidate.verification.checks if not check.passed]
     if not failed or any(not check.of_limit or check.time is None for check in failed):

@@ -191,7 +191,7 @@ def _finish_over_path(
     done = None
     if found.is_credible:
         done = plan_timing(candidate, program, found.timings, reports, options)
-        if done is not None and (done.verified or session.deadline.passed):
+        if done is not None and (done.is_settled or session.deadline.passed):
             return done
     other = _solve_over_time(start, program, session)
     reports = (*reports, *other.reports)
@@ -205,7 +205,7 @@ def _finish_over_path(
         done = plan_timing(candidate, program, found.timings, reports, options)
     elif other.usable:
         done = plan_timing(other, adapted.program, timings, adapted.reports, options)
-    if done is not None and (done.verified or not other.usable):
+    if done is not None and (done.is_settled or not other.usable):
         return done
     session = dataclasses.replace(session, deadline=options.deadline)
     return refine_and_verify(other, adapted.program, adapted.reports, session, options)

@@ -107,7 +107,7 @@ class Search:
     def _merit(self, candidate: Candidate) -> tuple[float, float]:
         """By what motions are compared: violation of a limit, -inf for a motion that will do, and end time, s."""
         assert candidate.verification is not None
-        if candidate.verified or not self._problem.task.refinement.max_rounds:
+        if candidate.is_settled or not self._problem.task.refinement.max_rounds:
             return -np.inf, candidate.t_end
         return candidate.verification.worst_ratio - 1.0, candidate.t_end
 

@@ -129,7 +129,7 @@ def plan_timing(
         )
         done = verify(candidate, reports, own)
         found = done.verification
-        if done.verified or found is None:
+        if done.is_settled or found is None:
             return done
         failed = [check for check in found.checks if not check.passed]
         if not all(check.of_limit for check in failed):
