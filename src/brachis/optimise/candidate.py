@@ -41,10 +41,6 @@ def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
-_CLEARANCE_CHECK = "clearance ratio"
-"""Name of the check of distances."""
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class InitialGuess(Summary):
     """A joint path from which a plan is begun.
@@ -227,12 +223,10 @@ class Candidate(Summary):
 
     @property
     def is_settled(self) -> bool:
-        """Whether it is verified, or fails only at a clearance that the task wants checked and not kept."""
-        if self.trajectory is None or self.verification is None:
+        """Whether it is verified, or fails only at what the task wants checked and not kept."""
+        if self.verification is None:
             return False
-        failed = {check.name for check in self.verification.checks if not check.passed}
-        only_checked = self.trajectory.task.collision_mode == "check"
-        return failed <= ({_CLEARANCE_CHECK} if only_checked else set())
+        return all(each.passed or not each.is_kept for each in self.verification.checks)
 
     @property
     def refinement_rounds(self) -> int:

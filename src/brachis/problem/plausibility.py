@@ -84,6 +84,10 @@ Some of the largest figures are ratios to the robot's own measure.
 """
 
 
+_SMALL = 1.0 / 60.0
+"""Share of the largest usual size of a body that a distance between bodies may have."""
+
+
 def _figure(key: str, value: float, scale: float = 1.0, where: str = "") -> Check:
     """Compare a value with `scale` times the largest usual one."""
     message, largest, unit, aside = USUAL[key]
@@ -117,9 +121,12 @@ def _bodies(task: Task) -> Iterator[Check]:
         largest = max(np.abs([*sizes, *body.position]))
         yield _figure("scene", float(largest), where=f"scene: {body.name}")
     settings = task.collisions
-    for key, figure in {"clearance": settings.clearance, **settings.padding}.items():
-        name = key if key == "clearance" else f"padding.{key}"
-        yield _figure("scene", figure, 1.0 / 60.0, where=f"collisions.{name}")
+    lengths = {"collisions.clearance": settings.clearance}
+    lengths |= {
+        f"collisions.padding.{link}": more for link, more in settings.padding.items()
+    }
+    for where, length in lengths.items():
+        yield _figure("scene", length, _SMALL, where=where)
 
 
 def of_places(

@@ -38,6 +38,8 @@ class Check:
         Note on the check itself; often empty.
     of_limit : bool
         Whether it compares the motion with a limit, so that `value` is a ratio.
+    is_kept : bool
+        Whether plans keep it; otherwise they are only checked.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Check:
     time: float | None = None
     remark: str = ""
     of_limit: bool = False
+    is_kept: bool = True
 
     def __post_init__(self) -> None:
         """Compare."""

@@ -55,6 +55,7 @@ def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]
             worst.time,
             worst.remark,
             of_limit=True,
+            is_kept=worst.is_kept,
         )
         for name, worst in found
         if worst is not None

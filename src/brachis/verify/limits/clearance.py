@@ -44,7 +44,9 @@ def worst_clearance(given: Given) -> Worst | None:
     if known < min(wanted, least) - 2.0 * _ROUNDING:
         found = f"search stopped early: {found}, the proven lower bound is {1e3 * known:.2f} mm"
         least = known
-    return Worst(max(1.0 + (wanted - least) / UNIT, 0.0), subject, time, found)
+    ratio = max(1.0 + (wanted - least) / UNIT, 0.0)
+    is_kept = given.task.collision_mode == "avoid"
+    return Worst(ratio, subject, time, found, is_kept)
 
 
 class _Search:

@@ -22,12 +22,15 @@ class Worst(NamedTuple):
         s.
     remark : str
         Note on the check; often empty.
+    is_kept : bool
+        Whether plans keep the limit.
     """
 
     ratio: float
     subject: str
     time: float
     remark: str = ""
+    is_kept: bool = True
 
 
 LimitCheck = Callable[[Given], Worst | None]
