@@ -56,6 +56,7 @@ USUAL = {
     "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
     "robot.mounting.xyz": ("the distance looks like mm", 200.0, "m", ""),
     "scene": ("the length looks like mm", 30.0, "m", ""),
+    "collisions": ("the length looks like mm", 0.5, "m", ""),
     "robot.gravity": ("the acceleration looks like mm/s^2", 100.0, "m/s^2", ""),
     # The strongest arms of 1 m reach carry 130 kg, and more with the square of the reach.
     "robot.payload.mass": ("the mass looks like g", 150.0, "kg", _OF_SIZE),
@@ -84,10 +85,6 @@ Some of the largest figures are ratios to the robot's own measure.
 """
 
 
-_SMALL = 1.0 / 60.0
-"""Share of the largest usual size of a body that a distance between bodies may have."""
-
-
 def _figure(key: str, value: float, scale: float = 1.0, where: str = "") -> Check:
     """Compare a value with `scale` times the largest usual one."""
     message, largest, unit, aside = USUAL[key]
@@ -113,20 +110,15 @@ def of_task(task: Task) -> tuple[Issue, ...]:
 def _bodies(task: Task) -> Iterator[Check]:
     """Compare sizes and places of a scene's bodies, and what keeps clear of them, with a large cell."""
     for body in task.scene:
-        shape = getattr(body, body.shape)
-        sizes = np.ravel(shape) if body.shape in {"box", "sphere"} else [0.0]
-        sizes = [getattr(shape, key, 0.0) for key in ("radius", "length", "offset")] + [
-            *sizes
-        ]
-        largest = max(np.abs([*sizes, *body.position]))
-        yield _figure("scene", float(largest), where=f"scene: {body.name}")
+        largest = max(body.size, *map(abs, body.position))
+        yield _figure("scene", largest, where=f"scene: {body.name}")
     settings = task.collisions
     lengths = {"collisions.clearance": settings.clearance}
     lengths |= {
         f"collisions.padding.{link}": more for link, more in settings.padding.items()
     }
     for where, length in lengths.items():
-        yield _figure("scene", length, _SMALL, where=where)
+        yield _figure("collisions", length, where=where)
 
 
 def of_places(

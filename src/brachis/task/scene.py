@@ -82,6 +82,16 @@ class SceneBody(Model):
         return next(key for key in SHAPES if getattr(self, key) is not None)
 
     @property
+    def size(self) -> float:
+        """Largest length that its shape states, m; 0 of a mesh."""
+        shape = getattr(self, self.shape)
+        if isinstance(shape, Round):
+            return max(shape.radius, shape.length)
+        if isinstance(shape, HalfSpaceShape):
+            return abs(shape.offset)
+        return 0.0 if isinstance(shape, str) else float(np.max(shape))
+
+    @property
     def placement(self) -> Placement:
         """Where it is in the world, or in the link's frame."""
         return Placement(xyz=self.position, rpy_deg=self.rpy_deg)
