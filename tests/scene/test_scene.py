@@ -113,7 +113,7 @@ def test_distances_of_balls_and_planes_are_those_of_formulas():
     names = [found.names(pair) for pair in near.pair]
     apart = {
         "ball and held": np.linalg.norm(held - [0.5, 0.3, 0.7], axis=1) - 0.15,
-        "held and floor": held[:, 2] - 0.1 - 0.05,
+        "held and floor": held[:, 2] - 0.2 - 0.05,
     }
     for pair, expected in apart.items():
         own = [each == pair for each in names]
@@ -227,6 +227,36 @@ def test_padding_makes_links_larger():
     is_apart = everything(padded, placed).distance > 0.0
     np.testing.assert_allclose(apart[own & is_apart], 0.02, atol=1e-8)
     np.testing.assert_allclose(apart[~own], 0.0, atol=1e-8)
+
+
+def test_padded_balls_are_found_from_as_far_away_as_they_are_large(tmp_path):
+    text = (ROBOTS / "iiwa14/robot.urdf").read_text()
+    begin = text.index("<collision>", text.index('<link name="link_7">'))
+    end = text.index("</geometry>", begin)
+    shape = text.index("<cylinder", begin)
+    assert shape < end
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(text[:shape] + '<sphere radius="0.05"/>' + text[end:])
+    robot = brachis.Robot.from_urdf(urdf)
+    found = scene_of(robot, task(padding={"link_7": 0.3}))
+    placed = Chain.of(robot.model).place(postures(robot))
+    near = everything(found, placed)
+    is_close = near.distance < 0.2
+    assert len(found.find_close(placed, 0.2).pair) == np.count_nonzero(is_close)
+    bounds = found.bounds(placed)[near.posture, near.pair]
+    assert np.all(bounds <= near.distance + 1e-6)
+
+
+def test_what_is_added_to_the_clearance_is_added_once():
+    given = task()
+    robot = robot_for(None, given.robot)
+    limit = build_clearance(robot, given)
+    q = postures(robot)
+    once = limit.restrict_to(q)
+    again = once.restrict_to(q)
+    np.testing.assert_allclose(once.lower * UNIT, 0.0102, atol=1e-12)
+    np.testing.assert_array_equal(again.lower, once.lower)
+    assert limit.restrict_to(q[:0]) is None
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,6 @@ _SPARE = 2e-4
 """Distance that joint paths keep beside the clearance, m: splines leave them by so much at most."""
 _NEARBY = 2.0
 """Pairs are left out that stay so many times `_FAR` apart where the motion begins."""
-
-
 _STRIDE = 0.05
 """Distance that solids move between two checks on a step of the lattice, m."""
 _MOST_STRIDES = 16
@@ -42,6 +40,8 @@ class Clearance(Limit):
         m.
     lower : (P,) ndarray, optional
         Bounds of the values, where they are not the clearance.
+    spare : float, optional
+        Distance that `restrict_to` adds to them, m.
     """
 
     kind = "clearance"
@@ -55,11 +55,13 @@ class Clearance(Limit):
         scene: Scene,
         clearance: float,
         lower: np.ndarray | None = None,
+        spare: float = _SPARE,
     ) -> None:
         count = len(scene.pairs)
         self._chain = chain
         self._scene = scene
         self._clearance = clearance
+        self._spare = spare
         self._last: tuple[bytes, ClosePairs] | None = None
         self.labels = tuple(
             Label(scene.names(pair), "clearance", "m", "collisions.clearance")
@@ -80,9 +82,9 @@ class Clearance(Limit):
         kept = np.unique(close.pair)
         if not len(kept):
             return None
-        lower = self.lower[kept] + _SPARE / UNIT
+        lower = self.lower[kept] + self._spare / UNIT
         scene = self._scene.with_pairs(kept)
-        return Clearance(self._chain, scene, self._clearance, lower)
+        return Clearance(self._chain, scene, self._clearance, lower, spare=0.0)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
         """Tell in which postures, (K, n), no pair is too close, (K,)."""

@@ -22,7 +22,7 @@ from brachis.task import Task
 _POSTURES = 100
 """Random postures in which links that always touch are found."""
 _FARTHEST = 1.0
-"""Where joints without an end are drawn within, as a part of half a turn, or m."""
+"""Farthest from zero that sliding joints without an end are drawn, m."""
 
 
 def scene_of(robot: Robot, task: Task) -> Scene | None:
@@ -113,7 +113,7 @@ def _find_hazards(
     ]
     are_joined = np.array([pair in joined for pair in links], dtype=bool)
     limits = robot.limits
-    half = np.where(robot.revolute, np.pi, 1.0) * _FARTHEST
+    half = np.where(robot.revolute, np.pi, _FARTHEST)
     low = np.where(np.isfinite(limits.position_lower), limits.position_lower, -half)
     high = np.where(np.isfinite(limits.position_upper), limits.position_upper, half)
     q = np.random.default_rng(0).uniform(low, high, (_POSTURES, robot.n))

@@ -49,7 +49,9 @@ class Solid:
     @property
     def radius(self) -> float:
         """Radius of a ball around it, m; infinite of a half-space."""
-        return float(self.geometry.aabb_radius)
+        # Coal leaves the padding out of the ball around a sphere.
+        shape = self.geometry
+        return float(shape.aabb_radius + shape.getSweptSphereRadius())
 
 
 def build_solid(body: SceneBody) -> Solid:
@@ -63,8 +65,8 @@ def build_solid(body: SceneBody) -> Solid:
     shape = getattr(body, body.shape)
     if body.half_space is not None:
         normal = np.array(body.half_space.normal)
-        length = float(np.linalg.norm(normal))
-        geometry = coal.Halfspace(normal / length, body.half_space.offset / length)
+        unit = normal / np.linalg.norm(normal)
+        geometry = coal.Halfspace(unit, body.half_space.offset)
     elif body.mesh is not None:
         try:
             geometry = _hull(Path(body.mesh), np.full(3, body.scale))
