@@ -24,10 +24,11 @@ def scene_meshes(trajectory: Trajectory) -> dict[int, list[trimesh.Trimesh]]:
     task = trajectory.task
     found = scene_of(trajectory.robot, task)
     meshes: dict[int, list[trimesh.Trimesh]] = {}
-    first = 0 if found is None else len(found.solids) - len(task.scene)
-    for number in range(first, 0 if found is None else len(found.solids)):
-        assert found is not None
-        mesh = _mesh_of(found.solids[number])
+    if found is None:
+        return meshes
+    own = len(found.solids) - len(task.scene)
+    for number, solid in enumerate(found.solids[own:], own):
+        mesh = _mesh_of(solid)
         mesh.apply_transform(found.placements[number])
         meshes.setdefault(int(found.joints[number]), []).append(mesh)
     return meshes
