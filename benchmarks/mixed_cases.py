@@ -129,9 +129,7 @@ def _drawn(
     robot = robot_for(None, load_task({**task, **start}).robot)
     robot, task_map = bind(robot, space)
     motion = random_motion(rng, robot)
-    task["start"] = {
-        "joints": (motion[0, :-1] if robot.rolls_freely else motion[0]).tolist()
-    }
+    task["start"] = {"joints": (motion[0, : len(robot.urdf_joints)]).tolist()}
     task["path"] = random_path(
         rng, task_map, motion, shape, made.task.with_suffix(".csv")
     )
@@ -220,7 +218,7 @@ def random_motion(rng: np.random.Generator, robot: Robot) -> np.ndarray:
         np.minimum(robot.limits.position_upper, np.pi),
     )
     middle, half = 0.5 * (lower + upper), 0.45 * (upper - lower)
-    free = np.array([not robot.rolls_freely or i < robot.n - 1 for i in range(robot.n)])
+    free = np.arange(robot.n) < len(robot.urdf_joints)
     s = np.linspace(0.0, 1.0, STEPS + 1)[:, None]
     while True:
         first = middle + half * rng.uniform(-0.7, 0.7, robot.n)

@@ -185,9 +185,9 @@ def test_a_robot_with_other_limits_keeps_the_rest():
 def test_a_robot_whose_tool_rolls_may_have_other_limits():
     robot, _ = bind(brachis.robots.iiwa14, "pose_free_roll")
     changed = robot.with_limits(velocity=1.0)
-    assert changed.rolls_freely
+    assert changed.tool_joints
     assert changed.limits.velocity.tolist() == [1.0] * 7 + [np.inf]
-    assert not robot.with_payload(1.0).rolls_freely
+    assert not robot.with_payload(1.0).tool_joints
 
 
 def test_a_payload_is_carried():

@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import null_space
 
 from brachis.errors import UnreachableError
-from brachis.kinematics import ChartRows, chart_around, null_spaces, transversality
+from brachis.ik.newton import null_spaces
+from brachis.kinematics import ChartRows, chart_around, transversality
 from brachis.robot import Robot
 from support.charts import jacobian, least_motion, path_from, turned_null_spaces
 from support.motions import Sway

@@ -17,7 +17,7 @@ from brachis.limits import (
     limits_of,
 )
 from brachis.robot import dynamics
-from brachis.task import LimitSpec, SpeedTable, ToolLimits
+from brachis.task import LimitSpec, SpeedTable, Tolerances, ToolLimits
 from brachis.task.scene import CollisionSettings, SceneBody
 from support.chains import planar_robot
 from support.phases import FRICTION
@@ -53,7 +53,10 @@ TASK = SimpleNamespace(
     scene=SCENE,
     collisions=CollisionSettings(capsules="auto"),
     collision_mode="avoid",
+    tolerances=Tolerances(),
 )
+OF_TOLERANCES = ("tool_tilt", "tool_distance", "tool_range")
+"""They need the virtual joints of the tool; see `test_tolerances.py`."""
 RNG = np.random.default_rng(3)
 # The path coordinates lie off all kinks.
 STATES = Moments(
@@ -64,7 +67,7 @@ ORDERS = ("q", "qdot", "qddot", "qdddot")
 BY = (*ORDERS, "s")
 
 
-@pytest.fixture(params=sorted(TABLE))
+@pytest.fixture(params=sorted(set(TABLE) - set(OF_TOLERANCES)))
 def limit(request):
     some = np.array([5.0, np.inf, 7.0])
     limits = dataclasses.replace(
@@ -146,7 +149,9 @@ def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
 def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     kinds = [limit.kind for limit in limits_of(ROBOT, TASK)]
     assert kinds == [
-        kind for kind in TABLE if kind not in ("acceleration", "jerk", "torque_rate")
+        kind
+        for kind in TABLE
+        if kind not in ("acceleration", "jerk", "torque_rate", *OF_TOLERANCES)
     ]
     open_task = SimpleNamespace(
         tool_limits=ToolLimits(),
@@ -154,6 +159,7 @@ def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
         scene=(),
         collisions=CollisionSettings(),
         collision_mode="off",
+        tolerances=Tolerances(),
     )
     kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
     assert kinds == ["torque", "velocity", "position"]

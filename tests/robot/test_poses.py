@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from brachis.errors import InputError
-from brachis.robot import ROLL_JOINT, Robot, bind, dynamics, task_map_of
+from brachis.robot import Robot, bind, dynamics, task_map_of
 from brachis.robot.task_map import Pose
 from support.chains import chain_urdf
 from support.spatial import START, rail_arm, rail_arm_joints
@@ -63,15 +63,15 @@ def test_words_that_do_not_exist():
         task_map_of(rail_arm(), "pose_free_roll")
 
 
-def test_the_virtual_joint_turns_the_tool_about_its_own_z_axis():
+def test_the_virtual_joint_says_how_far_the_tool_is_turned_about_its_own_z_axis():
     fixed = rail_arm()
     robot, space = bind(fixed, "pose_free_roll")
-    assert robot.joint_names == (*fixed.joint_names, ROLL_JOINT)
+    assert robot.joint_names == (*fixed.joint_names, "tool_roll")
     assert robot.n == fixed.n + 1
     assert space.m == 6
     assert bind(robot, "pose_free_roll")[0] is robot
     expected = fixed.tool_placement(np.array(START)) * pin.SE3(
-        pin.exp3(np.array([0.0, 0.0, 0.7])), np.zeros(3)
+        pin.exp3(np.array([0.0, 0.0, -0.7])), np.zeros(3)
     )
     assert robot.tool_placement(np.array([*START, 0.7])).isApprox(expected, 1e-14)
 
@@ -110,7 +110,7 @@ def test_a_posture_may_leave_the_virtual_joint_out():
 
 
 def test_a_joint_of_the_virtual_ones_name_is_refused():
-    text = chain_urdf(rail_arm_joints()).replace("'j7'", f"'{ROLL_JOINT}'")
+    text = chain_urdf(rail_arm_joints()).replace("'j7'", "'tool_roll'")
     robot = Robot.from_urdf("named", urdf_text=text)
-    with pytest.raises(InputError, match="name of the virtual roll joint"):
+    with pytest.raises(InputError, match="name of a virtual joint"):
         bind(robot, "pose_free_roll")

@@ -62,7 +62,7 @@ def test_it_sees_a_roll_that_does_not_fit_the_joints(motion):
     q[:, -1] += 1e-7
     assert path_error(replace(motion, q=q)).value == pytest.approx(1e-7, rel=1e-3)
     # Turned back by the last joint, about the same axis, the tool is as it was.
-    q[:, -2] -= 1e-7
+    q[:, -2] += 1e-7
     assert path_error(replace(motion, q=q)).passed
 
 
@@ -77,5 +77,5 @@ def test_saved_motions_come_back(motion, tmp_path):
 
 @pytest.mark.parametrize("motion", ["pose_free_roll"], indirect=True)
 def test_a_tool_that_rolls_freely_is_for_that_task_space_alone(motion):
-    with pytest.raises(brachis.BrachisError, match="rolls freely"):
+    with pytest.raises(brachis.BrachisError, match="leave the path in other ways"):
         brachis.plan(motion.robot, {**motion.task.to_dict(), "task_space": "pose"})

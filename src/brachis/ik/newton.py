@@ -28,6 +28,11 @@ class Newton:
     task_map : TaskMap
     geometry : ChainGeometry, optional
         Of another chain than the task map's robot.
+
+    Attributes
+    ----------
+    scales : (n,) ndarray
+        Of the robot's joints, rad or m.
     """
 
     def __init__(
@@ -35,6 +40,7 @@ class Newton:
     ) -> None:
         self._task_map = task_map
         self._geometry = geometry or ChainGeometry.of(task_map.robot)
+        self.scales = task_map.robot.scales
 
     def task_coordinates(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Task coordinates (K, c) and task Jacobian (K, m, n) in postures (K, n)."""
@@ -138,8 +144,12 @@ class Newton:
 
     def nearest(self, targets: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Find the postures that meet targets, (K, c), without self-motion from given ones; (K, n), NaN where none."""
-        rows = np.swapaxes(null_spaces(self.task_coordinates(q)[1]), 1, 2)
+        rows = np.swapaxes(self.self_motions(q), 1, 2) / self.scales
         return self.solve(targets, q, rows, np.einsum("kij,kj->ki", rows, q))
+
+    def self_motions(self, q: np.ndarray) -> np.ndarray:
+        """Orthonormal bases, (K, n, r), of self-motion in postures (K, n); units of the joints are their scales."""
+        return null_spaces(self.task_coordinates(q)[1] * self.scales)
 
 
 def null_spaces(jacobian: np.ndarray) -> np.ndarray:

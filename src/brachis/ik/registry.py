@@ -177,14 +177,18 @@ def find(
 def find_all(
     robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()
 ) -> list[TriedDecomposition]:
-    """Try every choice of redundant joints; see `find`. Paths of joints need no closed form."""
+    """Try every choice of redundant joints; see `find`. Paths of joints need no closed form.
+
+    A virtual joint of the tool that has a range is always among them: closed forms know no ranges.
+    """
     r = robot.n - task_map.m
     if r < 0 or isinstance(task_map, JointSpace):
         return []
     matcher = _Matcher(robot, task_map, families)
-    return [
-        matcher.match(names) for names in itertools.combinations(robot.joint_names, r)
-    ]
+    always = tuple(joint.name for joint in robot.tool_joints if joint.is_ranged)
+    others = [name for name in robot.joint_names if name not in always]
+    choices = itertools.combinations(others, r - len(always))
+    return [matcher.match((*names, *always)) for names in choices]
 
 
 class _Matcher:

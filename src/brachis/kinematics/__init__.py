@@ -1,6 +1,6 @@
 """Joint maps: joint motion and its derivatives from curves y, such as (s, q_r)."""
 
-from brachis.ik.newton import Newton, null_spaces, solve_each
+from brachis.ik.newton import Newton, solve_each
 from brachis.kinematics.chart import (
     CHART,
     ChartMap,
@@ -35,7 +35,6 @@ __all__ = [
     "interpolate",
     "join_nodes",
     "moving_most",
-    "null_spaces",
     "solve_each",
     "transversality",
 ]

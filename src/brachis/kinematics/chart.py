@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.ik.newton import Newton, null_spaces
+from brachis.ik.newton import Newton
 from brachis.kinematics.joint_map import apply_each
 from brachis.kinematics.path_map import Bend, PathMap, PathState
 from brachis.path import Path, PathSample
@@ -296,12 +296,15 @@ def chart_around(
     reference = reference[kept]
     if rows is not None:
         return ChartMap(task_map, path, rows, s, reference)
-    null = null_spaces(Newton(task_map).task_coordinates(reference)[1])
+    newton = Newton(task_map)
+    null = newton.self_motions(reference)
+    scales = newton.scales
     r = null.shape[2]
     constant = np.linalg.eigh(np.einsum("kir,kjr->ij", null, null))[1][:, ::-1][:, :r].T
     if transversality(constant[None], null).min(initial=np.inf) >= _ENOUGH:
-        return ChartMap(task_map, path, ChartRows.constant(constant), s, reference)
-    following = np.swapaxes(_continue_bases(null), 1, 2)
+        chosen = ChartRows.constant(constant / scales)
+        return ChartMap(task_map, path, chosen, s, reference)
+    following = np.swapaxes(_continue_bases(null), 1, 2) / scales
     for count in _PLACES:
         places = np.unique(
             np.linspace(0, len(s) - 1, min(count, len(s))).round().astype(int)
@@ -309,7 +312,7 @@ def chart_around(
         if len(places) <= DEGREE:
             continue
         chosen = ChartRows.along(s[places], following[places], reference[places])
-        if transversality(chosen.at(s)[0], null).min() >= _ENOUGH:
+        if transversality(chosen.at(s)[0] * scales, null).min() >= _ENOUGH:
             return ChartMap(task_map, path, chosen, s, reference)
     raise UnreachableError(
         "the task Jacobian is nearly singular along the reference: no chart fits around it"
@@ -326,7 +329,10 @@ def _growing(s: np.ndarray) -> np.ndarray:
 
 
 def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
-    """Least singular value of C N, (K,), of rows (K, r, n) and bases (K, n, r); infinite without redundancy."""
+    """Least singular value of C N, (K,), of rows (K, r, n) and bases (K, n, r); infinite without redundancy.
+
+    Both are as of `Newton.self_motions`, in the scales of the joints.
+    """
     if not null.shape[2]:
         return np.full(len(null), np.inf)
     return np.asarray(np.linalg.svd(rows @ null, compute_uv=False)[:, -1])

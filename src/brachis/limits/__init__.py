@@ -33,6 +33,11 @@ from brachis.limits.protocol import (
     Partials,
     Role,
 )
+from brachis.limits.tolerance import (
+    build_tool_distance,
+    build_tool_range,
+    build_tool_tilt,
+)
 from brachis.limits.tool import (
     build_tool_acceleration,
     build_tool_angular_speed,
@@ -61,6 +66,9 @@ TABLE: dict[str, Build] = {}
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_LIMITS[_kind].build
     TABLE |= _AFTER.get(_kind, {})
+TABLE["tool_tilt"] = build_tool_tilt
+TABLE["tool_distance"] = build_tool_distance
+TABLE["tool_range"] = build_tool_range
 TABLE["clearance"] = build_clearance
 
 

@@ -59,12 +59,13 @@ class JointLimit(Limit):
         self._measure(*self._ends)
         units = [robot.position_units[i] for i in joints]
         names = [robot.joint_names[i] for i in joints]
+        ranges = {joint.name: joint.key for joint in robot.tool_joints}
         self.labels = tuple(
             Label(
                 name,
                 row.in_words(unit),
                 row.units[unit],
-                f"robot.limits.{self.kind}.{name}",
+                ranges.get(name, f"robot.limits.{self.kind}.{name}"),
                 share=self.share,
             )
             for name, unit in zip(names, units, strict=True)

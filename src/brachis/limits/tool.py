@@ -24,7 +24,7 @@ from brachis.limits.protocol import (
     Partials,
     Role,
 )
-from brachis.robot import ROLL_JOINT, Robot, task_map_of
+from brachis.robot import Robot, task_map_of
 from brachis.task import SpeedTable as SpeedTableModel
 from brachis.task import Task
 
@@ -45,7 +45,7 @@ def _direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 class ToolSpeed:
     """Speed of the tool frame's origin, m/s, or angular speed of the tool, rad/s.
 
-    A virtual joint about which a tool rolls freely does not turn it.
+    Virtual joints do not turn the tool.
 
     Parameters
     ----------
@@ -56,11 +56,9 @@ class ToolSpeed:
     def __init__(self, robot: Robot, *, angular: bool = False) -> None:
         self._tool = task_map_of(robot, "pose" if angular else "position")
         self._rows = slice(3, None) if angular else slice(None)
-        is_virtual = [
-            angular and robot.rolls_freely and name == ROLL_JOINT
-            for name in robot.joint_names
-        ]
-        self._moves = np.where(is_virtual, 0.0, 1.0)
+        self._moves = np.ones(robot.n)
+        if angular:
+            self._moves[len(robot.urdf_joints) :] = 0.0
 
     def speed(self, motion: JointStates) -> np.ndarray:
         """Speeds at K moments, (K,)."""

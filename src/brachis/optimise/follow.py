@@ -18,7 +18,7 @@ from brachis.limits import Limit
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
-from brachis.optimise.phase import Phase, is_checked_at_points
+from brachis.optimise.phase import Phase, is_checked_at_points, is_of_postures
 from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
@@ -103,9 +103,9 @@ def follow(
             break
         allowed = tolerance if number < _MESHES else np.inf
         laid = _hold_limits(phase, own, timing, breaks, allowed)
-        if best is None or laid.needed < best.needed:
+        if best is None or laid.is_better_than(best):
             best = laid
-        if laid.slower < tolerance:
+        if laid.slower < tolerance and laid.outside <= _ENOUGH:
             break
         wanted = _AIM * tolerance / laid.slower
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
@@ -192,11 +192,19 @@ class _Laid:
         Largest violation of a limit; infinite if it is not known.
     slower : float
         Part of the time by which these knots make the motion slower, at least; infinite where limits cannot hold.
+    outside : float
+        Largest violation of a limit on postures, which a longer time does not relieve; infinite if it is not known.
     """
 
     motion: Motion
     violation: float = np.inf
     slower: float = np.inf
+    outside: float = np.inf
+
+    def is_better_than(self, other: _Laid) -> bool:
+        """Tell whether they keep limits on postures that the others exceed, or else are faster."""
+        beyond = self.outside > _ENOUGH, other.outside > _ENOUGH
+        return self.needed < other.needed if beyond[0] == beyond[1] else beyond[1]
 
     @property
     def needed(self) -> float:
@@ -219,6 +227,7 @@ def _hold_limits(
         if is_checked_at_points(limit) and limit.longer_time == "relieves"
     ]
     timing = fastest
+    of_postures = [limit for limit in phase.limits if is_of_postures(limit)]
     best = _Laid(_lay_splines(phase, own, timing, breaks))
     motion = best.motion
     idle = 0
@@ -235,7 +244,8 @@ def _hold_limits(
             limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
         }
         violation = max((each.max() for each in beyond.values()), default=0.0)
-        laid = _Laid(motion, float(violation))
+        outside = [own.violation(own.values(state)).max() for own in of_postures]
+        laid = _Laid(motion, float(violation), outside=max(outside, default=0.0))
         idle = 0 if laid.needed < best.needed * (1.0 - _ENOUGH) else idle + 1
         if laid.needed < best.needed:
             best = laid

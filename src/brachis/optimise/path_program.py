@@ -5,13 +5,15 @@ With X = sdot^2 linear in s between the stations, u = d2s/dt2 is constant there,
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
+There limits hold, and at both ends.
+
 What it finds is a joint path: its timing is computed anew, on a finer grid.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -19,9 +21,10 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
+from brachis.limits import Limit, Moments
 from brachis.optimise.bspline import basis_matrix, clamped_knots, local_basis
 from brachis.optimise.evaluator import Evaluation, Evaluator
-from brachis.optimise.phase import Phase
+from brachis.optimise.phase import Phase, is_of_postures
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Link, is_safeguard
 from brachis.path.time_law import TimeLaw
@@ -37,6 +40,14 @@ _NOTHING = 1e-24
 """Stands for zero where it is divided by."""
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
+_SMALL = 5e-5
+"""Violation of a limit on postures that is left."""
+_SPARE = 1e-4
+"""Violation that they stay away from, but for the ends."""
+_RAMP = 5.0
+"""Places from an end at which they do."""
+_MORE = 1.2
+"""Factor on larger ones, by which limits are narrowed."""
 _STATIONS_A_PIECE = 4
 """Stations in every piece of a path, at most as far apart as others."""
 
@@ -63,7 +74,6 @@ class PathPhase:
         Path coordinates.
     start, x_lower, x_upper : (v,) ndarray
         Variables: X at the stations, in units of what it is at the beginning, and the control points.
-    lower, upper : (c,) ndarray
     jacobian_rows, jacobian_columns : (nnz,) int ndarray
     """
 
@@ -83,8 +93,15 @@ class PathPhase:
         s = np.interp(evenly, t, curves[:, 0])
         self._s = _with_pieces(s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
-        middles = 0.5 * (self._s[1:] + self._s[:-1])
-        self._middles = middles
+        # Where limits hold: the interval between stations, and the part of it that is ahead.
+        self._number = np.pad(np.arange(len(self._steps)), 1, mode="edge")
+        self._ahead = np.pad(
+            np.full(len(self._steps), 0.5), 1, constant_values=(1.0, 0.0)
+        )[:, None]
+        places = (
+            self._s[self._number + 1] - self._ahead[:, 0] * self._steps[self._number]
+        )
+        self._places = places
         times = np.interp(self._s, curves[:, 0], t)
         squares = own.course.curves(timing, times)[1][:, 0] ** 2
         if phase.time_law is not None:
@@ -94,7 +111,7 @@ class PathPhase:
         breaks = self._part(np.interp(evenly, t, curves[:, 0]))
         self.breaks = breaks
         self._knots = clamped_knots(_DEGREE, breaks)
-        first, basis = local_basis(self._knots, _DEGREE, self._part(middles))
+        first, basis = local_basis(self._knots, _DEGREE, self._part(places))
         self._basis = basis / self._way ** np.arange(4)[:, None, None]
         columns = first[:, None] + np.arange(_DEGREE + 1)
         self._columns = columns
@@ -106,19 +123,25 @@ class PathPhase:
         self._set_variables(squares, points)
         if phase.time_law is None:
             self._begin_within_limits()
-        limits = phase.limits_near(curves)
-        self._evaluator = Evaluator(phase.joint_map, limits)
-        lower = np.concatenate([limit.lower for limit in limits])
-        upper = np.concatenate([limit.upper for limit in limits])
-        self.lower = np.tile(lower, len(middles))
-        self.upper = np.tile(upper, len(middles))
-        numbers = np.arange(len(middles))[:, None]
+        self._limits = phase.limits_near(curves)
+        self._evaluator = Evaluator(phase.joint_map, self._limits)
+        ends = [(limit.lower, limit.upper) for limit in self._limits]
+        lower_and_upper = np.concatenate(ends, axis=1)
+        self._bounds = np.repeat(lower_and_upper[:, None], len(places), axis=1)
+        # Splines over time leave a joint path by a little.
+        for values, limit in self._posture_limits():
+            self._narrow(values, _SPARE / limit.violation_scale)
+        self._set_pattern(columns)
+        self._last: tuple[bytes, Evaluation] | None = None
+
+    def _set_pattern(self, columns: np.ndarray) -> None:
+        """Set where entries of the Jacobian are; `columns`, (P + 1, 4), are the control points of a curve."""
+        numbers = self._number[:, None]
         of_curves = [self.place_of(j, 0) + columns for j in range(self.curves_count)]
         every = np.hstack([numbers, numbers + 1, *of_curves])
-        shape = (len(middles), len(lower), every.shape[1])
+        shape = (*self._bounds.shape[1:], every.shape[1])
         self.jacobian_columns = np.broadcast_to(every[:, None], shape).ravel()
         self.jacobian_rows = np.repeat(np.arange(len(self.lower)), every.shape[1])
-        self._last: tuple[bytes, Evaluation] | None = None
 
     def _set_variables(self, squares: np.ndarray, points: np.ndarray) -> None:
         """Set the variables at the beginning, and their bounds: X at the ends stays, and values that are given."""
@@ -173,31 +196,81 @@ class PathPhase:
         return x[:count] * self._units, points
 
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Y' and y'', (P - 1, c), and X and u, (P - 1, 1), half-way between the stations; y in front."""
+        """Y' and y'', (P + 1, c), and X and u, (P + 1, 1), where limits hold; y in front."""
         squares, points = self._split(x)
         near = points[:, self._columns]
         y, y_ds, y_dds = (
             np.einsum("mk,jmk->mj", basis, near) for basis in self._basis[:3]
         )
-        mean = 0.5 * (squares[1:] + squares[:-1])
-        u = np.diff(squares) / (2.0 * self._steps)
+        number = self._number
+        square = squares[number + 1, None]
+        square = square + self._ahead * (squares[number, None] - square)
+        u = (np.diff(squares) / (2.0 * self._steps))[number]
         return (
-            np.column_stack([self._middles, y]),
+            np.column_stack([self._places, y]),
             np.column_stack([np.ones(len(y)), y_ds]),
             np.column_stack([np.zeros(len(y)), y_dds]),
-            mean[:, None],
+            square,
             u[:, None],
         )
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
-        """Joint motion and limits half-way between the stations; raises UnreachableError where there is none."""
+        """Joint motion and limits where these hold; raises UnreachableError where there is none."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
-            y, y_ds, y_dds, mean, u = self._motion(x)
-            orders = (y, y_ds * np.sqrt(mean), y_dds * mean + y_ds * u, 0.0 * y)
-            t = self._middles - self._begin
+            y, y_ds, y_dds, square, u = self._motion(x)
+            orders = (y, y_ds * np.sqrt(square), y_dds * square + y_ds * u, 0.0 * y)
+            t = self._places - self._begin
             self._last = (key, self._evaluator.evaluate(*orders, t=t))
         return self._last[1]
+
+    def narrow(self, x: np.ndarray) -> float:
+        """Narrow limits on postures where they do not hold between the places at which the program holds them.
+
+        Returns
+        -------
+        float
+            The largest violation there was.
+        """
+        curves = self.curves(x)
+        motion = Moments.at_rest(self.phase.joint_map.postures(curves))
+        worst = 0.0
+        for columns, limit in self._posture_limits():
+            violation = limit.violation(limit.values(motion)).max(axis=0)
+            worst = max(worst, float(violation.max()))
+            more = np.where(violation > _SMALL, _MORE * violation, 0.0)
+            self._narrow(columns, more / limit.violation_scale)
+        return worst
+
+    def _posture_limits(self) -> Iterator[tuple[slice, Limit]]:
+        """Yield the limits on postures alone, each with the columns of its values."""
+        first = 0
+        for limit in self._limits:
+            columns = slice(first, first + len(limit.lower))
+            first = columns.stop
+            if is_of_postures(limit):
+                yield columns, limit
+
+    def _narrow(self, columns: slice, by: np.ndarray | float) -> None:
+        """Move both bounds of some values inwards, (c,), beside an end with a given posture by less."""
+        number = np.arange(float(len(self._places)))
+        ends = self.phase.boundary.start, self.phase.boundary.end
+        part = np.ones(len(number))
+        for away, conditions in zip((number, number[::-1]), ends, strict=True):
+            if any(np.isfinite(condition.value) for condition in conditions[1:]):
+                part = np.minimum(part, away / _RAMP)
+        self._bounds[0, :, columns] += part[:, None] * by
+        self._bounds[1, :, columns] -= part[:, None] * by
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower bounds of the values of all limits at all places, (c,)."""
+        return self._bounds[0].ravel()
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds, (c,)."""
+        return self._bounds[1].ravel()
 
     def time(self, x: np.ndarray) -> float:
         """Time, s."""
@@ -219,19 +292,25 @@ class PathPhase:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,)."""
-        _, y_ds, y_dds, mean, u = self._motion(x)
+        _, y_ds, y_dds, square, u = self._motion(x)
         by_y, by_rate, by_second = self.evaluate(x).slopes[:3]
-        of_mean = np.einsum("mcj,mj->mc", by_rate, y_ds / (2.0 * np.sqrt(mean)))
-        of_mean += np.einsum("mcj,mj->mc", by_second, y_dds)
+        rate = np.sqrt(square)
+        # X is given where it vanishes.
+        half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
+        of_square = np.einsum("mcj,mj->mc", by_rate, y_ds * half)
+        of_square += np.einsum("mcj,mj->mc", by_second, y_dds)
         of_u = np.einsum("mcj,mj->mc", by_second, y_ds)
-        of_step = of_u / (2.0 * self._steps[:, None])
+        number = self._number
+        of_step = of_u / (2.0 * self._steps[number, None])
+        before = self._ahead * of_square - of_step
+        behind = (1.0 - self._ahead) * of_square + of_step
         parts = [
-            ((0.5 * of_mean - of_step) * self._units[:-1, None])[:, :, None],
-            ((0.5 * of_mean + of_step) * self._units[1:, None])[:, :, None],
+            (before * self._units[number, None])[:, :, None],
+            (behind * self._units[number + 1, None])[:, :, None],
         ]
         value, first, second, _ = self._basis
-        of_rate = first * np.sqrt(mean)
-        of_second = second * mean + first * u
+        of_rate = first * rate
+        of_second = second * square + first * u
         for j in range(1, self.curves_count + 1):
             own = by_y[:, :, j, None] * value[:, None]
             own = own + by_rate[:, :, j, None] * of_rate[:, None]
@@ -305,9 +384,6 @@ class PathProgram:
                 ends = first_phase.place_of(curve, -1), first_phase.place_of(curve, 0)
                 pairs.append(ends)
         self._pairs = np.reshape(np.array(pairs, dtype=int), (-1, 2))
-        joined = np.zeros(len(self._pairs))
-        self.lower = np.concatenate([*(own.lower for own in self.phases), joined])
-        self.upper = np.concatenate([*(own.upper for own in self.phases), joined])
         heights = np.cumsum([0, *(len(own.lower) for own in self.phases)]).tolist()
         rows = [
             own.jacobian_rows + a for own, a in zip(self.phases, heights, strict=False)
@@ -323,6 +399,22 @@ class PathProgram:
         return [
             (own, x[part]) for own, part in zip(self.phases, self._parts, strict=True)
         ]
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower bounds of the rows, (c,)."""
+        joined = np.zeros(len(self._pairs))
+        return np.concatenate([*(own.lower for own in self.phases), joined])
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds of the rows, (c,)."""
+        joined = np.zeros(len(self._pairs))
+        return np.concatenate([*(own.upper for own in self.phases), joined])
+
+    def narrow(self, x: np.ndarray) -> float:
+        """Narrow limits on postures of all phases; see `PathPhase.narrow`."""
+        return max(own.narrow(part) for own, part in self._split(x))
 
     def objective(self, x: np.ndarray) -> float:
         """Time of all phases, s."""

@@ -479,6 +479,12 @@ def is_checked_at_points(limit: Limit) -> bool:
     return limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean
 
 
+def is_of_postures(limit: Limit) -> bool:
+    """Tell whether the limit is one of postures alone, whatever the timing."""
+    is_held = is_checked_at_points(limit) and limit.at_rest != "nothing"
+    return is_held and limit.longer_time == "neither"
+
+
 def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:
     """Slopes of a limit at rest by the posture, (c, n); zero where it does not depend on it."""
     if partials.q is None:

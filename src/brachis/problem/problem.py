@@ -33,7 +33,7 @@ from brachis.problem.feasibility import (
     lacks_a_direction,
     other_branch,
 )
-from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
+from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace
 from brachis.task import Task
@@ -92,7 +92,7 @@ class Problem(Summary):
             Task space, postures, path or a limit of the user's do not fit the robot; the splines are not smooth enough
             for a limit.
         """
-        robot, task_map = bind(robot, task.task_space)
+        robot, task_map = bind(robot, task.task_space, task.tolerances)
         start, end = (
             None if given == "free" else robot.posture(given.joints, f"{key}.joints")
             for key, given in (("start", task.start), ("end", task.end))
@@ -269,7 +269,7 @@ def decompositions_of(
     if isinstance(task_map, JointSpace):
         return []
     if task.redundant_joints != "auto":
-        wanted = _with_roll(task_map, task.redundant_joints)
+        wanted = _with_tool_joints(task_map, task.redundant_joints)
         return [
             _decomposition(problem, ik.find(robot, task_map, wanted, families=families))
         ]
@@ -303,13 +303,12 @@ def decompositions_of(
     return sorted(allowed, key=lambda decomposition: -decomposition.clearance)
 
 
-def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Add the free roll where it is the one redundant joint that is left out."""
+def _with_tool_joints(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Add the virtual joints of the tool where these are the redundant joints that are left out."""
     robot = task_map.robot
-    is_one_short = robot.n - task_map.m - len(names) == 1
-    if robot.rolls_freely and is_one_short and ROLL_JOINT not in names:
-        return (*names, ROLL_JOINT)
-    return names
+    virtual = [joint.name for joint in robot.tool_joints if joint.name not in names]
+    is_short = robot.n - task_map.m - len(names) == len(virtual)
+    return (*names, *virtual) if is_short else names
 
 
 def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:

@@ -21,7 +21,7 @@ from brachis.robot.limits import (
     without_joints,
 )
 from brachis.robot.robot import Robot
-from brachis.robot.task_map.choice import with_free_roll
+from brachis.robot.task_map.choice import with_tool_joints
 from brachis.robot.urdf import read_chain
 from brachis.task import (
     FROM_URDF,
@@ -109,7 +109,9 @@ def robot_for(
     if wanted == given:
         return robot if given is robot.settings else replace(robot, settings=given)
     same = robot_from_settings(given, urdf_text=robot.urdf)
-    if (with_free_roll(same) if robot.rolls_freely else same).model != robot.model:
+    if robot.tool_joints:
+        same = with_tool_joints(same, robot.tool_joints)
+    if same.model != robot.model:
         raise InputError(
             "the robot's model differs from its URDF and settings, so the task's robot section cannot be applied",
             where="robot",

@@ -12,6 +12,7 @@ from brachis.common import tolerances
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError, LimitError, UnknownNameError
+from brachis.robot.tool_joints import ToolJoint
 from brachis.task import FROM_URDF, LIMIT_KINDS, LimitScale, LimitSpec
 from brachis.task.fields import LARGEST, LEAST
 
@@ -87,15 +88,20 @@ class Limits(_JointArrays, Summary):  # type: ignore[misc]
             ends |= _arrays_of(kind, np.array([-values, values]))
         return replace(self, **ends)
 
-    def with_free_joint(self) -> Limits:
-        """Return the limits with those of a further joint, which has none."""
-        free: dict[str, Any] = {
-            name: np.append(
-                getattr(self, name), -np.inf if name.endswith("_lower") else np.inf
-            )
+    def with_tool_joints(self, joints: Sequence[ToolJoint]) -> Limits:
+        """Return the limits with those of further joints, which have none but their ranges."""
+        free = {
+            name: np.full(len(joints), -np.inf if name.endswith("_lower") else np.inf)
             for name in _ARRAYS
         }
-        return replace(self, **free, torque_speed=(*self.torque_speed, ()))
+        free["position_lower"] = np.array([joint.lower for joint in joints])
+        free["position_upper"] = np.array([joint.upper for joint in joints])
+        longer: dict[str, Any] = {
+            name: np.append(getattr(self, name), values)
+            for name, values in free.items()
+        }
+        curves = (*self.torque_speed, *((),) * len(joints))
+        return replace(self, **longer, torque_speed=curves)
 
 
 def _arrays_of(kind: str, pairs: np.ndarray) -> dict[str, np.ndarray]:

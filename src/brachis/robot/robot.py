@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self, TypedDict, Unpack
 
@@ -26,6 +27,7 @@ from brachis.robot.limits import (
     without_joints,
 )
 from brachis.robot.model import build_model
+from brachis.robot.tool_joints import ToolJoint
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import UrdfDynamics
 from brachis.robot.urdf_elements import read_tree
@@ -38,9 +40,6 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
-
-ROLL_JOINT = "tool_roll"
-"""The virtual joint by which a tool rolls freely about its z axis; see `bind`."""
 
 
 class RobotKeywords(TypedDict, total=False):
@@ -84,8 +83,8 @@ class Robot(Summary):
         The URDF file that the robot was read from.
     urdf : str
         Text of that file.
-    rolls_freely : bool
-        Whether the last joint is the virtual one by which the tool rolls freely; see `bind`.
+    tool_joints : tuple of ToolJoint
+        The last joints of the chain, which are virtual: by them the tool may leave the path; see `bind`.
 
     Examples
     --------
@@ -106,7 +105,7 @@ class Robot(Summary):
     settings: RobotSettings
     source: str
     urdf: str
-    rolls_freely: bool = False
+    tool_joints: tuple[ToolJoint, ...] = ()
 
     def __new__(cls, *given: object, **named_fields: object) -> Self:
         """Refuse a file name, which is for `from_urdf`."""
@@ -271,8 +270,7 @@ class Robot(Summary):
                 changes[kind] = value
         spec = LimitSpec(**changes)
         resolved = resolve_limits(spec, names, self.urdf_limits[: len(names)])
-        if self.rolls_freely:
-            resolved = resolved.with_free_joint()
+        resolved = resolved.with_tool_joints(self.tool_joints)
         self.friction.check_against(self.model, resolved.torque)
         changed = {"limits": spec, "speed_override": 1.0}
         settings = self.settings.model_copy(update=changed)
@@ -316,7 +314,7 @@ class Robot(Summary):
         }
         settings = self.settings.model_copy(update=changes)
         robot = Robot.from_settings(settings, self.source, self.urdf)
-        if self.rolls_freely:
+        if self.tool_joints:
             return robot
         return replace(robot, limits=self.limits, friction=self.friction)
 
@@ -358,13 +356,13 @@ class Robot(Summary):
 
     @property
     def urdf_joints(self) -> tuple[str, ...]:
-        """Names of the joints without the virtual one by which the tool rolls freely."""
-        return self.joint_names[: self.n - self.rolls_freely]
+        """Names of the joints without the virtual ones."""
+        return self.joint_names[: self.n - len(self.tool_joints)]
 
     @property
     def frame_id(self) -> int:
         """Pinocchio's index of the tool frame."""
-        kind = pin.FrameType.OP_FRAME if self.rolls_freely else pin.FrameType.BODY
+        kind = pin.FrameType.OP_FRAME if self.tool_joints else pin.FrameType.BODY
         return int(self.model.getFrameId(self.tool_frame, kind))
 
     @property
@@ -380,20 +378,31 @@ class Robot(Summary):
         """Which joints turn, (n,) bool; the others slide."""
         return np.array([unit == "rad" for unit in self.position_units])
 
+    @cached_property
+    def scales(self) -> np.ndarray:
+        """How far joints move, about, (n,): 1 rad or m; a virtual joint with a range half of it."""
+        halves = [0.5 * (joint.upper - joint.lower) for joint in self.tool_joints]
+        return np.append(np.ones(len(self.urdf_joints)), np.minimum(halves, 1.0))
+
     def posture(self, joints: object, where: str) -> np.ndarray:
         """Check a list or mapping of joint positions and return it as (n,) in chain order, rad or m.
 
-        The position of the virtual joint of a freely rolling tool may be left out; it is zero then.
+        Positions of virtual joints may be left out; they are zero then, or at the end of the range that is nearer.
 
         Raises
         ------
         InputError, UnknownNameError
             A joint is missing, unknown or not finite, or the list has another length than the chain.
         """
-        if self.rolls_freely and isinstance(joints, Mapping):
-            joints = {ROLL_JOINT: 0.0, **joints}
-        elif self.rolls_freely and isinstance(joints, Sequence | np.ndarray):
-            joints = [*joints, 0.0] if len(joints) == self.n - 1 else joints
+        still = {
+            joint.name: float(np.clip(0.0, joint.lower, joint.upper))
+            for joint in self.tool_joints
+        }
+        if isinstance(joints, Mapping):
+            joints = {**still, **joints}
+        elif isinstance(joints, Sequence | np.ndarray):
+            are_real = len(joints) == len(self.urdf_joints)
+            joints = [*joints, *still.values()] if are_real else joints
         values = per_joint_values(where, joints, self.joint_names, None)
         pairs = zip(self.joint_names, values, strict=True)
         missing = [name for name, value in pairs if value is None]

@@ -35,7 +35,6 @@ from brachis.kinematics import (
     JointState,
     Newton,
     chart_around,
-    null_spaces,
     transversality,
 )
 from brachis.limits.safeguards import HELD_BACK, MARGINS
@@ -418,20 +417,13 @@ def _densely(solved: SolvedProgram) -> Iterator[tuple[float, np.ndarray, JointSt
         yield motion.t_end, t_norm, phase.joint_map.state(*motion.at(times), t=times)
 
 
-def _self_motion(solved: SolvedProgram) -> tuple[ChartMap, np.ndarray, np.ndarray]:
-    """Return the chart, and along the motion s, (K,), and bases of the null spaces of the task Jacobian, (K, n, r)."""
-    states = solved.program.states(solved.report.x)
-    chart = solved.program.phases[0].joint_map
-    assert isinstance(chart, ChartMap)
-    q = np.concatenate([state.q for state in states])
-    jacobian = Newton(chart.task_map).task_coordinates(q)[1]
-    s = np.concatenate([state.s for state in states])
-    return chart, s, null_spaces(jacobian)
-
-
 def _select_joints(solved: SolvedProgram) -> list[ChartRows]:
     """Rows that select joints and are transversal along the motion, the most transversal ones first."""
-    _, _, null = _self_motion(solved)
+    chart = solved.program.phases[0].joint_map
+    assert isinstance(chart, ChartMap)
+    states = solved.program.states(solved.report.x)
+    q = np.concatenate([state.q for state in states])
+    null = Newton(chart.task_map).self_motions(q)
     n, r = null.shape[1:]
     # Three choices of one redundant joint and one of several are tried: these solves take longest.
     most = (0, 3, 1)[min(r, 2)]

@@ -16,6 +16,7 @@ from typing import Unpack
 import numpy as np
 
 from brachis.problem.problem import Decomposition, Problem
+from brachis.robot import Robot
 from brachis.robot.joints import TURN, complement
 from brachis.search.joint_path import OTHER_BRANCH
 from brachis.search.lattice import LARGEST_STEP, Edges, Lattice, Layer, Options
@@ -60,7 +61,7 @@ class Cells:
         turning = problem.robot.revolute[joints]
         low = problem.robot.limits.position_lower[joints]
         high = problem.robot.limits.position_upper[joints]
-        size = cell_sizes(turning, cells_per_turn)
+        size = cell_sizes(problem.robot, cells_per_turn)[joints]
         if posture is None:
             near = [_near_start(problem, joint) for joint in joints]
             origin = np.clip(np.where(turning, 0.0, near), low, high)
@@ -105,9 +106,11 @@ class Cells:
         return np.unique(np.vstack([still, single, -single, random]), axis=0)
 
 
-def cell_sizes(revolute: np.ndarray, cells_per_turn: int) -> np.ndarray:
-    """Return cell sizes, (n,): rad for the joints of the mask `revolute`, m for others."""
-    return np.where(revolute, TURN, 3.0) / cells_per_turn
+def cell_sizes(robot: Robot, cells_per_turn: int) -> np.ndarray:
+    """Return cell sizes of the joints, (n,), rad or m: at least four cells in a range."""
+    limits = robot.limits
+    size = np.where(robot.revolute, TURN, 3.0) / cells_per_turn
+    return np.minimum(size, 0.25 * (limits.position_upper - limits.position_lower))
 
 
 def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -19,7 +19,6 @@ from brachis.kinematics import (
     JointSpaceMap,
     Newton,
     chart_around,
-    null_spaces,
     transversality,
 )
 from brachis.optimise.candidate import InitialGuess, PathMap
@@ -132,7 +131,9 @@ def _lay_chart(
     elif len(joints) == robot.n - problem.task_map.m:
         rows = ChartRows.constant(np.eye(robot.n)[joints])
     if rows is not None:
-        null = null_spaces(Newton(problem.task_map).task_coordinates(q)[1])
-        if transversality(rows.at(s)[0], null).min() < SELECTABLE:
+        newton = Newton(problem.task_map)
+        scaled = rows.at(s)[0] * newton.scales
+        scaled /= np.linalg.norm(scaled, axis=2, keepdims=True)
+        if transversality(scaled, newton.self_motions(q)).min() < SELECTABLE:
             rows = None
     return chart_around(problem.task_map, problem.path, s, q, rows)

@@ -19,7 +19,6 @@ from brachis.kinematics import (
     ChartMap,
     Newton,
     chart_around,
-    null_spaces,
     transversality,
 )
 from brachis.optimise.candidate import InitialGuess
@@ -132,8 +131,9 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
     q = chart.postures(curves)
     if not np.isfinite(q).all():
         return None
-    null = null_spaces(Newton(chart.task_map).task_coordinates(q)[1])
-    least = transversality(chart.rows.at(s)[0], null).min()
+    newton = Newton(chart.task_map)
+    rows = chart.rows.at(s)[0] * newton.scales
+    least = transversality(rows, newton.self_motions(q)).min()
     if least >= _TRANSVERSAL and not better.found.is_held_back:
         return None
     try:

@@ -19,7 +19,8 @@ from typing import Unpack
 
 import numpy as np
 
-from brachis.kinematics import Newton, moving_most, null_spaces, solve_each
+from brachis.ik.newton import null_spaces
+from brachis.kinematics import Newton, moving_most, solve_each
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.joints import TURN
 from brachis.search.closed_form_lattice import Cells, cell_sizes, solve_all
@@ -112,7 +113,7 @@ class PostureLattice(Lattice):
         self._only_minima = only_minima
         self._decompositions = decompositions
         self._r = problem.robot.n - problem.task_map.m
-        self._size = cell_sizes(revolute, self._cells_per_turn)
+        self._size = cell_sizes(problem.robot, self._cells_per_turn)
         # Distance within which nodes are neighbours on the self-motion manifold.
         self._around = 3.0 * float(self._size.max())
         self._newton = Newton(problem.task_map)
@@ -197,10 +198,12 @@ class PostureLattice(Lattice):
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
         """List edges to the postures at the cells around the nodes, along self-motion."""
         values, jacobian = self._newton.task_coordinates(before.q)
-        null = null_spaces(jacobian)
+        # Of self-motion, where joints have their cells as units.
+        null = null_spaces(jacobian * self._size)
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
         still = np.zeros((len(null), self._r))  # without self-motion
-        square = np.concatenate([jacobian, np.swapaxes(null, 1, 2)], axis=1)
+        rows = np.swapaxes(null, 1, 2) / self._size
+        square = np.concatenate([jacobian, rows], axis=1)
         needed = solve_each(square, np.concatenate([wanted, still], axis=1))
         if self._r <= 1:
             around = self._at_cells(before.q, jacobian, null, wanted, station)
@@ -215,7 +218,8 @@ class PostureLattice(Lattice):
             q = np.vstack([q, end[which]])
         step = self._step(before.q[parent], q)
         own = step - needed[parent]
-        small = np.all(np.abs(own) <= self._size, axis=1)
+        own = own / self._size
+        small = np.all(np.abs(own) <= 1.0, axis=1)
         # Postures across a fold of the manifold differ in other directions.
         along = np.linalg.norm(np.einsum("eir,ei->er", null[parent], own), axis=1)
         return Edges(
@@ -249,7 +253,7 @@ class PostureLattice(Lattice):
         station: int,
     ) -> np.ndarray:
         """Postures (C, n) at the cells around nodes with postures (K, n), on the way to the next station's target."""
-        joints = moving_most(null / self._size[:, None])
+        joints = moving_most(null)
         rows = np.eye(self._robot.n)[joints]
         size = self._size[joints]
         at = np.take_along_axis(q, joints, axis=1)
@@ -289,11 +293,12 @@ class PostureLattice(Lattice):
         aside = np.einsum("kij,oj->koi", null, offsets) * self._size
         if self._to_end:  # one more: a part of the way to the given end
             left = (self.problem.end - q) / max(1, len(self.s) - station)
-            homing = np.einsum("kir,kjr,kj->ki", null, null, left)
+            homing = np.einsum("kir,kjr,kj->ki", null, null, left / self._size)
+            homing = homing * self._size
             aside = np.concatenate([aside, homing[:, None]], axis=1)
         parent = np.repeat(np.arange(len(q)), aside.shape[1])
         begun = ((q + needed)[:, None] + aside).reshape(len(parent), -1)
-        rows = np.swapaxes(null, 1, 2)[parent]
+        rows = (np.swapaxes(null, 1, 2) / self._size)[parent]
         levels = np.einsum("kij,kj->ki", rows, begun)
         found = self._project(begun, rows, levels, station)
         exists = np.isfinite(found).all(axis=1)

@@ -323,7 +323,7 @@ def perturb(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[Join
         waves.append(s)
     limits = problem.robot.limits
     # Standard deviations of a 16th of a turn, then of half as much, and so on: four sizes.
-    size = cell_sizes(problem.robot.revolute, 16)
+    size = cell_sizes(problem.robot, 16)
     found = []
     for number in range(most):
         given = joint_paths[number % len(joint_paths)]

@@ -20,6 +20,8 @@ from brachis.search.over_path import improve_guess
 
 _MORE = 1.2
 """Times the violation by which a timing takes longer."""
+_LESS = 0.9
+"""Factor on an excess beyond a limit that such a longer time should bring, at least."""
 _LONGEST = 0.1
 """Part of the time by which it may."""
 
@@ -97,7 +99,7 @@ def plan_timing(
 ) -> Candidate | None:
     """Lay splines along the timings of all phases, and verify them.
 
-    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer.
+    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer, if that helps.
 
     Parameters
     ----------
@@ -123,6 +125,7 @@ def plan_timing(
         return None
     finer, report = laid
     factor = 1.0
+    worst = np.inf
     for number in itertools.count(1):
         own = SolvedProgram(
             finer, (report,), violation=report.violation, time_scaled=factor
@@ -132,10 +135,12 @@ def plan_timing(
         if done.is_settled or found is None:
             return done
         failed = [check for check in found.checks if not check.passed]
-        if not all(check.of_limit for check in failed):
+        ratio = found.worst_ratio
+        if not all(check.of_limit for check in failed) or ratio > worst:
             return done
+        worst = 1.0 + _LESS * (ratio - 1.0)
         # Torques that gravity adds to fall more slowly.
-        more = number * _MORE * max(found.worst_ratio - 1.0, options.tolerance)
+        more = number * _MORE * max(ratio - 1.0, options.tolerance)
         factor *= 1.0 + more
         if factor > 1.0 + _LONGEST:
             break

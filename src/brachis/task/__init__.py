@@ -57,6 +57,7 @@ from brachis.task.settings import (
     SolverSettings,
     SplineSettings,
 )
+from brachis.task.tolerances import Tolerances
 
 __all__ = [
     "FROM_URDF",
@@ -100,6 +101,7 @@ __all__ = [
     "Target",
     "Task",
     "TaskKeywords",
+    "Tolerances",
     "ToolLimits",
     "ToolPose",
     "TurnSegment",

@@ -25,6 +25,7 @@ from brachis.task.settings import (
     SolverSettings,
     SplineSettings,
 )
+from brachis.task.tolerances import Tolerances
 
 Posture = (
     Array
@@ -62,6 +63,7 @@ class TaskKeywords(TypedDict, total=False):
     tool_limits: ToolLimits | Settings
     scene: Sequence[SceneBody | Settings] | Settings
     collisions: CollisionSettings | Settings
+    tolerances: Tolerances | Settings
     custom_limits: Mapping[str, Settings]
     strict: bool | None
     # robot

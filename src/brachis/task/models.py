@@ -55,6 +55,11 @@ from brachis.task.settings import (
     SplineSettings,
     expand_solver_name,
 )
+from brachis.task.tolerances import (
+    OrientationTolerance,
+    PositionTolerance,
+    Tolerances,
+)
 
 Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
@@ -196,6 +201,8 @@ class Task(Model):
     """Bodies around the robot and on it, which it keeps clear of; or {file: cell.yaml} (see docs/my_cell.md)."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
     """The clearance, which pairs of bodies keep it, and whether it is a limit of the plan."""
+    tolerances: Tolerances = Field(default_factory=Tolerances)
+    """Ranges within which the tool may leave the path's orientation and position."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"
@@ -393,6 +400,31 @@ class Task(Model):
                     ("branch", "auto"),
                     ("search.guesses", "lattice"),
                 )
+            ),
+        )
+
+    @model_validator(mode="after")
+    def _tolerances_fit(self) -> Self:
+        asked = self.tolerances
+        of_places = self.of_poses or self.task_space == POSITION_ROWS
+        return self.check(
+            (
+                asked.orientation != OrientationTolerance() and not self.of_poses,
+                "tolerances.orientation",
+                "the path does not prescribe the orientation",
+                "tolerances of the orientation with task_space: pose",
+            ),
+            (
+                asked.position != PositionTolerance() and not of_places,
+                "tolerances.position",
+                "the path does not prescribe the whole position",
+                "tolerances of the position with task_space: position or pose",
+            ),
+            (
+                asked.orientation.roll is not None and self.task_space != "pose",
+                "tolerances.orientation.roll",
+                "the roll is free in this task space",
+                "task_space: pose with it",
             ),
         )
 

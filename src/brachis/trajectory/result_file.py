@@ -172,7 +172,7 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     """Check that the parts fit each other; return the arguments of a `Trajectory`."""
     task = load_task(meta.task)
     robot = robot_from_settings(task.robot, urdf_text=meta.urdf)
-    robot, _ = bind(robot, task.task_space)
+    robot, _ = bind(robot, task.task_space, task.tolerances)
     _refuse_unless(
         meta.joint_names == list(robot.joint_names),
         "the joints are not those of the URDF",

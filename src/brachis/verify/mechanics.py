@@ -47,13 +47,28 @@ class _Weight:
 
 
 def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n)."""
+    """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n).
+
+    Positions of virtual joints say how far the tool is from the path; the place on the path is returned then.
+    """
     tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
-    roll = q[:, -1] if robot.rolls_freely else np.zeros(len(q))
-    axes = [_rotate(_AXES[2], roll, axis[:, None] + 0.0 * roll) for axis in _AXES]
-    # The tool's axes and its origin, (3, K) each, in the frame of one joint after the other.
+    count = len(robot.urdf_joints)
+    away = dict(zip(robot.joint_names[count:], q.T[count:], strict=True))
+    still = np.zeros(len(q))
+    x, y, z, side, lead, roll = (
+        away.get(f"tool_{way}", still)
+        for way in ("x", "y", "z", "side", "lead", "roll")
+    )
+    axes = [
+        _rotate(
+            _AXES[2], -roll, _rotate(_AXES[1], -lead, _rotate(_AXES[0], side, each))
+        )
+        for each in (axis[:, None] + still for axis in _AXES)
+    ]
+    # The path's axes and its origin, (3, K) each, in the frame of one joint after the other.
     vectors = [tool[:3, :3] @ axis for axis in axes]
-    vectors.append(np.tile(tool[:3, 3:], len(q)))
+    origin = -sum(axis * length for axis, length in zip(axes, (x, y, z), strict=True))
+    vectors.append(tool[:3, :3] @ origin + tool[:3, 3:])
     for body, position in reversed(
         list(zip(robot.urdf_dynamics.bodies, q.T, strict=False))
     ):
@@ -70,7 +85,7 @@ def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and of all joints in postures, (K, n).
 
-    A free roll of the tool is no joint here.
+    Virtual joints of the tool have no part in it.
     """
     bodies = robot.urdf_dynamics.bodies
     base = placement_matrix(robot.settings.mounting)
@@ -107,7 +122,7 @@ def _to_parent(
 def torques(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
-    """Joint torques (K, n) from states (K, n), Nm or N; that of a free roll of the tool is zero."""
+    """Joint torques (K, n) from states (K, n), Nm or N; those of virtual joints are zero."""
     f = robot.friction
     return (
         _rigid(robot, q, qdot, qddot)

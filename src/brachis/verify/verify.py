@@ -75,9 +75,9 @@ def verify_trajectory(
     options = options or VerifyOptions(
         ratio_tolerance=trajectory.task.refinement.tolerance
     )
-    robot, task_map = bind(
-        trajectory.robot if robot is None else robot, trajectory.task.task_space
-    )
+    task = trajectory.task
+    asked = trajectory.robot if robot is None else robot
+    robot, task_map = bind(asked, task.task_space, task.tolerances)
     if robot.joint_names != trajectory.joint_names:
         raise InputError(
             "the joints of the robot are not those of the trajectory",

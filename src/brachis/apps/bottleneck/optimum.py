@@ -28,7 +28,6 @@ from brachis.optimise.refine import RefinementOptions, refine
 from brachis.optimise.retiming import is_timing_all, keep
 from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Problem, decompositions_of
-from brachis.robot import ROLL_JOINT
 from brachis.robot.task_map import JOINTS
 from brachis.trajectory import Trajectory
 
@@ -143,7 +142,9 @@ def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
         joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
         names = tuple(
-            name for name in trajectory.redundant_joints if name != ROLL_JOINT
+            name
+            for name in trajectory.redundant_joints
+            if name in trajectory.robot.urdf_joints
         )
         own = task.model_copy(
             update={"redundant_joints": names, "branch": trajectory.branch}

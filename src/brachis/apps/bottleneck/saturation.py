@@ -12,7 +12,6 @@ from brachis.common import tolerances
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.limits import Label, Limit, Moments, limits_of
-from brachis.robot import bind
 from brachis.trajectory import MotionPhase, Samples, Trajectory
 
 
@@ -70,7 +69,7 @@ def limit_ratios(
     LimitRatios
     """
     if limits is None:
-        robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+        robot = trajectory.robot
         limits = limits_of(robot, trajectory.task)
     nodes = trajectory.times[1:]
     before = (

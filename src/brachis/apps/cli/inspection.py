@@ -116,7 +116,7 @@ def inspect(
         space = ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
-    robot, task_map = bind(robot, space)
+    robot, task_map = bind(robot, space, None if task is None else task.tolerances)
     remarks += [f"warning: {remark}" for remark in of_robot(robot)]
     candidates = ik.find_all(robot, task_map)
     if candidates and not any(candidate.solver for candidate in candidates):

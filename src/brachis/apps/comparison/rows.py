@@ -16,7 +16,6 @@ from math import factorial
 import numpy as np
 
 from brachis.limits import Limit, Moments, Role, limits_of
-from brachis.robot import bind
 from brachis.trajectory import Trajectory
 
 _STRIDES = (1, 2, 4)
@@ -56,7 +55,7 @@ def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
     """Compare the rows of an imported motion with every limit of its task."""
     assert trajectory.recovered is not None
     t = trajectory.recovered.rows[:, 0]
-    robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+    robot = trajectory.robot
     bounds = []
     for limit in limits_of(robot, trajectory.task):
         subjects = tuple(label.subject for label in limit.labels)

@@ -11,7 +11,6 @@ from types import ModuleType
 import numpy as np
 
 from brachis.errors import BrachisWarning, NotInstalledError, UnknownNameError
-from brachis.robot import ROLL_JOINT
 from brachis.trajectory import Trajectory
 from brachis.trajectory.samples import COLUMNS
 
@@ -76,7 +75,7 @@ def rows_of(
     last : {"exact", "hold"}
         See `Trajectory.sample`.
     joints : sequence of str or None
-        Which, in which order; None: all that the robot has, which the virtual joint of a freely rolling tool is not.
+        Which, in which order; None: all that the robot has, which virtual ones are not.
 
     Raises
     ------
@@ -91,7 +90,8 @@ def rows_of(
         A joint that moves is not among them.
     """
     names = trajectory.joint_names
-    chosen = [name for name in names if name != ROLL_JOINT]
+    real = trajectory.robot.urdf_joints
+    chosen = list(real)
     if joints is not None:
         chosen = list(joints)
     unknown = [name for name in chosen if name not in names]
@@ -104,7 +104,7 @@ def rows_of(
     units = trajectory.robot.position_units
     for joint, unit, q in zip(names, units, postures.T, strict=True):
         is_still = np.ptp(q) <= 1e-9  # rad or m
-        if is_still or joint in (*chosen, ROLL_JOINT):
+        if is_still or joint in chosen or joint not in real:
             continue
         travel = f"{np.ptp(q):.4g} {unit} ({q.min():.4g} to {q.max():.4g} {unit})"
         left_out.append(f"joint {joint} moves by {travel} and is not in this file")

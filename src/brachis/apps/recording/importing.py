@@ -127,11 +127,12 @@ def import_motion(
     if not space:
         space = settings.task_space if settings else ik.default_task_space(given_robot)
     recording = read_recording(path, given_robot, check_units(units or {}))
-    bound, task_map = bind(given_robot, space)
+    tolerances = settings.tolerances if settings else None
+    bound, task_map = bind(given_robot, space, tolerances)
     deviation = _deviations(recording, noise)
     nodes = nodes_of(recording, deviation)
     error = recording.rounding if noise is None else _SURE * deviation
-    rolling = ((0, 0), (0, bound.n - given_robot.n))  # the virtual joint stands still
+    rolling = ((0, 0), (0, bound.n - given_robot.n))  # virtual joints stand still
     q, qdot, qddot = (np.pad(x, rolling) for x in (nodes.q, nodes.qdot, nodes.qddot))
     nodes = Nodes(nodes.t, q, qdot, qddot, nodes.notes)
     rests = find_rests(nodes)

@@ -13,7 +13,6 @@ from brachis.errors import BrachisError
 from brachis.limits import Limit, Role, describe_guarantees, limits_of
 from brachis.optimise.candidate import Candidate
 from brachis.problem.plausibility import of_robot, of_task
-from brachis.robot import bind
 from brachis.robot.plausibility import Issue
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
@@ -92,7 +91,7 @@ def reported_motion(
             early = "the search was ended early: a faster motion may have been missed"
             not_completed = (early, *not_completed)
     if not limits:
-        robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+        robot = trajectory.robot
         limits += limits_of(robot, trajectory.task)
     ratios = limit_ratios(trajectory, limits)
     found = saturations(ratios)

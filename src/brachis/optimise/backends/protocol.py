@@ -43,10 +43,18 @@ class Problem(Protocol):
 
     x_lower: np.ndarray
     x_upper: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
     jacobian_rows: np.ndarray
     jacobian_columns: np.ndarray
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower bounds of the rows."""
+        ...
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds of the rows."""
+        ...
 
     def objective(self, x: np.ndarray) -> float:
         """Value to be minimised; raises UnreachableError where it does not exist."""

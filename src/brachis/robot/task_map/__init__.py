@@ -1,11 +1,10 @@
 """Task maps: from joint positions to task coordinates; one kind per file."""
 
-from brachis.robot.task_map.choice import FREE_ROLL, JOINTS, JointSpace, task_map_of
+from brachis.robot.task_map.choice import JOINTS, JointSpace, task_map_of
 from brachis.robot.task_map.protocol import TaskDerivatives, TaskMap
 from brachis.robot.task_map.tool import Pose, RowsAndYaw, WorldRows
 
 __all__ = [
-    "FREE_ROLL",
     "JOINTS",
     "JointSpace",
     "Pose",

@@ -1,9 +1,8 @@
-"""The task map that a task asks for: of the tool, with a tool that rolls freely, or of the joints themselves.
+"""The task map that a task asks for: of the tool, with a tool that may leave the path, or of the joints themselves.
 
-Free roll about the tool axis is a virtual joint after the tool frame, of zero inertia and without limits. A pose whose
-rotation about the tool frame's z axis is left open has five rows. With a revolute joint about this axis added to the
-chain it is a pose of six rows again, and the joint is one more that may be redundant: the closed forms for poses serve
-both.
+A way in which the tool may leave the path, such as a roll about its axis, is a virtual joint after the tool frame. A
+pose of which one row is left open is then a pose of six rows again, and the joint is one more that may be redundant:
+the closed forms for poses serve both.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from brachis.common import tolerances
 from brachis.errors import InputError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import UrdfLimit
-from brachis.robot.robot import ROLL_JOINT, Robot
+from brachis.robot.robot import Robot
 from brachis.robot.task_map.protocol import (
     AXES,
     POSE_ROWS,
@@ -30,6 +29,8 @@ from brachis.robot.task_map.protocol import (
     position_rows,
 )
 from brachis.robot.task_map.tool import Pose, RowsAndYaw, WorldRows
+from brachis.robot.tool_joints import FREE_ROLL, ToolJoint, tool_joints_of
+from brachis.task import Tolerances
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,7 +74,6 @@ class JointSpace(TaskMap):
         return TaskDerivatives(zeros, zeros, zeros)
 
 
-FREE_ROLL = "pose_free_roll"
 JOINTS = "joints"
 
 
@@ -93,7 +93,7 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     """
     if rows == JOINTS:
         return JointSpace(robot)
-    if rows == FREE_ROLL and not robot.rolls_freely:
+    if rows == FREE_ROLL and not robot.tool_joints:
         raise InputError(
             "the robot's tool does not roll freely",
             where="task_space",
@@ -143,71 +143,82 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     return RowsAndYaw(robot, names, int(np.argmax(lies_in_plane)))
 
 
-def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskMap]:
+def bind(
+    robot: Robot,
+    space: str | Sequence[str],
+    tolerances: Tolerances | None = None,
+) -> tuple[Robot, TaskMap]:
     """Return the robot as a task space needs it, and the task map bound to it.
 
     Parameters
     ----------
     robot : Robot
     space : str or sequence of str
-        Rows, or one of ``position``, ``pose``, ``pose_free_roll``. The last one adds the virtual joint `ROLL_JOINT`
-        unless the robot has it already.
+        Rows, or one of ``position``, ``pose``, ``pose_free_roll``, ``joints``.
+    tolerances : Tolerances, optional
+        For each way in which the tool may leave the path a virtual joint is added, unless the robot has it already.
 
     Raises
     ------
     InputError
-        See `task_map_of`; or the robot has a joint of the virtual joint's name.
+        See `task_map_of`; or the robot has a joint of a virtual joint's name.
     """
-    if robot.rolls_freely and space != FREE_ROLL:
+    joints = tool_joints_of(space, tolerances)
+    if robot.tool_joints and robot.tool_joints != joints:
         raise InputError(
-            "the robot's tool rolls freely",
+            "the robot's tool may leave the path in other ways",
             where="task_space",
             found=space,
-            allowed=FREE_ROLL,
-            hint="Use the robot as it was before it was bound to pose_free_roll",
+            hint="Use the robot as it was before it was bound to a task",
         )
-    if space == FREE_ROLL and not robot.rolls_freely:
-        robot = with_free_roll(robot)
+    if joints and not robot.tool_joints:
+        robot = with_tool_joints(robot, joints)
     return robot, task_map_of(robot, space)
 
 
-def with_free_roll(robot: Robot) -> Robot:
-    """Append the virtual joint `ROLL_JOINT` about the tool frame's z axis.
+def with_tool_joints(robot: Robot, joints: Sequence[ToolJoint]) -> Robot:
+    """Append virtual joints after the tool frame.
 
     Raises
     ------
     InputError
-        The robot has a joint of this name.
+        The robot has a joint of such a name.
     """
-    if robot.model.existJointName(ROLL_JOINT):
-        raise InputError(
-            "a joint of the robot has the name of the virtual roll joint",
-            where="task_space",
-            found=ROLL_JOINT,
-            hint="Rename the joint in the URDF",
-        )
     model = robot.model.copy()
-    tool = model.frames[robot.frame_id]
-    turning = pin.JointModelRZ()
-    joint = model.addJoint(tool.parentJoint, turning, tool.placement, ROLL_JOINT)
-    name = f"{robot.tool_frame}/{ROLL_JOINT}"
-    origin = pin.SE3.Identity()
-    model.addFrame(
-        pin.Frame(name, joint, robot.frame_id, origin, pin.FrameType.OP_FRAME)
-    )
+    frame = model.frames[robot.frame_id]
+    last = frame.parentJoint
+    place = frame.placement
+    for joint in joints:
+        if model.existJointName(joint.name):
+            raise InputError(
+                "a joint of the robot has the name of a virtual joint of the tool",
+                where=joint.key,
+                found=joint.name,
+                hint="Rename the joint in the URDF",
+            )
+        kind = (
+            pin.JointModelRevoluteUnaligned
+            if joint.turns
+            else pin.JointModelPrismaticUnaligned
+        )
+        last = model.addJoint(last, kind(np.array(joint.axis)), place, joint.name)
+        place = pin.SE3.Identity()
+    name = f"{robot.tool_frame}/{joints[-1].name}"
+    model.addFrame(pin.Frame(name, last, robot.frame_id, place, pin.FrameType.OP_FRAME))
+    count = len(joints)
     friction = robot.friction
     return replace(
         robot,
-        rolls_freely=True,
+        tool_joints=tuple(joints),
         model=model,
-        joint_names=(*robot.joint_names, ROLL_JOINT),
+        joint_names=(*robot.joint_names, *(joint.name for joint in joints)),
         tool_frame=name,
-        limits=robot.limits.with_free_joint(),
-        urdf_limits=(*robot.urdf_limits, UrdfLimit(None, None, None, None)),
+        limits=robot.limits.with_tool_joints(joints),
+        urdf_limits=(*robot.urdf_limits, *(UrdfLimit(None, None, None, None),) * count),
         friction=Friction(
-            armature=np.append(friction.armature, 0.0),
-            viscous=np.append(friction.viscous, 0.0),
-            coulomb=np.append(friction.coulomb, 0.0),
-            v_eps=np.append(friction.v_eps, 1.0),
+            armature=np.append(friction.armature, np.zeros(count)),
+            viscous=np.append(friction.viscous, np.zeros(count)),
+            coulomb=np.append(friction.coulomb, np.zeros(count)),
+            v_eps=np.append(friction.v_eps, np.ones(count)),
         ),
     )

@@ -20,6 +20,7 @@ from brachis.verify.limits.joint import (
     worst_total_power,
 )
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
+from brachis.verify.limits.tolerance import TOLERANCE_CHECKS
 from brachis.verify.limits.tool import TOOL_CHECKS
 from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
@@ -36,6 +37,7 @@ TABLE: dict[str, LimitCheck] = {}
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_CHECKS[_kind]
     TABLE |= _AFTER.get(_kind, {})
+TABLE |= TOLERANCE_CHECKS
 TABLE["clearance"] = worst_clearance
 
 

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from brachis.robot import ROLL_JOINT, Robot
+from brachis.robot import Robot
 from brachis.task import SpeedTable
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.motion import Given, MotionStates
@@ -16,17 +16,14 @@ from brachis.verify.motion import Given, MotionStates
 def frame_motion(robot: Robot, states: MotionStates, vector: str) -> np.ndarray:
     """Sizes, (K, 1), of the tool frame's velocity (``linear``, m/s; ``angular``, rad/s), or ``acceleration``, m/s^2.
 
-    The virtual joint of a free roll does not turn the tool.
+    Virtual joints do not turn the tool.
     """
     model = robot.model
     data = model.createData()
     frame = (robot.frame_id, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-    is_virtual = [
-        robot.rolls_freely and name == ROLL_JOINT for name in robot.joint_names
-    ]
-    qdot = (
-        np.where(is_virtual, 0.0, states.qdot) if vector == "angular" else states.qdot
-    )
+    qdot = states.qdot.copy()
+    if vector == "angular":
+        qdot[:, len(robot.urdf_joints) :] = 0.0
     sizes = np.empty((len(states.t), 1))
     for k in range(len(sizes)):
         pin.forwardKinematics(model, data, states.q[k], qdot[k], states.qddot[k])

@@ -1,0 +1,179 @@
+"""Tolerances that are more than ranges of the tool's virtual joints: a cone, a sphere, a box in the world's axes.
+
+With the angles a (side) and b (lead) the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes
+of the path's orientation is R d in the world's, with the rotation R of the chain's end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.common.arrays import cross
+from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials, Role
+from brachis.robot import Robot
+from brachis.robot.task_map import Pose
+from brachis.task import Task
+
+
+class _Tolerance(Limit):
+    """Ratio of how far the tool is from the path to the largest that is allowed.
+
+    Parameters
+    ----------
+    robot : Robot
+    ways : str
+        Ways of the virtual joints on which it depends, for example ``"xyz"``.
+    """
+
+    role = Role.PROCESS
+    at_rest = "posture"
+
+    def __init__(self, robot: Robot, ways: tuple[str, ...]) -> None:
+        names = [joint.way for joint in robot.tool_joints]
+        first = len(robot.urdf_joints)
+        self._robot = robot
+        self._columns = [first + names.index(way) for way in ways if way in names]
+
+
+class _Size(_Tolerance):
+    """A size, zero or more, over the largest one."""
+
+    def _describe(self, label: Label, figure: float) -> None:
+        self.labels = (label,)
+        self.lower = np.full(1, -np.inf)
+        self.upper = np.ones(1)
+        self.bounds = (Bound(0, figure, figure, 1.0 / figure),)
+
+
+class TiltLimit(_Size):
+    """Angle between the tool's z axis and that of the path over the largest one.
+
+    Parameters
+    ----------
+    robot : Robot
+    figure : float
+        Degrees.
+    """
+
+    kind = "tool_tilt"
+
+    def __init__(self, robot: Robot, figure: float) -> None:
+        super().__init__(robot, ("side", "lead"))
+        key = "tolerances.orientation.tilt"
+        self._describe(Label("tool", "tilt", "deg", key), figure)
+        self._largest = np.radians(figure)
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        angles = motion.q[:, self._columns]
+        cosine = np.cos(angles).prod(axis=1, keepdims=True)
+        return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)) / self._largest)
+
+    def partials(self, motion: JointStates) -> Partials:
+        angles = motion.q[:, self._columns]
+        tilt = self.values(motion) * self._largest
+        falls = np.tan(angles) * np.cos(angles).prod(axis=1, keepdims=True)
+        by_q = np.zeros((len(angles), 1, self._robot.n))
+        by_q[:, 0, self._columns] = np.divide(
+            falls,
+            self._largest * np.sin(tilt),
+            out=np.zeros_like(angles),
+            where=tilt > 0.0,
+        )
+        return Partials(q=by_q)
+
+
+class DistanceLimit(_Size):
+    """Distance of the tool from the path over the largest one.
+
+    Parameters
+    ----------
+    robot : Robot
+    figure : float
+        m.
+    """
+
+    kind = "tool_distance"
+
+    def __init__(self, robot: Robot, figure: float) -> None:
+        super().__init__(robot, ("x", "y", "z"))
+        key = "tolerances.position.sphere"
+        self._describe(Label("tool", "distance from the path", "m", key), figure)
+        self._largest = figure
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        away = motion.q[:, self._columns]
+        return np.linalg.norm(away, axis=1, keepdims=True) / self._largest
+
+    def partials(self, motion: JointStates) -> Partials:
+        away = motion.q[:, self._columns]
+        size = np.linalg.norm(away, axis=1, keepdims=True)
+        by_q = np.zeros((len(away), 1, self._robot.n))
+        by_q[:, 0, self._columns] = np.divide(
+            away, self._largest * size, out=np.zeros_like(away), where=size > 0.0
+        )
+        return Partials(q=by_q)
+
+
+class RangeLimit(_Tolerance):
+    """Displacement of the tool from the path along the world's axes within ranges.
+
+    Parameters
+    ----------
+    robot : Robot
+    ranges : (3, 2) ndarray
+        Along x, y and z, m.
+    """
+
+    kind = "tool_range"
+
+    def __init__(self, robot: Robot, ranges: np.ndarray) -> None:
+        super().__init__(robot, ("x", "y", "z"))
+        self._pose = Pose(robot)
+        self._scale = 2.0 / (ranges[:, 1] - ranges[:, 0])
+        self.lower, self.upper = (ranges * self._scale[:, None]).T
+        self.labels = tuple(
+            Label(f"tool {axis}", "displacement", "m", f"tolerances.position.{axis}")
+            for axis in "xyz"
+        )
+        self.bounds = tuple(
+            Bound(axis, float(ranges[axis, end]), float(width), float(per_m), side)
+            for axis, (width, per_m) in enumerate(
+                zip(2.0 / self._scale, self._scale, strict=True)
+            )
+            for end, side in enumerate(("lower", "upper"))
+        )
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        rotations = self._robot.tool_placements(motion.q)[1]
+        away = motion.q[:, self._columns]
+        return np.asarray(np.einsum("kij,kj->ki", rotations, away) * self._scale)
+
+    def partials(self, motion: JointStates) -> Partials:
+        rotations = self._robot.tool_placements(motion.q)[1]
+        away = motion.q[:, self._columns]
+        turning = self._pose.twists(motion.q)[3:]
+        by_q = cross(turning, away.T[:, :, None])
+        for axis, column in enumerate(self._columns):
+            by_q[axis, :, column] += 1.0
+        in_world = np.einsum("kij,jkn->kin", rotations, by_q)
+        return Partials(q=in_world * self._scale[:, None])
+
+
+def build_tool_tilt(robot: Robot, task: Task) -> TiltLimit | None:
+    """Build the limit of a task whose tool may tilt within a cone."""
+    figure = task.tolerances.orientation.tilt
+    return None if figure is None else TiltLimit(robot, figure)
+
+
+def build_tool_distance(robot: Robot, task: Task) -> DistanceLimit | None:
+    """Build the limit of a task whose tool may be within a sphere around the path."""
+    figure = task.tolerances.position.sphere
+    return None if figure is None else DistanceLimit(robot, figure)
+
+
+def build_tool_range(robot: Robot, task: Task) -> RangeLimit | None:
+    """Build the limit of a task whose tool may be within a box in the world's axes."""
+    given = task.tolerances.position
+    if given.axes == "tool" or given.x is None:
+        return None
+    return RangeLimit(robot, np.array([given.x, given.y, given.z]))

@@ -1,0 +1,103 @@
+"""Tolerances of the tool: ranges within which it may leave the orientation and the position that the path states."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    model_validator,
+)
+
+from brachis.task.fields import (
+    ByForm,
+    Model,
+    Number,
+    Positive,
+    refuse,
+)
+
+_Given = float | tuple[float, float] | Literal["free"] | None
+_FORMS = "a number > 0, or [low, high] with low < high"
+_FARTHEST = 10.0
+"""Largest tolerance of the position, m."""
+
+
+def _range_within(largest: float) -> AfterValidator:
+    """Return what reads a number as both sides of zero, and refuses ranges that are empty or end farther from zero."""
+
+    def read(given: _Given) -> _Given:
+        if given is None or given == "free":
+            return given
+        low, high = given if isinstance(given, tuple) else (-given, given)
+        if not -largest <= low < high <= largest:
+            raise refuse(
+                "this is not a range",
+                found=given,
+                allowed=f"{_FORMS}, all within {largest:g} of zero",
+            )
+        return low, high
+
+    return AfterValidator(read)
+
+
+_Ends = Annotated[Positive | tuple[Number, Number] | None, ByForm(_FORMS)]
+_EndsOrFree = Annotated[
+    Literal["free"] | Positive | tuple[Number, Number] | None,
+    ByForm(f"{_FORMS}, or free"),
+]
+_Lean = Annotated[_Ends, _range_within(80.0)]
+_Roll = Annotated[_EndsOrFree, _range_within(180.0)]
+_Distance = Annotated[_Ends, _range_within(_FARTHEST)]
+AXES = ("x", "y", "z")
+
+
+class OrientationTolerance(Model):
+    """How far the tool may turn away from the orientation of the path, about the axes of the tool frame."""
+
+    tilt: Annotated[Positive, Field(le=80.0)] | None = None
+    """Largest angle between the tool's z axis and that of the path, degrees: a cone. Null: as lead and side say."""
+    lead: _Lean = None
+    """Angle by which the z axis leans towards the x axis of the path's orientation, degrees: a number for both sides,
+    or [low, high]. Where the x axis points along the path, it is the lead of a torch, negative its lag."""
+    side: _Lean = None
+    """Angle by which the z axis leans towards the y axis of the path's orientation, degrees."""
+    roll: _Roll = None
+    """Angle by which the tool turns about its own z axis, degrees: a number, [low, high], or free."""
+
+
+class PositionTolerance(Model):
+    """How far the tool may be from the position that the path states."""
+
+    sphere: Annotated[Positive, Field(le=_FARTHEST)] | None = None
+    """Largest distance, m."""
+    x: _Distance = None
+    """Displacement along x, m: a number for both sides, or [low, high]."""
+    y: _Distance = None
+    """Displacement along y, m."""
+    z: _Distance = None
+    """Displacement along z, m."""
+    axes: Literal["tool", "world"] = "tool"
+    """Axes of x, y and z: those of the path's orientation, or those of the world."""
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Self:
+        given = [axis for axis in AXES if getattr(self, axis) is not None]
+        if self.axes == "world" and self.sphere is None and len(given) < len(AXES):
+            raise refuse(
+                "a box in the world's axes needs all three lengths",
+                key="axes",
+                found=f"world, with {', '.join(given) or 'none'}",
+                allowed="x, y and z with it, or axes: tool",
+            )
+        return self
+
+
+class Tolerances(Model):
+    """Ranges within which the tool may leave the path."""
+
+    orientation: OrientationTolerance = Field(default_factory=OrientationTolerance)
+    """Ranges of the orientation: {tilt: 15}, in degrees."""
+    position: PositionTolerance = Field(default_factory=PositionTolerance)
+    """Ranges of the position: {sphere: 0.002}, in m."""

@@ -1,0 +1,212 @@
+"""Tolerances of the tool: its virtual joints, the limits beside their ranges, and motions that use them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import brachis
+from brachis.errors import TaskError
+from brachis.limits import Moments, limits_of
+from brachis.robot import bind
+from brachis.task import Tolerances, load_task
+from support.spatial import START, rail_arm
+
+EVERYTHING = {
+    "orientation": {"tilt": 15, "roll": [-30, 40]},
+    "position": {
+        "sphere": 0.004,
+        "x": 0.002,
+        "y": [-0.001, 0.003],
+        "z": [-0.002, 0.001],
+        "axes": "world",
+    },
+}
+
+
+def task_with(tolerances, space="pose", **more):
+    return load_task(
+        {
+            "brachis": 1,
+            "robot": {"urdf": "unread.urdf"},
+            "start": {"joints": START},
+            "task_space": space,
+            "path": [{"line": {"by": [0.1, 0.2, 0.0]}}],
+            "tolerances": tolerances,
+            **more,
+        }
+    )
+
+
+def robot_with(tolerances):
+    return bind(rail_arm(), "pose", Tolerances(**tolerances))[0]
+
+
+def test_virtual_joints_have_the_ranges_of_the_task():
+    robot = robot_with(EVERYTHING)
+    assert robot.joint_names[-6:] == (
+        "tool_roll",
+        "tool_lead",
+        "tool_side",
+        "tool_x",
+        "tool_y",
+        "tool_z",
+    )
+    # A cone is as wide all around; a box in the world's axes fits into its own sphere, and into the one that is given.
+    reach = min(0.004, np.linalg.norm([0.002, 0.003, 0.002]))
+    expected = [np.radians(40), np.radians(15), np.radians(15), *[reach] * 3]
+    np.testing.assert_allclose(robot.limits.position_upper[-6:], expected)
+    np.testing.assert_allclose(robot.limits.position_lower[-6], np.radians(-30))
+
+
+def test_positions_of_virtual_joints_are_how_far_the_tool_is_from_the_path():
+    robot = robot_with(EVERYTHING)
+    count = len(START)
+    side, lead, roll = -0.1, 0.15, 0.3
+    shift = np.array([0.001, -0.002, 0.003])
+    q = np.array([*START, roll, lead, side, *shift])
+    path = robot.tool_placement(q)
+    tool = rail_arm().tool_placement(q[:count])
+    turn = pin.rpy.rpyToMatrix
+    expected = (
+        path
+        * pin.SE3(np.eye(3), shift)
+        * pin.SE3(turn(-side, 0.0, 0.0), np.zeros(3))
+        * pin.SE3(turn(0.0, lead, 0.0), np.zeros(3))
+        * pin.SE3(turn(0.0, 0.0, roll), np.zeros(3))
+    )
+    assert tool.isApprox(expected, 1e-12)
+    # The tool's axis leans towards x for a positive lead, and towards y for a positive side.
+    axis = (path.rotation.T @ tool.rotation)[:, 2]
+    np.testing.assert_allclose(axis[:2], [np.sin(lead), np.sin(side) * np.cos(lead)])
+
+
+@pytest.mark.parametrize("kind", ["tool_tilt", "tool_distance", "tool_range"])
+def test_slopes_are_those_of_differences(kind):
+    robot = robot_with(EVERYTHING)
+    every = limits_of(robot, task_with(EVERYTHING))
+    (limit,) = [each for each in every if each.kind == kind]
+    rng = np.random.default_rng(1)
+    q = np.concatenate([rng.normal(size=(9, 7)), 0.01 * rng.normal(size=(9, 6))], 1)
+    found = limit.partials(Moments.at_rest(q)).q
+    for joint in range(robot.n):
+        step = 1e-6 * np.eye(robot.n)[joint]
+        ends = [limit.values(Moments.at_rest(q + sign * step)) for sign in (1, -1)]
+        by_difference = (ends[0] - ends[1]) / 2e-6
+        np.testing.assert_allclose(found[:, :, joint], by_difference, atol=1e-5)
+
+
+def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow():
+    robot = robot_with({"orientation": {"lead": [5, 15]}, "position": {"x": 0.01}})
+    q = robot.posture(list(START), "start")
+    np.testing.assert_allclose(q[-2:], [np.radians(5), 0.0])
+    named = robot.posture(dict(zip(robot.joint_names, START, strict=False)), "start")
+    np.testing.assert_array_equal(named, q)
+
+
+@pytest.mark.parametrize(
+    ("tolerances", "space", "match"),
+    [
+        ({"orientation": {"tilt": 15}}, "position", "prescribe the orientation"),
+        ({"position": {"sphere": 0.1}}, ["x", "y"], "prescribe the whole position"),
+        ({"orientation": {"roll": 5}}, "pose_free_roll", "roll is free"),
+        ({"orientation": {"lead": [5, 2]}}, "pose", "not a range"),
+        ({"orientation": {"lead": 100}}, "pose", "within 80 of zero"),
+        ({"position": {"x": 0.1, "axes": "world"}}, "pose", "all three lengths"),
+        ({"tilt": 15}, "pose", "tolerances.orientation.tilt"),
+    ],
+)
+def test_tolerances_that_make_no_sense_are_refused(tolerances, space, match):
+    with pytest.raises(TaskError, match=match):
+        task_with(tolerances, space)
+
+
+def test_free_roll_is_a_tolerance():
+    word, _ = bind(rail_arm(), "pose_free_roll")
+    range_, _ = bind(rail_arm(), "pose", Tolerances(orientation={"roll": "free"}))
+    assert word.tool_joints == range_.tool_joints
+
+
+@pytest.fixture(scope="module")
+def leaning():
+    """The same task, without and with a lead."""
+    task = {
+        "robot": {"locked_joints": {"rail": 0.0}},
+        "start": {"joints": [0.5, 0.4, 1.3, 0.0, np.pi / 2 - 0.13, 0.3]},
+        "task_space": "pose",
+        "path": [{"line": {"by": [0.1, -0.3, 0.05]}}],
+        "spline": {"intervals": "auto", "rest": "velocity"},
+        "search": {"least_motion": False},
+    }
+    urdf = brachis.robots.tx90l_rail.source
+    given = {"orientation": {"lead": [-5, 10]}}
+    return [
+        brachis.plan(urdf, {"brachis": 1, **task, **more})
+        for more in ({}, {"tolerances": given})
+    ]
+
+
+def test_a_tool_that_may_lean_is_faster_and_stays_within_its_range(leaning):
+    """Angles by Pinocchio, from the joints of the arm and the path alone."""
+    plain, result = leaning
+    assert plain.verified
+    assert result.verified
+    assert result.t_end < 0.99 * plain.t_end
+    trajectory = result.trajectory
+    t = np.linspace(0.0, result.t_end, 400)
+    arm = plain.trajectory.robot
+    q = trajectory.position(t)
+    _, rotations = arm.tool_placements(q[:, : arm.n])
+    s = trajectory.path_coordinate(t)
+    wanted = arm.tool_placements(np.array([plain.trajectory.position(0.0)]))[1][0]
+    assert np.ptp(s) == pytest.approx(1.0)
+    axis = rotations[:, :, 2] @ wanted  # the orientation stays the same along the path
+    lead = np.degrees(np.arcsin(axis[:, 0]))
+    assert lead.min() >= -5.001
+    assert lead.max() <= 10.001
+    assert np.abs(axis[:, 1]).max() < 1e-6
+    np.testing.assert_allclose(np.radians(lead), q[:, -1], atol=1e-6)
+
+
+def test_the_verification_sees_a_tool_that_leaves_its_range(leaning):
+    trajectory = leaning[1].trajectory
+    narrow = Tolerances(orientation={"lead": [-2, 6]})
+    task = trajectory.task.model_copy(update={"tolerances": narrow})
+    arm = leaning[0].trajectory.robot
+    changed = replace(trajectory, task=task, robot=bind(arm, "pose", narrow)[0])
+    found = brachis.verify_trajectory(changed)
+    (check,) = [each for each in found.checks if each.name == "tool range ratio"]
+    assert not check.passed
+    assert check.subject == "tool lead"
+    lead = trajectory.q[:, -1]
+    assert check.value == pytest.approx(
+        np.abs(np.degrees(lead) - 2.0).max() / 4.0, 1e-3
+    )
+
+
+def test_labels_name_the_keys_of_the_task():
+    every = limits_of(robot_with(EVERYTHING), task_with(EVERYTHING))
+    keys = {
+        label.key
+        for limit in every
+        for label in limit.labels
+        if label.subject.startswith("tool")
+    }
+    parts = ("orientation.tilt", "orientation.roll", "position.sphere")
+    assert keys >= {f"tolerances.{part}" for part in parts}
+    (tilt,) = [limit for limit in every if limit.kind == "tool_tilt"]
+    (bound,) = tilt.bounds
+    assert tilt.relax(bound, 15.0).upper == pytest.approx(2.0)
+
+
+def test_saved_motions_come_back(leaning, tmp_path):
+    _, result = leaning
+    result.save(tmp_path / "motion.npz")
+    again = brachis.Trajectory.load(tmp_path / "motion.npz")
+    assert again.joint_names[-1] == "tool_lead"
+    assert brachis.verify_trajectory(again).passed
+    brachis.export.write(again, tmp_path / "motion.csv", dt=0.01)
+    assert "tool_lead" not in (tmp_path / "motion.csv").read_text()
