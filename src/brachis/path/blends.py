@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations
 from math import floor
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder
 
 from brachis.common import tolerances
 from brachis.common.arrays import with_like_signs
 from brachis.path.context import stands_still
+from brachis.path.curves import SplineCurve
 from brachis.path.joins import Join
 from brachis.path.pose import (
     LEAST_QUALITY,
@@ -26,41 +24,7 @@ from brachis.path.rotations import quaternion_derivatives, quaternions_of, rotat
 from brachis.robot.plausibility import position_hint
 
 
-@dataclass(frozen=True, eq=False)
-class SepticCurve:
-    """A polynomial of degree 7 over sigma in [0, length].
-
-    Attributes
-    ----------
-    coefficients : ndarray, shape (8, m)
-        Coefficients of the powers of sigma / length.
-    length : float
-        Range of sigma.
-    """
-
-    coefficients: Array
-    length: float
-
-    @property
-    def knots(self) -> Array:
-        """Start and end: the polynomial is analytic."""
-        return np.array([0.0, self.length])
-
-    @cached_property
-    def _by_order(self) -> Array:
-        """Coefficients of all derivatives by sigma, shape (8, 8, m)."""
-        found = np.zeros((8, *self.coefficients.shape))
-        for k in range(8):
-            found[k, : 8 - k] = polyder(self.coefficients, k) / self.length**k
-        return found
-
-    def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the polynomial and its derivatives by sigma, shape (order + 1, K, m)."""
-        powers = np.vander(sigma / self.length, 8, increasing=True)
-        return np.asarray(powers @ self._by_order[: order + 1])
-
-
-def septic(start: Array, end: Array, length: float) -> SepticCurve:
+def septic(start: Array, end: Array, length: float) -> SplineCurve:
     """Return the septic polynomial with given values and three derivatives at both ends.
 
     Parameters
@@ -70,11 +34,13 @@ def septic(start: Array, end: Array, length: float) -> SepticCurve:
     length : float
         Range of sigma.
     """
-    scale = length ** np.arange(4)[:, None]
-    low = start * scale / np.array([1.0, 1.0, 2.0, 6.0])[:, None]
-    at_end = np.stack([polyder(np.eye(8), k).sum(axis=0) for k in range(4)])
-    high = np.linalg.solve(at_end[:, 4:], end * scale - at_end[:, :4] @ low)
-    return SepticCurve(np.concatenate([low, high]), length)
+    from scipy.interpolate import BPoly, BSpline
+
+    ends = np.array([0.0, length])
+    polynomial = BPoly.from_derivatives(ends, [start, end])
+    # As a spline without inner knots it has the same control points, and is evaluated faster.
+    spline = BSpline(np.repeat(ends, 8), polynomial.c[:, 0], 7)
+    return SplineCurve(spline, length, ends)
 
 
 def blend_rows(first: Curve, second: Curve, size: float, join: Join) -> Curve:
@@ -169,7 +135,7 @@ def _ends(first: Curve, second: Curve, size: float) -> tuple[Array, Array, Array
     return start, corner, second.derivatives(np.array([size]))[:, 0]
 
 
-def _blend(start: Array, corner: Array, end: Array, join: Join) -> SepticCurve:
+def _blend(start: Array, corner: Array, end: Array, join: Join) -> SplineCurve:
     """Return the septic polynomial between derivatives (4, m), after a check that its position keeps going.
 
     Its length is the mean of the chord and of the polygon over the corner, which keeps its speed near 1.

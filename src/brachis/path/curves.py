@@ -1,8 +1,9 @@
-"""Straight lines, arcs and helices: their curves, and the functions that make them of a task's segments."""
+"""Curves: lines, arcs, helices and splines; and the functions that make all but the splines of a task's segments."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,33 @@ from brachis.task.segments import (
     LineHeading,
     LineTo,
 )
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+
+@dataclass(frozen=True, eq=False)
+class SplineCurve:
+    """A spline over sigma in [0, length].
+
+    Attributes
+    ----------
+    spline : BSpline
+        The spline with values of shape (m,).
+    length : float
+        Range of sigma; of waypoints the cumulative chord length of the position rows, m (of yaw, rad, where they stand
+        still).
+    knots : ndarray
+        Values of sigma between which the spline is a polynomial; of waypoints their chord lengths.
+    """
+
+    spline: BSpline
+    length: float
+    knots: Array
+
+    def derivatives(self, sigma: Array, order: int = 3) -> Array:
+        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        return np.stack([self.spline(sigma, nu=k) for k in range(order + 1)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,23 +208,14 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
     to_center = np.linalg.solve(gram, np.diag(gram) / 2) @ sides
     outward = -to_center
     radius = float(np.linalg.norm(outward))
-    # Of the two directions along the circle, forward is the one in which via comes before the end.
-    forward = to_via - (to_via @ outward) / radius**2 * outward
-    if np.linalg.norm(forward) < collinear * radius:  # via is opposite to the start
-        forward = -(to_end - (to_end @ outward) / radius**2 * outward)
+    # An inversion about the start makes a line of the circle, and this the direction in which via comes before the end.
+    forward = to_via / gram[0, 0] - to_end / gram[1, 1]
+    forward -= (forward @ outward) / radius**2 * outward
     forward *= radius / np.linalg.norm(forward)
-    via_angle, angle = (
-        _angle_of(point - to_center, outward, forward) for point in (to_via, to_end)
-    )
-    if via_angle > angle:
-        forward = -forward
-        angle = 2 * np.pi - angle
+    end = to_end - to_center
+    angle = float(np.arctan2(end @ forward, end @ outward) % (2 * np.pi))
     arc = _arc(start + to_center, outward, forward, angle)
     return _with_yaw(arc, shape.yaw, context)
-
-
-def _angle_of(vector: Array, outward: Array, forward: Array) -> float:
-    return float(np.arctan2(vector @ forward, vector @ outward) % (2 * np.pi))
 
 
 def _about_center(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,7 @@ from brachis.common import tolerances
 from brachis.common.arrays import with_like_signs
 from brachis.errors import PathError
 from brachis.path.context import SegmentContext, place
-from brachis.path.curves import LineCurve
+from brachis.path.curves import LineCurve, SplineCurve
 from brachis.path.orientation import AMBIGUOUS, half_turn, turn_between
 from brachis.path.pose import (
     LEAST_QUALITY,
@@ -40,32 +39,6 @@ if TYPE_CHECKING:
 
 START_TOLERANCE = 1e-4
 """How far a segment may start from where its waypoints expect, m and rad."""
-
-
-@dataclass(frozen=True, eq=False)
-class SplineCurve:
-    """The natural quintic spline through waypoints, C4, over their cumulative chord length.
-
-    Of all curves through the waypoints it has the least integral of the squared third derivative; its third and fourth
-    derivatives vanish at both ends. That holds from three waypoints on, where it is a parabola.
-
-    Attributes
-    ----------
-    spline : BSpline
-        The spline with values of shape (m,).
-    length : float
-        Cumulative chord length of the position rows, m (of yaw, rad, where they stand still).
-    knots : ndarray
-        Chord lengths of the waypoints.
-    """
-
-    spline: BSpline
-    length: float
-    knots: Array
-
-    def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
-        return np.stack([self.spline(sigma, nu=k) for k in range(order + 1)])
 
 
 def spline_through(
@@ -285,6 +258,9 @@ def _chord_knots(
 
 def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
     """Return the natural quintic spline, or the line, through waypoints of shape (n, m) at knots of shape (n,).
+
+    The spline is C4. Of all curves through the waypoints it has the least integral of the squared third derivative; its
+    third and fourth derivatives vanish at both ends. That holds from three waypoints on, where it is a parabola.
 
     Raises
     ------
