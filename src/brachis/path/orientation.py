@@ -17,6 +17,7 @@ from brachis.path.pose import smallest
 from brachis.path.protocol import Array, Curve, Orientation
 from brachis.path.rotations import (
     hat,
+    matrices,
     product,
     rotation_from,
     rotation_of,
@@ -36,11 +37,9 @@ def _about_axis(
     start: Array, axis: Array, angle: Curve, sigma: Array, order: int
 ) -> Array:
     """Return the rotation ``start exp(angle(sigma) hat(axis))``, about an axis in the tool frame, and derivatives."""
-    sine, cosine = sine_cosine(angle.derivatives(sigma, order)[..., 0, None, None])
-    aside = hat(axis)
-    result = sine * (start @ aside) - cosine * (start @ aside @ aside)
-    result[0] += start @ (np.eye(3) + aside @ aside)
-    return result
+    sine, cosine = sine_cosine(angle.derivatives(sigma, order) / 2.0)
+    quaternions = np.concatenate([cosine, sine * axis], axis=-1)
+    return start @ matrices(quaternions)
 
 
 @dataclass(frozen=True, eq=False)
