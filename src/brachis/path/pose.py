@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from brachis.common.arrays import spread
 from brachis.path.protocol import Array, Curve, MappedCurve, Orientation, PathSample
 from brachis.path.rotations import angular_velocity, matrices, product, unit
 from brachis.path.sequence import SequencePath
@@ -85,9 +86,7 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
         Values of sigma between which the function is smooth.
     """
     count = 64
-    fractions = np.arange(count) / count
-    inside = knots[:-1, None] + fractions * np.diff(knots)[:, None]
-    grid = np.append(inside.ravel(), knots[-1])
+    grid = spread(knots, count)
     near = int(np.argmin(function(grid)))
     before, after = np.clip([near - 1, near + 1], 0, len(grid) - 1)
     fine = np.linspace(grid[before], grid[after], 2 * count + 1)

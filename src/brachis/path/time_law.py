@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import spread
 from brachis.errors import PathError
 from brachis.path.legs import Leg
 from brachis.path.protocol import Array, Path
@@ -82,8 +83,7 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
 
     tool = _ToolAlongPath(task_map, path.between(leg.begin, leg.end), leg.speed)
     knots = tool.path.knots
-    parts = knots[:-1, None] + np.arange(32) / 32 * np.diff(knots)[:, None]
-    distances = tool.slopes(np.append(parts, leg.end))[0]
+    distances = tool.slopes(spread(knots, 32))[0]
     if np.ptp(distances) <= tolerances.ROUNDING * distances.max():
         duration = float(distances.mean()) * (leg.end - leg.begin) / leg.speed
         rate = (leg.end - leg.begin) / duration
