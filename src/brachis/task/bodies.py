@@ -9,10 +9,7 @@ from collections.abc import Sequence
 from os import PathLike, fspath
 from typing import Any, TypedDict, Unpack
 
-from pydantic import ValidationError
-
-from brachis.task.fields import plain
-from brachis.task.messages import task_error
+from brachis.task.messages import validate
 from brachis.task.scene import SceneBody
 
 
@@ -118,8 +115,5 @@ def Mesh(  # noqa: N802
 
 
 def _make(maker: str, **keys: Any) -> SceneBody:
-    given = {key: plain(value) for key, value in keys.items() if value is not None}
-    try:
-        return SceneBody.model_validate(given)
-    except ValidationError as error:
-        raise task_error(error, maker, SceneBody) from None
+    given = {key: value for key, value in keys.items() if value is not None}
+    return validate(SceneBody, given, maker)

@@ -10,11 +10,9 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
 from brachis.common.arguments import check_keywords
-from brachis.task.fields import plain, required_keys
-from brachis.task.messages import models_in, task_error
+from brachis.task.fields import required_keys
+from brachis.task.messages import models_in, validate
 from brachis.task.segments import (
     ArcSegment,
     CircleSegment,
@@ -57,12 +55,9 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
 
     def make(*args: Any, **keys: Any) -> _S:
         bound = signature.bind(*args, **keys).arguments
-        given = {key: plain(value) for key, value in bound.items() if value is not None}
+        given = {key: value for key, value in bound.items() if value is not None}
         beside = {key: given.pop(key) for key in model.model_fields if key in given}
-        try:
-            return model.model_validate({kind: given, **beside})
-        except ValidationError as error:
-            raise task_error(error, name, model) from None
+        return validate(model, {kind: given, **beside}, name)
 
     described = [
         f"{key} : {'required' if key in needed else 'optional'}\n    {field.description}"

@@ -8,12 +8,9 @@ from math import degrees
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from brachis.common.files import read_text
 from brachis.errors import TaskError, write_count
-from brachis.task.fields import plain
-from brachis.task.messages import task_error
+from brachis.task.messages import validate
 from brachis.task.models import Task
 from brachis.task.orientation import Attitude, OrientationMode, Rotate, TurnTo
 from brachis.task.point_data import (
@@ -100,13 +97,15 @@ def segments_along(
     return [
         BSplineSegment(
             **_end_of(segment, is_last=i == len(curves) - 1, blend=curve.blend),
-            bspline=BSplineCurve(
-                degree=curve.spline.k,
-                knots=tuple(curve.spline.t.tolist()),
-                control_points=_rows(curve.spline.c),
-                relative=settings.relative or i > 0,
-                speeds=curve.speeds,
-                fit=fit if i == 0 else None,
+            bspline=BSplineCurve.model_validate(
+                {
+                    "degree": curve.spline.k,
+                    "knots": curve.spline.t.tolist(),
+                    "control_points": curve.spline.c.tolist(),
+                    "relative": settings.relative or i > 0,
+                    "speeds": curve.speeds,
+                    "fit": fit if i == 0 else None,
+                }
             ),
         )
         for i, curve in enumerate(curves)
@@ -123,10 +122,6 @@ def _end_of(
     return {"orientation": segment.orientation, **keys}
 
 
-def _rows(values: Any) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, values.tolist()))
-
-
 def _spline_through(
     points: Points, report: FitReport, settings: PointFile, *, number: int
 ) -> SplineThrough:
@@ -135,10 +130,10 @@ def _spline_through(
     Behind a corner the waypoints begin with it, so that the first one after it is passed, however near it is.
     """
     first = 0 if number else 1
-    places = _rows(points.columns)
+    places = points.columns.tolist()
     turns = None
     if points.turning.shape[1] == QUATERNION:
-        places = _rows(points.position)
+        places = points.position.tolist()
         turns = [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()]
     fit = report.model_copy(update={"source": settings.file})
     return SplineThrough(
@@ -275,7 +270,7 @@ def _along_joints(
     _check_count(len(table.values), path)
     nothing = table.values[:, :0]
     refuse_repetitions(Points(table.values, nothing, None, table.lines, str(path)))
-    start, *through = _rows(table.values)
+    start, *through = table.values.tolist()
     spline = SplineThrough(
         through=tuple(through),
         relative=settings.relative,
@@ -356,11 +351,8 @@ def fit_path(
         "tolerance": tolerance,
         "corner": corner,
     }
-    try:
-        file = PointFile.model_validate(plain(settings))
-        segment = CsvSegment(csv=file, orientation=orientation)
-    except ValidationError as error:
-        model = PointFile if error.title == "PointFile" else CsvSegment
-        raise task_error(error, "fit_path", model) from None
+    file = validate(PointFile, settings, "fit_path")
+    content = {"csv": file, "orientation": orientation}
+    segment = validate(CsvSegment, content, "fit_path")
     given = points_from(points, orientations, speed, segment.csv.units, "points")
     return tuple(segments_along(given, segment, "points"))

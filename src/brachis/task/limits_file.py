@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from brachis.common.files import check_kind, read_text
 from brachis.errors import TaskError, UnknownNameError
@@ -19,10 +19,9 @@ from brachis.task.fields import (
     NonEmpty,
     Number,
     Positive,
-    plain,
 )
 from brachis.task.limit_models import LimitSpec
-from brachis.task.messages import show, task_error
+from brachis.task.messages import show, validate
 from brachis.task.yaml_reader import read_yaml
 
 
@@ -216,15 +215,12 @@ def _by_joint(
             allowed=", ".join(LimitsFile.model_fields),
             where=str(path),
         )
-    model = RosLimitsFile if "joint_limits" in content else LimitsFile
-    try:
-        file = model.model_validate(plain(content))
-    except ValidationError as error:
-        raise task_error(error, str(path), model) from None
-    if isinstance(file, RosLimitsFile):
+    if "joint_limits" in content:
+        of_ros = validate(RosLimitsFile, content, str(path))
         if robot is not None and isinstance(robot.get("urdf"), str | os.PathLike):
-            _check_joints(set(file.joints), robot, folder, str(path))
-        return file.by_kind()
+            _check_joints(set(of_ros.joints), robot, folder, str(path))
+        return of_ros.by_kind()
+    file = validate(LimitsFile, content, str(path))
     if file.limits.scale != LimitSpec().scale:
         raise TaskError(
             "a limits file cannot contain factors on limits",

@@ -11,14 +11,12 @@ from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from brachis.common.files import TASK_SUFFIXES, Kind, check_kind, read_text
 from brachis.errors import TaskError
 from brachis.task.fields import plain
 from brachis.task.fitted import expand_csv_files
 from brachis.task.limits_file import with_limits_of_file
-from brachis.task.messages import show, task_error
+from brachis.task.messages import show, validate
 from brachis.task.models import Task
 from brachis.task.scene_file import with_absolute_files, with_scene_of_file
 from brachis.task.settings import RobotSettings
@@ -226,10 +224,7 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
     TaskError
         The mapping is wrong.
     """
-    try:
-        return RobotSettings.model_validate(plain(content))
-    except ValidationError as error:
-        raise task_error(error, "robot", RobotSettings) from None
+    return validate(RobotSettings, content, "robot")
 
 
 def task_from(
@@ -266,23 +261,14 @@ def task_from(
     try:
         content = with_limits_of_file(content, source, folder)
         content = with_scene_of_file(content, source, folder)
-        task = Task.model_validate(plain(content))
-    except ValidationError as error:
-        raise task_error(error, source, Task) from None
+        task = validate(Task, content, source)
     except RecursionError:
         raise TaskError(
             "the task contains itself (a YAML alias inside its own anchor)",
             where=source,
         ) from None
     task = _with_start(expand_csv_files(task, source, folder), source)
-    task = with_absolute_files(task, folder)
-    if task.robot.urdf is None:
-        return task
-    # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
-    urdf = os.path.abspath(folder / task.robot.urdf)  # noqa: PTH100
-    return task.model_copy(
-        update={"robot": task.robot.model_copy(update={"urdf": urdf})}
-    )
+    return with_absolute_files(task, folder)
 
 
 def _with_start(task: Task, source: str) -> Task:
@@ -301,7 +287,4 @@ def _with_start(task: Task, source: str) -> Task:
         names = getattr(task.path[0].shape, "joints", None)
         posture = dict(zip(names, place, strict=True)) if names else place
         changes = {"start": {"joints": posture}}
-    try:
-        return Task.model_validate(task.model_copy(update=changes))
-    except ValidationError as error:
-        raise task_error(error, source, Task) from None
+    return validate(Task, task.model_copy(update=changes), source)

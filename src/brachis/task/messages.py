@@ -4,13 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
-from typing import Final, get_args, get_type_hints
+from typing import Final, TypeVar, get_args, get_type_hints
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from brachis.errors import TaskError, nearest
-from brachis.task.fields import REFUSED, WRONG_FORM, WRONG_KEYS, Model
+from brachis.task.fields import REFUSED, WRONG_FORM, WRONG_KEYS, Model, plain
+
+_M = TypeVar("_M", bound=Model)
+
+
+def validate(model: type[_M], content: object, source: str) -> _M:
+    """Return the model with a content, in which arrays may stand for lists.
+
+    Parameters
+    ----------
+    model : type
+    content : object
+        As a task file has it, or a model.
+    source : str
+        File name, or what else the content came from, for messages.
+
+    Raises
+    ------
+    TaskError
+        The content does not fit the model.
+    """
+    try:
+        return model.model_validate(plain(content))
+    except ValidationError as error:
+        raise task_error(error, source, model) from None
 
 
 def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskError:

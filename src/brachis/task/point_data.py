@@ -181,33 +181,31 @@ class FitReport(Model):
 
     def __str__(self) -> str:
         """Say it in one line, lengths in mm."""
-        off, rms, allowed = (
-            1e3 * x
-            for x in (self.position_error, self.position_rms, self.position_tolerance)
-        )
-        turned, turned_allowed = map(
-            degrees, (self.orientation_error, self.orientation_tolerance)
-        )
-        text = (
-            f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, "
-            f"{write_count(self.intervals, 'knot interval')}; "
-        )
-        text += f"at most {off:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm"
-        text += (
-            f"; orientation at most {turned:.2g} deg off (allowed {turned_allowed:.3g} deg)"
-            if turned
-            else ""
-        )
         corners = [
             f"row {corner.row} ({degrees(corner.angle):.3g} deg)"
             for corner in self.corners[:_LISTED]
         ]
-        corners += ["..."] if len(self.corners) > _LISTED else []
+        if len(self.corners) > _LISTED:
+            corners.append("...")
         count = write_count(len(self.corners), "corner")
         is_blended = any(corner.blend for corner in self.corners)
         what = "blended" if is_blended else "at which the tool stops"
-        text += f"; {count} {what}: {', '.join(corners)}" if corners else "; no corners"
-        return f"{text}; {'; '.join(self.told)}" if self.told else text
+        allowed = 1e3 * self.position_tolerance
+        rms = 1e3 * self.position_rms
+        intervals = write_count(self.intervals, "knot interval")
+        parts = [
+            f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, {intervals}",
+            f"at most {1e3 * self.position_error:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm",
+        ]
+        if self.orientation_error:
+            parts.append(
+                f"orientation at most {degrees(self.orientation_error):.2g} deg off "
+                f"(allowed {degrees(self.orientation_tolerance):.3g} deg)"
+            )
+        parts.append(
+            f"{count} {what}: {', '.join(corners)}" if corners else "no corners"
+        )
+        return "; ".join([*parts, *self.told])
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON, without the profile."""

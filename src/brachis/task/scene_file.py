@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ValidationError
+from pydantic import BeforeValidator
 
 from brachis.common.files import read_text
 from brachis.errors import TaskError
 from brachis.task.fields import Model
-from brachis.task.messages import show, task_error
+from brachis.task.messages import show, validate
 from brachis.task.models import Task
 from brachis.task.scene import SceneBody, bodies_by_name
 from brachis.task.yaml_reader import read_yaml
@@ -55,16 +55,16 @@ def with_scene_of_file(
     path = folder / name
     where = f"{source}: scene.file"
     text = read_text(path, where=where, folder=folder, found=name)
-    try:
-        file = SceneFile.model_validate(read_yaml(text, str(path)))
-    except ValidationError as error:
-        raise task_error(error, str(path), SceneFile) from None
+    file = validate(SceneFile, read_yaml(text, str(path)), str(path))
     return {**content, "scene": _with_paths(file.bodies, path.absolute().parent)}
 
 
 def with_absolute_files(task: Task, folder: Path) -> Task:
-    """Return the task with the paths of meshes and of an SRDF, relative to `folder`, made absolute."""
+    """Return the task with the paths of a URDF, an SRDF and meshes, relative to `folder`, made absolute."""
     changes: dict[str, object] = {}
+    if task.robot.urdf is not None:
+        urdf = {"urdf": _absolute(task.robot.urdf, folder)}
+        changes["robot"] = task.robot.model_copy(update=urdf)
     if task.scene:
         changes["scene"] = _with_paths(task.scene, folder)
     if task.collisions.srdf is not None:
@@ -83,4 +83,5 @@ def _with_paths(bodies: tuple[SceneBody, ...], folder: Path) -> tuple[SceneBody,
 
 
 def _absolute(name: str, folder: Path) -> str:
-    return os.path.abspath(folder / name)  # noqa: PTH100  (linked folders keep their names)
+    # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
+    return os.path.abspath(folder / name)  # noqa: PTH100
