@@ -14,13 +14,13 @@ from brachis.path.rotations import (
     matrices,
     product,
     quaternion_derivatives,
-    quaternions_of,
     rotation_from,
     rotation_of,
     sine_cosine,
     unit,
 )
 from brachis.task import Attitude
+from brachis.task.points.units import quaternions_of
 
 ORDER = 4
 SIGMA = np.linspace(-1, 1, 7)

@@ -20,8 +20,9 @@ from brachis.path.pose import (
     rotations,
 )
 from brachis.path.protocol import Array, Curve
-from brachis.path.rotations import quaternion_derivatives, quaternions_of, rotation_of
+from brachis.path.rotations import quaternion_derivatives, rotation_of
 from brachis.robot.plausibility import position_hint
+from brachis.task.points.units import quaternions_of
 
 
 def septic(start: Array, end: Array, length: float) -> SplineCurve:

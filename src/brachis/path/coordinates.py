@@ -27,7 +27,7 @@ from brachis.path.joins import pose_corner, row_corner
 from brachis.path.orientation import orientation_along, turn_of
 from brachis.path.pose import POSITIONS, PosePath, pose_curve, rotations
 from brachis.path.protocol import Array, Curve, MappedCurve
-from brachis.path.rotations import matrices, quaternions_of, rotation_of
+from brachis.path.rotations import matrices, rotation_of
 from brachis.path.sequence import SequencePath
 from brachis.path.splines import (
     bspline_curve,
@@ -37,6 +37,7 @@ from brachis.path.splines import (
 )
 from brachis.robot.task_map.protocol import AXES, POSE_COORDINATES, ROWS, YAW, joints_of
 from brachis.task.point_data import PointFile
+from brachis.task.points.units import quaternions_of
 from brachis.task.segments import (
     ArcCenter,
     ArcVia,

@@ -15,7 +15,7 @@ import numpy as np
 
 from brachis.path.protocol import Array
 from brachis.task import Attitude
-from brachis.task.points.units import rotation_by
+from brachis.task.points.units import quaternions_of, rotation_by
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -120,11 +120,6 @@ def rotation_of(matrix: Array) -> Rotation:
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(matrix)
-
-
-def quaternions_of(rotation: Rotation) -> Array:
-    """Return the unit quaternions, (..., 4), one of both, of rotations."""
-    return np.roll(rotation.as_quat(), 1, axis=-1)
 
 
 def rotation_from(attitude: Attitude) -> Rotation:

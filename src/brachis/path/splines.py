@@ -23,7 +23,6 @@ from brachis.path.pose import (
 from brachis.path.protocol import Array, MappedCurve
 from brachis.path.rotations import (
     quaternion_product,
-    quaternions_of,
     rotation_from,
     rotation_of,
 )
@@ -31,6 +30,7 @@ from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import joints_of
 from brachis.task.orientation import Attitude
 from brachis.task.points.points import steps_of
+from brachis.task.points.units import quaternions_of
 from brachis.task.segments import BSplineCurve, SplineThrough
 
 if TYPE_CHECKING:

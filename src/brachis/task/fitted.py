@@ -23,7 +23,7 @@ from brachis.task.point_data import (
 from brachis.task.points.checks import refuse_repetitions
 from brachis.task.points.curves import check_interpolation, cut_at_corners, fit_curves
 from brachis.task.points.gcode import SUFFIXES, read_gcode
-from brachis.task.points.points import QUATERNION, Points, points_from
+from brachis.task.points.points import Points, points_from
 from brachis.task.points.tables import (
     allowed_columns,
     points_of,
@@ -61,8 +61,7 @@ def segments_along(
         Points are wrong, or no smooth curve lies within the tolerance; the message names the row.
     """
     settings = segment.csv
-    poses = points.turning.shape[1] == QUATERNION
-    if poses and segment.orientation is not None:
+    if points.has_quaternions and segment.orientation is not None:
         raise TaskError(
             "the points already have orientations",
             found="orientations",
@@ -132,7 +131,7 @@ def _spline_through(
     first = 0 if number else 1
     places = points.columns.tolist()
     turns = None
-    if points.turning.shape[1] == QUATERNION:
+    if points.has_quaternions:
         places = points.position.tolist()
         turns = [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()]
     fit = report.model_copy(update={"source": settings.file})

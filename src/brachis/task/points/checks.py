@@ -13,11 +13,11 @@ import numpy as np
 from brachis.errors import TaskError, write_count
 from brachis.task.point_data import FitTolerance
 from brachis.task.points.points import (
-    QUATERNION,
     Array,
     Points,
     angles_between,
     shares_along,
+    sum_up,
 )
 
 SAME = 1e-9
@@ -93,7 +93,7 @@ def scatter_of(points: Points) -> Scatter:
     of_turning = 0.0
     if turning.shape[1]:
         # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
-        dimension, whole = (3, 2.0) if turning.shape[1] == QUATERNION else (1, 1.0)
+        dimension, whole = (3, 2.0) if points.has_quaternions else (1, 1.0)
         residuals = _residuals(turning, chords)
         of_turning = whole * _deviation(residuals, _MEDIANS[dimension])
     return Scatter(deviation, of_turning, spacing, decimals_of(position))
@@ -126,7 +126,7 @@ def decimals_of(position: Array) -> int | None:
 def _residuals(values: Array, chords: Array) -> Array:
     """Return the differences of values, (n, c), from local cubics, (n - 4, c), scaled to the scatter of one value."""
     count = len(values)
-    u = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-12 * chords.max()))])
+    u = sum_up(np.maximum(chords, 1e-12 * chords.max()))
     inner = np.arange(2, count - 2)
     neighbours = (-2, -1, 1, 2)
     offsets = np.stack([u[inner + k] - u[inner] for k in neighbours])
@@ -156,7 +156,6 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
         raise points.wrong(
             i,
             f"the position stands still from {points.name_row(i - 1)} on while the tool turns",
-            found=points.describe(i),
             allowed="rows with different positions",
             hint="Use separate segments for a turn on the spot: csv, turn, csv",
         )
@@ -196,7 +195,6 @@ def refuse_repetitions(points: Points) -> None:
         raise points.wrong(
             i,
             f"the row repeats {points.name_row(i - 1)}",
-            found=points.describe(i),
             allowed=f"rows that differ from their predecessors in {'orientation' if still else 'position'}",
             hint="Set a tolerance to leave out repeated rows",
         )
@@ -263,7 +261,6 @@ def _refuse_factors(points: Points) -> None:
             raise points.wrong(
                 i + 1,
                 f"the coordinates are a thousand times {word} than in {points.name_row(i)}",
-                found=points.describe(i + 1),
                 allowed=f"near {points.describe(i)}",
                 hint="mm and m, or a lost decimal point? Write all rows in one unit",
             )

@@ -10,11 +10,11 @@ from math import cos, sin
 
 import numpy as np
 
-from brachis.common.arrays import with_like_signs
+from brachis.common.arrays import interpolate_columns, spread, with_like_signs
 from brachis.errors import write_count
 from brachis.task.points.checks import Scatter
 from brachis.task.points.fit import lengths_along
-from brachis.task.points.points import QUATERNION, Array, Indices, Points
+from brachis.task.points.points import Array, Indices, Points
 
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
@@ -171,14 +171,13 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
 
     It may miss it by `off`, m, or by a small part of the spacing.
     """
+    from scipy.interpolate import krogh_interpolate
+
     side = i + sign * np.arange(1, 5)
     side = side[(side >= 0) & (side < len(u))]
     if len(side) == 1:
         return True
-    foreseen = np.zeros(position.shape[1])
-    for k in side:
-        others = side[side != k]
-        foreseen += position[k] * np.prod((u[i] - u[others]) / (u[k] - u[others]))
+    foreseen = krogh_interpolate(u[side], position[side], u[i])
     allowed = max(off, 0.03 * abs(u[side[0]] - u[i]))
     return bool(np.linalg.norm(foreseen - position[i]) <= allowed)
 
@@ -192,22 +191,16 @@ def fill_gaps(points: Points) -> tuple[Points, tuple[str, ...]]:
     if len(points) < 20 or not np.any(long):
         return points, ()
     parts = np.minimum(np.ceil(chords / (2.0 * usual)), 200)
-    counts = np.where(long, parts, 1.0).astype(int)
-    before = np.repeat(np.arange(len(chords)), counts)
-    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    shares = ((np.arange(len(before)) - firsts[before] + 1) / counts[before])[:, None]
-
-    def fill(values: np.ndarray) -> np.ndarray:
-        between = values[before] + shares * (values[before + 1] - values[before])
-        return np.concatenate([values[:1], between])
-
-    turning = fill(points.turning)
-    if turning.shape[1] == QUATERNION:
+    index = np.arange(len(points))
+    at = spread(index, np.where(long, parts, 1).astype(int))
+    columns = interpolate_columns(at, index, points.columns)
+    position, turning = np.hsplit(columns, [points.position.shape[1]])
+    if points.has_quaternions:
         turning = with_like_signs(turning)
     ways = write_count(int(np.count_nonzero(long)), "way")
     note = f"taken as straight: {ways} longer than {times:g} times the usual spacing"
-    rows = points.only(np.append(0, before + 1))
-    return replace(rows, position=fill(points.position), turning=turning), (note,)
+    rows = points.only(np.ceil(at).astype(int))
+    return replace(rows, position=position, turning=turning), (note,)
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:

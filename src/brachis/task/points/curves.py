@@ -25,7 +25,7 @@ from brachis.task.points.corners import (
     find_corners,
 )
 from brachis.task.points.fit import Fit, deviations, fit_points
-from brachis.task.points.points import Array, Points
+from brachis.task.points.points import Array, Points, sum_up
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -127,7 +127,6 @@ def _refuse_to_turn_back(points: Points, corners: tuple[Corner, ...]) -> None:
             raise points.wrong(
                 corner.index,
                 f"the path turns back, by {degrees:.4g} degrees",
-                found=points.describe(corner.index),
                 allowed="corners up to 150 degrees",
                 hint="Set corner: stop if the tool stops there",
             )
@@ -251,16 +250,14 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
         return ()
     sigma = np.maximum.accumulate(sigma)
     ways = speed[1:]
-    given = np.isfinite(ways)
-    changes = np.diff(given.astype(int), prepend=0, append=0)
-    edges = np.flatnonzero(changes)
     runs = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        of_way = ways[first:last]
+    # The stubs do not say what it returns: slices, in order.
+    for run in np.ma.clump_unmasked(np.ma.masked_invalid(ways)):  # type: ignore[no-untyped-call]
+        of_way = ways[run]
         values = np.minimum(np.append(of_way[0], of_way), np.append(of_way, of_way[-1]))
-        kept = np.ones(len(values), dtype=bool)
-        kept[1:-1] = (values[1:-1] != values[:-2]) | (values[1:-1] != values[2:])
-        at = sigma[first : last + 1]
+        changes = np.diff(values) != 0.0
+        kept = np.append(True, changes) | np.append(changes, True)
+        at = sigma[run.start : run.stop + 1]
         runs.append(tuple(zip(at[kept].tolist(), values[kept].tolist(), strict=True)))
     return tuple(runs)
 
@@ -298,7 +295,7 @@ def fit_curves(
         _refuse_to_turn_back(points, corners)
     note = plausibility_note(points)
     curves = _fit_between(points, corners, tolerance, scatter, note)
-    starts = np.cumsum([0.0, *(curve.length for curve in curves)]).tolist()
+    starts = sum_up([curve.length for curve in curves]).tolist()
     found = []
     for i, corner in enumerate(corners):
         blend = 0.0
@@ -339,8 +336,7 @@ def _report_corner(
 def _profile(*columns: Array) -> tuple[Any, ...]:
     """Return the largest values of columns in successive groups of rows, at most a few hundred groups."""
     count = len(columns[0])
-    groups = np.linspace(0, count, min(count, 400), endpoint=False).astype(int)
-    starts = np.unique(groups)
+    starts = np.linspace(0, count, min(count, 400), endpoint=False).astype(int)
     largest = [np.maximum.reduceat(values, starts).tolist() for values in columns]
     return tuple(zip(*largest, strict=True))
 
@@ -348,7 +344,7 @@ def _profile(*columns: Array) -> tuple[Any, ...]:
 def cut_at_corners(points: Points, report: FitReport) -> tuple[list[Points], FitReport]:
     """Return the parts of points between corners, which are their first and last points; report the corners."""
     corners = find_corners(points, scatter_of(points), 0.0)
-    distances = np.append(0.0, np.cumsum(points.steps))
+    distances = sum_up(points.steps)
     cuts = [0, *(corner.index for corner in corners), len(points) - 1]
     parts = [points.only(slice(first, last + 1)) for first, last in pairwise(cuts)]
     found = [

@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.common.arrays import spread
 from brachis.task.point_data import FitTolerance
 from brachis.task.points.checks import Scatter
 from brachis.task.points.points import (
@@ -27,6 +27,7 @@ from brachis.task.points.points import (
     angles_between,
     shares_along,
     steps_of,
+    sum_up,
 )
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def _fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
     weights[[0, -1]] = 1e3
     origin = columns[0]
     length = float(breaks[-1])
-    knots = _clamp_knots(breaks / length)
+    knots = np.pad(breaks / length, DEGREE, mode="edge")
     inside = np.clip(sigma[order] / length, 0.0, 1.0)
     spline = make_lsq_spline(
         inside, columns[order] - origin, knots, k=DEGREE, w=weights[order]
@@ -116,24 +117,18 @@ def _fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
     return _measure(points, spline, breaks, sigma)
 
 
-def _clamp_knots(breaks: Array) -> Array:
-    """Return the knots of a spline of the degree of all fits, with the ends repeated."""
-    return np.pad(breaks, DEGREE, mode="edge")
-
-
 def _measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fit:
     """Return the fit with the places on the curve that are nearest to the points, by Newton steps from `sigma`."""
     dimension = points.position.shape[1]
-    position = _position_of(spline, dimension)
-    slope = position.derivative()
     sigma = sigma.copy()
     # Of a path that winds, a first rough curve is near points of other windings, too: these are not for the taking.
     far = 0.02 * (breaks[-1] - breaks[0])
     low = np.maximum(sigma - far, breaks[0])
     high = np.minimum(sigma + far, breaks[-1])
     for _ in range(2):
-        tangent = slope(sigma)
-        along = np.sum((points.position - position(sigma)) * tangent, axis=1)
+        tangent = spline(sigma, nu=1)[:, :dimension]
+        off = points.position - spline(sigma)[:, :dimension]
+        along = np.sum(off * tangent, axis=1)
         sigma += along / np.maximum(np.sum(tangent**2, axis=1), 1e-12)
         np.clip(sigma, low, high, out=sigma)
         sigma[[0, -1]] = breaks[[0, -1]]
@@ -143,19 +138,16 @@ def _measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fi
     return Fit(spline, breaks, sigma, distances, angles)
 
 
-def _position_of(spline: BSpline, dimension: int) -> BSpline:
-    return type(spline)(spline.t, spline.c[:, :dimension], spline.k)
-
-
 def _over_arc_length(fit: Fit, dimension: int) -> tuple[Array, Array]:
     """Return the points' places and the knots, measured by the arc length of the fitted position instead of sigma."""
-    parts = [np.linspace(a, b, 17) for a, b in pairwise(fit.breaks)]
-    fine = np.unique(parts)
+    fine = spread(fit.breaks, 16)
     middle = (fine[1:] + fine[:-1]) / 2.0
-    slope = _position_of(fit.spline, dimension).derivative()
-    speed, between = (np.linalg.norm(slope(at), axis=1) for at in (fine, middle))
+    speed, between = (
+        np.linalg.norm(fit.spline(at, nu=1)[:, :dimension], axis=1)
+        for at in (fine, middle)
+    )
     steps = np.diff(fine) * (speed[:-1] + 4.0 * between + speed[1:]) / 6.0
-    lengths = np.cumsum(np.append(0.0, steps))
+    lengths = sum_up(steps)
     return np.interp(fit.sigma, fine, lengths), np.interp(fit.breaks, fine, lengths)
 
 
@@ -168,7 +160,7 @@ def lengths_along(position: Array, deviation: float) -> Array:
     count = len(position)
     block = _block(position, deviation)
     if block == 1:
-        return np.cumsum(np.append(0.0, np.maximum(steps_of(position), 1e-9)))
+        return sum_up(np.maximum(steps_of(position), 1e-9))
     edges = np.arange(0, count + 1, block)
     edges[-1] = count
     moved = np.pad(position - position[0], ((1, 0), (0, 0)))
@@ -179,7 +171,7 @@ def lengths_along(position: Array, deviation: float) -> Array:
     corners = np.concatenate([position[:1], means, position[-1:]])
     chords = np.maximum(steps_of(corners), 1e-9)
     index = np.concatenate([[-0.5], centres, [count - 0.5]])
-    at_index = np.cumsum(np.append(0.0, chords))
+    at_index = sum_up(chords)
     lengths = np.interp(np.arange(count), index, at_index)
     return np.asarray(lengths - lengths[0])
 
@@ -309,15 +301,8 @@ def _use_fewest_knots(points: Points, fit: Fit, tolerance: FitTolerance) -> Fit:
         fit = trial
     while most - fewest > 1:
         count = (most + fewest) // 2
-        trial = _fit_over(
-            points,
-            sigma,
-            np.interp(
-                np.linspace(0.0, 1.0, count + 1),
-                np.linspace(0.0, 1.0, len(breaks)),
-                breaks,
-            ),
-        )
+        fewer = np.quantile(breaks, np.linspace(0.0, 1.0, count + 1))
+        trial = _fit_over(points, sigma, fewer)
         if trial.ratios(tolerance).max() <= 1.0:
             most = count
             fit = trial
@@ -347,13 +332,8 @@ def _polynomial(points: Points, sigma: Array) -> Fit:
 
     through = make_interp_spline(sigma, points.columns, k=len(points) - 1)
     at = np.linspace(0.0, sigma[-1], DEGREE + 1)
-    breaks = sigma[[0, -1]]
-    return _measure(
-        points,
-        make_interp_spline(at, through(at), k=DEGREE, t=_clamp_knots(breaks)),
-        breaks,
-        sigma,
-    )
+    spline = make_interp_spline(at, through(at), k=DEGREE)
+    return _measure(points, spline, sigma[[0, -1]], sigma)
 
 
 def _interpolate(points: Points, sigma: Array) -> Fit:
@@ -376,9 +356,7 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     """
     breaks = np.unique(spline.t)
     count = max(64, 20_000 // (len(breaks) - 1))
-    sides = np.arange(count) / count
-    inside = breaks[:-1, None] + np.diff(breaks)[:, None] * sides
-    sigma = np.append(inside.ravel(), breaks[-1])
+    sigma = spread(breaks, count)
     dimension = points.position.shape[1]
     place = spline(sigma)[:, :dimension]
     nearest = _nearest(points.position, place)
@@ -402,7 +380,7 @@ def _nearest(position: Array, place: Array) -> Array:
     """Return the polygon's nearest corner to each of n points, (n,), in their order."""
     from scipy.spatial import cKDTree
 
-    along = np.append(0.0, np.cumsum(steps_of(place)))
+    along = sum_up(steps_of(place))
     nearest = np.zeros(len(position), dtype=int)
     reached = 0.0
     for stretch, length in _stretches(position, along[-1]):
@@ -422,7 +400,7 @@ def _stretches(position: Array, total: float) -> Iterator[tuple[slice, float]]:
 
     The points' polygon is at least as long as the path between them, but for the tolerance.
     """
-    lengths = np.append(0.0, np.cumsum(steps_of(position)))
+    lengths = sum_up(steps_of(position))
     most = max(1, len(position) // 1_000)
     first = 0
     while first < len(position):

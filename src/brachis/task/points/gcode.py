@@ -8,8 +8,9 @@ rotary axes, subprograms, a change of the work offset) is refused. M2 and M30 en
 from __future__ import annotations
 
 import re
+from cmath import phase
 from dataclasses import dataclass, field
-from math import acos, atan2, ceil, hypot, pi, sqrt
+from math import acos, ceil, pi, sqrt
 from typing import Final
 
 import numpy as np
@@ -238,44 +239,43 @@ def _shares(count: int) -> Array:
 def _arc(
     machine: _Machine, start: Array, end: Array, values: dict[str, float]
 ) -> Array:
-    """Return places on an arc, (k, 3)."""
+    """Return places on an arc, (k, 3); in its plane, points are complex numbers."""
     *plane, normal = machine.plane
-    one = start[plane]
-    other = end[plane]
+    one = complex(*start[plane])
+    other = complex(*end[plane])
     clockwise = machine.motion == "2"
     if "R" in values:
         centre = _centre(machine, one, other, values["R"] * machine.unit)
     else:
         offsets = [values.get("IJK"[axis], 0.0) * machine.unit for axis in plane]
-        centre = one + offsets
-    radius = hypot(*(one - centre))
-    at_end = hypot(*(other - centre))
+        centre = one + complex(*offsets)
+    radius = abs(one - centre)
+    at_end = abs(other - centre)
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
         raise machine.wrong(
             "invalid arc: its start and end are at different radii",
             f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end",
             "one radius; I, J, K from the start",
         )
-    first, last = (atan2(*(point - centre)[::-1]) for point in (one, other))
-    swept = (last - first) % (2.0 * pi)
+    swept = (phase(other - centre) - phase(one - centre)) % (2.0 * pi)
     if clockwise:
         swept -= 2.0 * pi
     if abs(abs(swept) - 2.0 * pi) < 1e-9 or abs(swept) < 1e-9:
         swept = -2.0 * pi if clockwise else 2.0 * pi
     count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - 1e-6 / radius, 0.5)))))
     shares = _shares(count)
-    angle = first + swept * shares
-    radii = radius + (at_end - radius) * shares
+    growth = 1.0 + (at_end / radius - 1.0) * shares
+    points = centre + (one - centre) * growth * np.exp(1j * swept * shares)
     places = np.empty((count, 3))
-    places[:, plane] = centre + radii * np.hstack([np.cos(angle), np.sin(angle)])
+    places[:, plane] = np.hstack([points.real, points.imag])
     places[:, [normal]] = start[normal] + (end[normal] - start[normal]) * shares
     return places
 
 
-def _centre(machine: _Machine, one: Array, other: Array, radius: float) -> Array:
-    """Return the centre, (2,), of an arc of given radius; a negative one is that of more than half a turn."""
+def _centre(machine: _Machine, one: complex, other: complex, radius: float) -> complex:
+    """Return the centre of an arc of given radius; a negative one is that of more than half a turn."""
     chord = other - one
-    length = hypot(*chord)
+    length = abs(chord)
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
         raise machine.wrong(
             "invalid arc: no circle of this radius passes both ends",
@@ -283,6 +283,5 @@ def _centre(machine: _Machine, one: Array, other: Array, radius: float) -> Array
             "ends at most 2 R apart, and not the same",
         )
     away = sqrt(max(radius**2 - length**2 / 4.0, 0.0))
-    left = np.array([-chord[1], chord[0]]) / length
     side = -1.0 if (machine.motion == "2") != (radius < 0.0) else 1.0
-    return np.asarray((one + other) / 2.0 + side * away * left)
+    return (one + other) / 2.0 + side * away * 1j * chord / length

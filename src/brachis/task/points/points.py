@@ -11,7 +11,7 @@ import numpy.typing as npt
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
 from brachis.task.point_data import FileUnits
-from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS
+from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS, quaternions_of
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -51,6 +51,11 @@ class Points:
         return len(self.position)
 
     @property
+    def has_quaternions(self) -> bool:
+        """Whether the points are poses."""
+        return self.turning.shape[1] == QUATERNION
+
+    @property
     def columns(self) -> Array:
         """Position and turning side by side, (n, p + q)."""
         return np.hstack([self.position, self.turning])
@@ -80,12 +85,18 @@ class Points:
         return f"{self.name_row(i)}, [{place}] m"
 
     def wrong(
-        self, i: int, problem: str, *, found: str, allowed: str, hint: str | None = None
+        self,
+        i: int,
+        problem: str,
+        *,
+        allowed: str,
+        found: str | None = None,
+        hint: str | None = None,
     ) -> TaskError:
-        """Return the error that something is wrong with a point."""
+        """Return the error that something is wrong with a point; without `found`, with its row and position."""
         return TaskError(
             problem,
-            found=found,
+            found=found or self.describe(i),
             allowed=allowed,
             where=f"{self.source}: {self.name_row(i)}",
             hint=hint,
@@ -96,6 +107,11 @@ def steps_of(position: Array) -> Array:
     """Return the distances, (n - 1,), of successive positions, (n, p)."""
     steps: Array = np.linalg.norm(np.diff(position, axis=0), axis=1)
     return steps
+
+
+def sum_up(steps: npt.ArrayLike) -> Array:
+    """Return the sums, (n,), of the first 0, 1, 2, ... of n - 1 steps."""
+    return np.append(0.0, np.cumsum(steps))
 
 
 def shares_along(points: Array, begin: Array, side: Array) -> Array:
@@ -203,7 +219,7 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
 
     where = f"{source}: orientations"
     if isinstance(orientations, Rotation):
-        return with_like_signs(np.roll(orientations.as_quat(), 1, axis=-1))
+        return with_like_signs(quaternions_of(orientations))
     values = _array(orientations, where, source)
     if values.ndim == 1:
         return values[:, None] * ANGLES[units.angle or "rad"]
@@ -211,8 +227,7 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
         off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
         bad = (off > 1e-4) | (np.linalg.det(values) < 0.0)
         _refuse_first(bad, "not a rotation matrix", values, source)
-        quaternions = Rotation.from_matrix(values).as_quat()
-        return with_like_signs(np.roll(quaternions, 1, axis=1))
+        return with_like_signs(quaternions_of(Rotation.from_matrix(values)))
     problem = "the orientations have the wrong shape"
     if values.shape[1:] == (QUATERNION,):
         problem = "an array of quaternions does not say whether w is first or last"

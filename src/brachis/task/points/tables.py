@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -19,7 +19,13 @@ from brachis.errors import TaskError
 from brachis.task.fields import LARGEST
 from brachis.task.point_data import FileUnits
 from brachis.task.points.points import Array, Indices, Points
-from brachis.task.points.units import CONVENTIONS, UNITS, choices, rotation_by
+from brachis.task.points.units import (
+    CONVENTIONS,
+    UNITS,
+    choices,
+    quaternions_of,
+    rotation_by,
+)
 
 _DELIMITERS: Final = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces"}
 
@@ -86,47 +92,45 @@ def read_table(
         if any("," in line for _, line in body):
             notes.append("decimal commas")
             body = [
-                (number, _with_point(line, source, number)) for number, line in body
+                (number, _with_point(line, f"{source}: line {number}"))
+                for number, line in body
             ]
-    (_, first), *rows = _cells([head, *body], delimiter, source)
-    header = tuple(first)
-    check(header, f"{source}: line {head[0]}")
-    if not rows:
+    header_line, first = head
+    where = f"{source}: line {header_line}"
+    header = tuple(_cells(first, delimiter, where))
+    check(header, where)
+    if not body:
         raise TaskError("the file has no rows of numbers", where=source)
-    values = [_numbers(cells, header, source, number) for number, cells in rows]
-    numbers = np.array([number for number, _ in rows])
-    return Table(header, head[0], np.array(values), numbers, tuple(notes))
+    values = []
+    for number, line in body:
+        where = f"{source}: line {number}"
+        values.append(_numbers(_cells(line, delimiter, where), header, where))
+    numbers = np.array([number for number, _ in body])
+    return Table(header, header_line, np.array(values), numbers, tuple(notes))
 
 
-def _with_point(line: str, source: str, number: int) -> str:
+def _with_point(line: str, where: str) -> str:
     """Write decimal commas as points, unless there are both: one of them would separate thousands."""
     if "," in line and "." in line:
         raise TaskError(
             "the line has both decimal points and decimal commas",
             found=repr(line[:60]),
-            where=f"{source}: line {number}",
+            where=where,
             hint="Write numbers without thousands separators",
         )
     return line.replace(",", ".")
 
 
-def _cells(
-    lines: list[tuple[int, str]], delimiter: str, source: str
-) -> Iterator[tuple[int, list[str]]]:
-    reader = csv.reader(
-        (line for _, line in lines), delimiter=delimiter, skipinitialspace=True
-    )
+def _cells(line: str, delimiter: str, where: str) -> list[str]:
+    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
     try:
-        for (number, _), cells in zip(lines, reader, strict=False):
-            yield number, [cell.strip() for cell in cells]
+        (cells,) = reader
     except csv.Error as error:
-        where = f"{source}: line {lines[reader.line_num - 1][0]}"
         raise TaskError(f"not a CSV file: {error}", where=where) from None
+    return [cell.strip() for cell in cells]
 
 
-def _numbers(
-    cells: list[str], header: tuple[str, ...], source: str, number: int
-) -> list[float]:
+def _numbers(cells: list[str], header: tuple[str, ...], where: str) -> list[float]:
     """Return the numbers of a line.
 
     Raises
@@ -139,7 +143,7 @@ def _numbers(
             "the row has the wrong number of values",
             found=len(cells),
             allowed=f"{len(header)}: {', '.join(header)}",
-            where=f"{source}: line {number}",
+            where=where,
             hint=hint if len(cells) > len(header) else None,
         )
     values = [_number(cell) for cell in cells]
@@ -151,7 +155,7 @@ def _numbers(
                 f"the value of column {column} {problem}",
                 found=repr(cell),
                 allowed=f"{-LARGEST:g} to {LARGEST:g}" if finite else "a number",
-                where=f"{source}: line {number}",
+                where=where,
             )
     return values
 
@@ -351,15 +355,14 @@ def points_of(
     TaskError
         Units are missing or contradict each other, a quaternion has no unit length, or a feed rate is not positive.
     """
-    used: dict[str, dict[str, None]] = {}
+    notes = []
 
     def read(names: Sequence[str], kind: str) -> Array:
         chosen = [columns.places[name] for name in names]
-        found = [_unit_of(name, kind, columns, units) for name in names]
-        stated = [unit for _, unit in chosen if unit is not None]
+        factors = [UNITS[kind][_unit_of(name, kind, columns, units)] for name in names]
+        stated = dict.fromkeys(unit for _, unit in chosen if unit is not None)
         if stated:
-            used[kind] = dict.fromkeys(stated)
-        factors = [UNITS[kind][unit] for unit in found]
+            notes.append(f"{kind} in {' and '.join(stated)}, as the header says")
         return table.values[:, [place for place, _ in chosen]] * np.array(factors)
 
     position = [name for name in columns.names if name in POSITION]
@@ -383,10 +386,6 @@ def points_of(
             found=f"{speed[i]:g} m/s",
             allowed="more than 0",
         )
-    notes = [
-        f"{kind} in {' and '.join(stated)}, as the header says"
-        for kind, stated in used.items()
-    ]
     if convention:
         notes.append(f"orientations: {CONVENTIONS[convention].meaning}")
     return points, tuple(notes)
@@ -404,5 +403,5 @@ def _with_quaternions(points: Points, convention: str) -> Points:
             found=str(values[i].tolist()),
             allowed="a quaternion of length 1",
         )
-    quaternions = np.roll(rotation_by(convention, values).as_quat(), 1, axis=1)
+    quaternions = quaternions_of(rotation_by(convention, values))
     return replace(points, turning=with_like_signs(quaternions))

@@ -114,3 +114,10 @@ def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
     if convention == "rotation_vector":
         return Rotation.from_rotvec(values)
     return Rotation.from_euler(CONVENTIONS[convention].euler, values)
+
+
+def quaternions_of(rotation: Rotation) -> npt.NDArray[Any]:
+    """Return the unit quaternions w, x, y, z, (..., 4), one of both, of rotations."""
+    import numpy as np
+
+    return np.roll(rotation.as_quat(), 1, axis=-1)
