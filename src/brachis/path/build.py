@@ -102,12 +102,12 @@ def _join(
     for join in find_joins(curves, coordinates.rows):
         i = join.index
         curve = curves[i]
-        size = segments[i].blend
-        pieces.append(Piece(curve, taken, curve.length - (size or 0.0), i))
-        taken = size or 0.0
+        size = segments[i].blend or 0.0
+        pieces.append(Piece(curve, taken, curve.length - size, i))
+        taken = size
         if segments[i].stop:
             continue
-        if size is None:
+        if not size:
             corners.append(coordinates.corner(join, curve, curves[i + 1]))
         else:
             rounded = coordinates.blend(curve, curves[i + 1], size, join)
@@ -139,13 +139,11 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     """
     placement = task.path_placement
     frame = None if placement is None else PathFrame.of(placement, task_map.rows)
-    given = (
-        None
-        if task.path_start is None
-        else task_map.read(task.path_start, "path_start")
-    )
-    if given is not None and frame is not None:
-        given = frame.to_world(given)
+    given = None
+    if task.path_start is not None:
+        given = task_map.read(task.path_start, "path_start")
+        if frame is not None:
+            given = frame.to_world(given)
     if task.start == "free":
         assert given is not None
         return build_path(task.path, given, task_map.rows, frame)

@@ -303,8 +303,8 @@ def helix(shape: HelixTurns, context: SegmentContext) -> ArcCurve:
     """Return the climbing turns about an axis."""
     context.need_rows("a helix", 3)
     arc = _about_center(shape, 2 * np.pi * shape.turns, context)
-    axis = np.asarray(shape.normal) / np.linalg.norm(shape.normal)
-    rise = abs(shape.turns) * shape.pitch * axis
+    # The arc's normal has the sign of the turns.
+    rise = shape.turns * shape.pitch * arc.normal
     length = float(np.hypot(arc.length, np.linalg.norm(rise)))
     turn = arc.turn * arc.length / length
     return replace(arc, length=length, turn=turn, slope=rise / length)

@@ -8,8 +8,10 @@ A function of one parameter is given by its derivatives: an array whose first ax
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from math import comb
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +21,13 @@ from brachis.task.points.units import quaternions_of, rotation_by
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+
+def _leibniz(
+    multiply: Callable[[Array, Array], Array], one: Array, other: Array, k: int
+) -> Any:
+    """Return the k-th derivative of a product from those of both factors, by Leibniz' rule."""
+    return sum(comb(k, i) * multiply(one[i], other[k - i]) for i in range(k + 1))
 
 
 def product(one: Array, other: Array, how: str) -> Array:
@@ -32,12 +41,8 @@ def product(one: Array, other: Array, how: str) -> Array:
         The product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.
     """
     orders = range(min(len(one), len(other)))
-    return np.stack(
-        [
-            sum(comb(k, i) * np.einsum(how, one[i], other[k - i]) for i in range(k + 1))
-            for k in orders
-        ]
-    )
+    multiply = partial(np.einsum, how)
+    return np.stack([_leibniz(multiply, one, other, k) for k in orders])
 
 
 def unit(vector: Array) -> Array:
@@ -49,9 +54,10 @@ def unit(vector: Array) -> Array:
     inverse = np.zeros_like(squared)
     inverse[0] = 1.0 / np.sqrt(squared[0])
     for k in range(len(vector) - 1):
-        first = sum(comb(k, i) * squared[i + 1] * inverse[k - i] for i in range(k + 1))
-        terms = (comb(k, i) * squared[i] * inverse[k + 1 - i] for i in range(1, k + 1))
-        inverse[k + 1] = (first / -2.0 - sum(terms)) / squared[0]
+        right = _leibniz(np.multiply, squared[1:], inverse, k) / -2.0
+        # Of n y', what is known: the last derivative of y is zero as yet.
+        left = _leibniz(np.multiply, squared, inverse[1:], k)
+        inverse[k + 1] = (right - left) / squared[0]
     return product(vector, inverse, "...i,...->...i")
 
 
@@ -60,8 +66,7 @@ def sine_cosine(angle: Array) -> tuple[Array, Array]:
     both = np.zeros(angle.shape, dtype=complex)  # exp(i angle)
     both[0] = np.exp(1j * angle[0])
     for k in range(len(angle) - 1):
-        terms = (comb(k, i) * angle[i + 1] * both[k - i] for i in range(k + 1))
-        both[k + 1] = 1j * sum(terms)
+        both[k + 1] = 1j * _leibniz(np.multiply, angle[1:], both, k)
     return both.imag, both.real
 
 
@@ -93,11 +98,7 @@ def quaternion_derivatives(rotation: Array) -> Array:
     velocity = angular_velocity(rotation)
     rate = np.concatenate([np.zeros((len(velocity), 1)), velocity], axis=1)
     for k in range(len(rotation) - 1):
-        terms = (
-            comb(k, i) * quaternion_product(result[i], rate[k - i])
-            for i in range(k + 1)
-        )
-        result[k + 1] = sum(terms) / 2.0
+        result[k + 1] = _leibniz(quaternion_product, result, rate, k) / 2.0
     return result
 
 

@@ -17,6 +17,7 @@ from brachis.robot import TaskMap, task_map_of
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES, POSE_ROWS, YAW, position_rows
 from brachis.task import Placement
+from brachis.task.points.points import sum_up
 from brachis.task.points.units import rotation_by
 
 
@@ -110,16 +111,6 @@ class Piece:
         knots = self.curve.knots
         return knots[(knots > self.first) & (knots < self.last)]
 
-    def arc_length(self, positions: int) -> float:
-        """Return the arc length of the position rows by Gauss quadrature between the curve's knots."""
-        bounds = np.concatenate([[self.first], self.inner_knots, [self.last]])
-
-        def speeds(sigma: Array) -> Array:
-            slope = self.curve.derivatives(sigma, 1)[1, :, :positions]
-            return np.linalg.norm(slope, axis=1)
-
-        return float(integrate(speeds, bounds).sum())
-
 
 @dataclass(frozen=True, eq=False)
 class SequencePath:
@@ -160,7 +151,7 @@ class SequencePath:
 
         The tool stops at the ends of the segments with the indices `stopping`.
         """
-        ends = np.cumsum([0.0, *(piece.length for piece in pieces)])
+        ends = sum_up([piece.length for piece in pieces])
         total = float(ends[-1])
         breaks = ends / total
         last = {
@@ -171,8 +162,13 @@ class SequencePath:
 
     @cached_property
     def length(self) -> float:
-        """Arc length of the position rows, m."""
-        return sum(piece.arc_length(self.positions) for piece in self.pieces)
+        """Arc length of the position rows, m, by Gauss quadrature between the knots."""
+
+        def speeds(s: Array) -> Array:
+            slope = self.derivatives(s, 1)[1, :, : self.positions]
+            return np.linalg.norm(slope, axis=1)
+
+        return float(integrate(speeds, self.knots).sum())
 
     @property
     def knots(self) -> Array:
@@ -211,19 +207,19 @@ class SequencePath:
         """
         return PathSample(*self.derivatives(s))
 
-    def derivatives(self, s: Sequence[float] | Array) -> Array:
-        """Return the coordinates in the world and their derivatives by s up to the third, shape (4, K, m)."""
+    def derivatives(self, s: Sequence[float] | Array, order: int = 3) -> Array:
+        """Return the coordinates in the world and their derivatives by s, shape (order + 1, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
         which = np.searchsorted(self.breaks[1:-1], values, side="right")
         rows = self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2]
-        result = np.empty((4, values.size, rows))
-        order = np.argsort(which, kind="stable")
-        used, starts = np.unique(which[order], return_index=True)
-        for i, here in zip(used, np.split(order, starts[1:]), strict=False):
+        result = np.empty((order + 1, values.size, rows))
+        by_piece = np.argsort(which, kind="stable")
+        used, starts = np.unique(which[by_piece], return_index=True)
+        for i, here in zip(used, np.split(by_piece, starts[1:]), strict=True):
             piece = self.pieces[i]
             sigma = piece.first + (values[here] - self.breaks[i]) * self.total
-            result[:, here] = piece.curve.derivatives(sigma)
-        result *= self.total ** np.arange(4)[:, None, None]
+            result[:, here] = piece.curve.derivatives(sigma, order)
+        result *= self.total ** np.arange(order + 1)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T
             result[0] += self.frame.origin

@@ -29,7 +29,7 @@ from brachis.path.rotations import (
 from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import joints_of
 from brachis.task.orientation import Attitude
-from brachis.task.points.points import steps_of
+from brachis.task.points.points import steps_of, sum_up
 from brachis.task.points.units import quaternions_of
 from brachis.task.segments import BSplineCurve, SplineThrough
 
@@ -253,7 +253,7 @@ def _chord_knots(
             found=list(shape.through[repeated]),
             allowed="waypoints that differ from their predecessors in the position rows",
         )
-    return np.concatenate([[0.0], np.cumsum(chords)])
+    return sum_up(chords)
 
 
 def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:

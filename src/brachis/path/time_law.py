@@ -22,6 +22,7 @@ from brachis.path.legs import Leg
 from brachis.path.protocol import Array, Path
 from brachis.path.sequence import integrate, tool_derivatives
 from brachis.robot import TaskMap
+from brachis.task.points.points import sum_up
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -143,7 +144,7 @@ class _ToolAlongPath:
     def times(self, s: Array) -> Array:
         """Return the times, (K,), s, at ascending path coordinates, from the first one on."""
         distances = integrate(lambda nodes: self.slopes(nodes)[0], s)
-        return np.append(0.0, np.cumsum(distances / self.speed))
+        return sum_up(distances / self.speed)
 
 
 def _interpolate(
