@@ -20,10 +20,11 @@ from brachis.apps.recording.nodes import Nodes, nodes_of
 from brachis.apps.recording.recording import Recording, check_units, read_recording
 from brachis.apps.recording.rests import find_rests, split_at_rests, with_rests
 from brachis.common.arguments import check_keywords, file_name, numbers
-from brachis.common.arrays import with_like_signs
+from brachis.common.arrays import spread, with_like_signs
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
 from brachis.errors import InputError, PathError, TaskError
 from brachis.path import Path, build_path
+from brachis.planner import Given
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace, Pose
@@ -34,6 +35,7 @@ from brachis.task import (
     PointFile,
     RobotSettings,
     Segment,
+    Source,
     Task,
     load_task,
 )
@@ -49,9 +51,9 @@ _SURE = 3.0
 @check_keywords
 def import_motion(
     path: str | os.PathLike[str],
-    robot: str | os.PathLike[str] | Robot | Task | None = None,
+    robot: Given = None,
     *,
-    task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
+    task: Source | None = None,
     task_space: str | Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
     tolerance: float | None = None,
@@ -150,10 +152,19 @@ def import_motion(
             where="path",
             hint="Raise the tolerance",
         )
+    period = 1e3 * float(np.median(np.diff(recording.t)))
+    notes = (
+        f"{len(recording.t)} rows over {recording.t[-1]:.6g} s, one every {period:.4g} ms",
+        *recording.notes,
+        *nodes.notes,
+        "unknown: the motion between the rows, and the measured torques",
+        f"the tool's path comes from forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
+        f"its tolerance is {tolerance:.1e} m and rad",
+    )
     recovered = Recovered(
         recording.source,
         tolerance,
-        _notes(recording, nodes, followed, tolerance),
+        notes,
         np.column_stack([recording.t, np.pad(recording.q, rolling)]),
         np.pad(error, rolling[1]),
     )
@@ -165,9 +176,10 @@ def import_motion(
         for t, s in followed.parts
     ]
     for number, (first, end) in enumerate(rests):
-        splines.insert(
-            2 * number + 1, _wait(nodes.t[[first, end]], splines[2 * number])
-        )
+        knots = np.repeat([0.0, 1.0], DEGREE + 1)
+        points = np.full((1, DEGREE + 1), splines[2 * number].control_points[0, -1])
+        wait = PhaseSpline(nodes.t[end] - nodes.t[first], knots, DEGREE, points)
+        splines.insert(2 * number + 1, wait)
     knots, control_points = join_splines(splines)
     ends = [number for rest in rests for number in rest]
     return Trajectory(
@@ -234,34 +246,34 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
         example.
     """
     rests = find_rests(nodes)
-    parts = [
-        _follow(task_map, part, tolerance) for part in split_at_rests(nodes, rests)
-    ]
-    segments = list(parts[0].segments)
-    for (first, end), part in zip(rests, parts[1:], strict=True):
+    moves = split_at_rests(nodes, rests)
+    parts = [_follow(task_map, move, tolerance) for move in moves]
+    (segments, _, first_values, _), *others = parts
+    for (first, end), (following, *_) in zip(rests, others, strict=True):
         dwell = float(nodes.t[end] - nodes.t[first])
         waits = segments[-1].model_copy(update={"stop": True, "dwell": dwell})
-        segments = [*segments[:-1], waits, *part.segments]
-    path = build_path(segments, parts[0].values[0], task_map.rows)
-    places = [0.0, *path.stops.tolist(), 1.0]
+        segments = [*segments[:-1], waits, *following]
+    path = build_path(segments, first_values[0], task_map.rows)
+    places = pairwise([0.0, *path.stops.tolist(), 1.0])
     found = []
-    misses = []
-    for part, ends in zip(parts, pairwise(places), strict=True):
+    worst = 0.0
+    for (_, t, values, share), ends in zip(parts, places, strict=True):
         own = path.between(*ends)
-        s = _nearest(task_map, own, part.values, part.share, ends)
-        miss = task_map.difference(part.values, own.sample(s).target)
-        misses.append(np.max(task_map.norms(miss)))
-        found.append((part.t, s))
-    return RecoveredPath(tuple(segments), tuple(found), float(max(misses)))
+        s = _nearest(task_map, own, values, share, ends)
+        miss = task_map.difference(values, own.sample(s).target)
+        worst = max(worst, float(np.max(task_map.norms(miss))))
+        found.append((t, s))
+    return RecoveredPath(tuple(segments), tuple(found), worst)
 
 
-@dataclass(frozen=True, eq=False)
-class _Followed:
-    """A part of a path between waits.
+def _follow(
+    task_map: TaskMap, nodes: Nodes, tolerance: float
+) -> tuple[list[Segment], np.ndarray, np.ndarray, np.ndarray]:
+    """Fit segments to a part of a motion between waits; see `recover_path`.
 
-    Attributes
-    ----------
-    segments : tuple of Segment
+    Returns
+    -------
+    list of Segment
     t : (K,) ndarray
         Dense times, s.
     values : (K, c) ndarray
@@ -269,32 +281,18 @@ class _Followed:
     share : (K,) ndarray
         Way from the part's beginning, of all of its way.
     """
-
-    segments: tuple[Segment, ...]
-    t: np.ndarray
-    values: np.ndarray
-    share: np.ndarray
-
-
-def _follow(task_map: TaskMap, nodes: Nodes, tolerance: float) -> _Followed:
-    """Fit segments to a part of a motion; see `recover_path`."""
+    from scipy.integrate import cumulative_trapezoid
     from scipy.interpolate import BPoly
 
-    parts = np.arange(4) / 4
-    inner = nodes.t[:-1, None] + np.diff(nodes.t)[:, None] * parts
-    t = np.append(inner.ravel(), nodes.t[-1])
+    t = spread(nodes.t, 4)
     states = np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1)
     pieces = BPoly.from_derivatives(nodes.t, states)
     q = pieces(t)
     qdot = pieces(t, nu=1)
-    is_joint_space = isinstance(task_map, JointSpace)
-    speed = (
-        np.linalg.norm(qdot, axis=1)
-        if is_joint_space
-        else _tool_speed(task_map, q, qdot)
-    )
-    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
-    length = np.append(0.0, np.cumsum(steps))
+    speed = _tool_speed(task_map, q, qdot)
+    if isinstance(task_map, JointSpace):
+        speed = np.linalg.norm(qdot, axis=1)
+    length = cumulative_trapezoid(speed, t, initial=0)
     if length[-1] < tolerance:
         raise PathError(
             "the tool does not move along a path",
@@ -319,7 +317,7 @@ def _follow(task_map: TaskMap, nodes: Nodes, tolerance: float) -> _Followed:
             hint="If the tool stops for less than five rows and changes its direction, split the file there. If the "
             "positions are measured, set their noise, or raise the tolerance",
         ) from error
-    return _Followed(tuple(segments), t, values, length / length[-1])
+    return list(segments), t, values, length / length[-1]
 
 
 def _tool_speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
@@ -360,16 +358,14 @@ def _nearest(
     ends: tuple[float, float],
 ) -> np.ndarray:
     """Return the path coordinates nearest to task coordinates, (K, c), between two ends, from shares on; ascending."""
-    begin, end = ends
-    s = begin + (end - begin) * share
+    s = np.interp(share, [0.0, 1.0], ends)
     for _ in range(4):
         sample = path.sample(s)
         miss = task_map.difference(values, sample.target)
         s += np.sum(miss * sample.xi, axis=1) / np.sum(sample.xi**2, axis=1)
-        np.clip(s, begin, end, out=s)
-    s[0] = begin
-    s[-1] = end
-    return np.asarray(np.maximum.accumulate(s))
+        s = np.clip(s, *ends)
+    s[[0, -1]] = ends
+    return np.maximum.accumulate(s)
 
 
 DEGREE = 3
@@ -407,13 +403,6 @@ def fit_coordinate(
     return spline
 
 
-def _wait(times: np.ndarray, before: PhaseSpline) -> PhaseSpline:
-    """Return the spline of a wait between two times, (2,), s, where a phase ends."""
-    knots = np.repeat([0.0, 1.0], DEGREE + 1)
-    points = np.full((1, DEGREE + 1), before.control_points[0, -1])
-    return PhaseSpline(times[1] - times[0], knots, DEGREE, points)
-
-
 def _is_task(given: object) -> bool:
     """Tell a task, or its file, from a robot."""
     if not isinstance(given, str | os.PathLike):
@@ -443,20 +432,6 @@ def _deviations(
             allowed=f"one number > 0 rad or m, or {n} of them",
         )
     return np.broadcast_to(given, n)
-
-
-def _notes(
-    recording: Recording, nodes: Nodes, followed: RecoveredPath, tolerance: float
-) -> tuple[str, ...]:
-    h = 1e3 * float(np.median(np.diff(recording.t)))
-    return (
-        f"{len(recording.t)} rows over {recording.t[-1]:.6g} s, one every {h:.4g} ms",
-        *recording.notes,
-        *nodes.notes,
-        "unknown: the motion between the rows, and the measured torques",
-        f"the tool's path comes from forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
-        f"its tolerance is {tolerance:.1e} m and rad",
-    )
 
 
 def _task_of(

@@ -18,11 +18,13 @@ acceleration changes from the one to the other within a small part of the period
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from brachis.apps.recording.recording import FEWEST_ROWS, Recording
 from brachis.errors import write_count
+from brachis.trajectory.trajectory import piece_coefficients
 
 _TINY = np.finfo(float).tiny
 _DEGREE = 5
@@ -97,7 +99,8 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
         for end in (0, -1):
             if np.all(np.abs(states[order, end]) <= small):
                 states[order, end] = 0.0
-    return Nodes(t, states[0], states[1], states[2], tuple(notes))
+    q, qdot, qddot = states[:3]
+    return Nodes(t, q, qdot, qddot, tuple(notes))
 
 
 def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
@@ -159,14 +162,10 @@ def _differentiate(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     rows = windows[chosen]
     local = (t[rows] - t[:, None]) / h
     coefficients = np.linalg.solve(local[:, :, None] ** powers, values[rows])
-    return np.stack(
-        [
-            values,
-            coefficients[:, 1] / h,
-            2.0 * coefficients[:, 2] / h**2,
-            6.0 * coefficients[:, 3] / h**3,
-        ]
-    )
+    derivatives = np.moveaxis(coefficients[:, :4], 1, 0)
+    derivatives[0] = values
+    factors = np.array([1.0, 1.0, 2.0, 6.0]) / h ** np.arange(4)
+    return derivatives * factors[:, None, None]
 
 
 def _fit_rows(
@@ -193,7 +192,8 @@ def _count_vanishing(
 ) -> int:
     """Count the derivatives that vanish at an end, from which t is counted, by polynomials through the rows near it."""
     is_away = (np.abs(q - q[0]) > 220.0 * deviation).any(axis=1)
-    count = max(8, int(np.argmax(is_away)) if is_away.any() else len(t)) + 1
+    first = int(np.argmax(is_away)) if is_away.any() else len(t)
+    count = max(8, first) + 1
     near = t[:count]
     u = near / near[-1]
     # Derivatives that are small, as parts of the largest ones, or not known to five standard deviations, vanish.
@@ -229,16 +229,15 @@ def _fit_spline(
     from scipy.sparse import csr_array
     from scipy.sparse.linalg import spsolve
 
-    breaks = np.interp(
-        np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(t)), t
-    )
-    knots = np.concatenate([np.full(_DEGREE, t[0]), breaks, np.full(_DEGREE, t[-1])])
+    rows = np.arange(len(t))
+    breaks = np.interp(np.linspace(0.0, rows[-1], count + 1), rows, t)
+    knots = np.pad(breaks, _DEGREE, mode="edge")
     # Derivatives vanish at an end where the first control points are equal: all from the free ones.
     points = np.arange(len(knots) - _DEGREE - 1)
     columns = np.clip(points - first, 0, points[-1] - first - last)
     tied = csr_array((np.ones(len(points)), (points, columns)))
-    rows = BSpline.design_matrix(t, knots, _DEGREE) @ tied
-    free = spsolve(rows.T @ rows, rows.T @ q).reshape(-1, q.shape[1])
+    design = BSpline.design_matrix(t, knots, _DEGREE) @ tied
+    free = spsolve(design.T @ design, design.T @ q).reshape(-1, q.shape[1])
     spline = BSpline(knots, tied @ free, _DEGREE)
     states = np.stack([spline(t, nu=order) for order in range(4)])
     off = np.sqrt(np.mean(((states[0] - q) / deviation) ** 2, axis=0)).max()
@@ -271,12 +270,11 @@ def _add_jumps(t: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarra
         left = states[:, i]
         right = states[:, i + 1]
         h = float(t[i + 1] - t[i])
-        nodes_t, nodes = _place_jump(left, right, h, scale)
-        nodes_t = t[i] + nodes_t
-        whole_t = np.array([t[i], *nodes_t, t[i + 1]])
+        after, nodes = _place_jump(left, right, h, scale)
+        whole_t = np.array([0.0, *after, h])
         whole = np.concatenate([left[:3, None], nodes, right[:3, None]], axis=1)
         if _overshoots(whole_t, whole, scale).max() < 0.5 * overshoots[i]:
-            times.append(nodes_t)
+            times.append(t[i] + after)
             parts.append(nodes)
     merged = np.concatenate(times)
     order = np.argsort(merged, kind="stable")
@@ -285,21 +283,14 @@ def _add_jumps(t: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 def _overshoots(t: np.ndarray, states: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """By how much the acceleration in each quintic piece leaves the range between its ends, relative to `scale`."""
-    h = np.diff(t)[:, None]
-    distance = np.diff(states[0], axis=0)
-    v0 = states[1, :-1]
-    v1 = states[1, 1:]
-    a0 = states[2, :-1]
-    a1 = states[2, 1:]
-    # a(u) = a0 + (a1 - a0) u + u (1 - u) (c + d u) with the given change of velocity, and distance
-    gain = (v1 - v0) / h - 0.5 * (a0 + a1)
-    rest = (distance - v0 * h) / h**2 - a0 / 3.0 - a1 / 6.0
-    d = 60.0 * (gain - 2.0 * rest)
-    c = 6.0 * gain - 0.5 * d
-    u = np.linspace(0.0, 1.0, 21)[1:-1, None, None]
-    values = a0 + (a1 - a0) * u + u * (1.0 - u) * (c + d * u)
-    above = values.max(axis=0) - np.maximum(a0, a1)
-    below = np.minimum(a0, a1) - values.min(axis=0)
+    from scipy.interpolate import BPoly
+
+    q, qdot, qddot = states[:3]
+    coefficients, _ = piece_coefficients(t, q, qdot, qddot, qddot)
+    inner = t[:-1] + np.diff(t) * np.linspace(0.0, 1.0, 21)[1:-1, None]
+    values = BPoly(coefficients, t)(inner, nu=2)
+    above = values.max(axis=0) - np.maximum(qddot[1:], qddot[:-1])
+    below = np.minimum(qddot[1:], qddot[:-1]) - values.min(axis=0)
     worst: np.ndarray = (np.maximum(above, below) / scale).max(axis=1)
     return worst
 
@@ -328,24 +319,22 @@ def _place_jump(
         Positions and two derivatives.
     """
 
-    def gap(place: np.ndarray | float, order: int) -> np.ndarray:
+    def gap(place: Any, order: int) -> Any:
         """Difference of both sides' derivatives at parts of the period, as parts of `scale`."""
         t = np.asarray(place)[..., None] * h
-        difference: np.ndarray = (
-            _extrapolate(right, t - h)[order] - _extrapolate(left, t)[order]
-        ) / scale
-        return difference
+        difference = _extrapolate(right, t - h) - _extrapolate(left, t)
+        return difference[order] / scale
 
     places = np.linspace(1.5 * _NARROWEST, 1.0 - 1.5 * _NARROWEST, 401)
-    place = float(places[int(np.argmin((gap(places, 1) ** 2).sum(axis=1)))])
+    place = places[np.argmin((gap(places, 1) ** 2).sum(axis=1))]
     jump = gap(place, 2)
-    size = max(float(jump @ jump), np.finfo(float).tiny)
-    place -= float(gap(place, 1) @ jump / size) / h
-    place = float(np.clip(place, places[0], places[-1]))
-    square = 24.0 * float(gap(place, 0) @ jump / size)
+    size = max(jump @ jump, _TINY)
+    place = place - gap(place, 1) @ jump / size / h
+    place = np.clip(place, places[0], places[-1])
+    square = 24.0 * gap(place, 0) @ jump / size
     widest = 2.0 * min(place, 1.0 - place) - _NARROWEST
     share = np.clip(np.sqrt(max(square, 0.0)) / h, 2.0 * _NARROWEST, widest)
-    width = h * float(share)
+    width = h * share
     first = place * h - 0.5 * width
     last = place * h + 0.5 * width
     begin = _extrapolate(left, first)

@@ -35,13 +35,11 @@ def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
 
 def with_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> Nodes:
     """Return the motion without the rounding of its positions, velocities and accelerations at rest."""
-    q = nodes.q.copy()
-    qdot = nodes.qdot.copy()
-    qddot = nodes.qddot.copy()
+    states = np.stack([nodes.q, nodes.qdot, nodes.qddot])
     for first, end in rests:
-        q[first : end + 1] = q[first]
-        qdot[first : end + 1] = 0.0
-        qddot[first : end + 1] = 0.0
+        states[0, first : end + 1] = nodes.q[first]
+        states[1:, first : end + 1] = 0.0
+    q, qdot, qddot = states
     return Nodes(nodes.t, q, qdot, qddot, nodes.notes)
 
 
