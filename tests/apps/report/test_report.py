@@ -320,7 +320,7 @@ def test_angles_may_be_in_degrees_and_lengths_stay(rail):
     q = rail.trajectory.q
     assert rows["rail"].start == f"{q[0, 0]:.4f} m"
     assert rows["joint_1"].start == f"{np.rad2deg(q[0, 1]):.4f} deg"
-    units = {row.found.partition(" ")[2] for row in tables.check_rows(reported)}
+    units = {row["found"].partition(" ")[2] for row in tables.check_rows(reported)}
     assert not any("rad" in unit for unit in units - {"m, rad"})
     assert [row.value.split()[1] for row in rows["joint_1"].peaks] == [
         "deg",

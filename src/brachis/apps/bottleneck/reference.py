@@ -119,27 +119,31 @@ def find_reference(
     r = own.phases[0].joint_map.r
     finest = max(2, intervals // (own.intervals * max(1, r)))
     meshes = [(3, times) for times in sorted({1, 2, finest})]
-    best: Reference | None = None
     fastest = refined
+    violation = np.inf
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         for degree, times in (*meshes, (_PARABOLAS, finest)):
-            if best is not None and time.perf_counter() > deadline:
+            if fastest is not refined and time.perf_counter() > deadline:
                 break
             program = _on_mesh(own, degree, times)
             answer = _plan_on_mesh(program, fastest, tolerance, deadline)
             if answer is None or answer.t_end >= fastest.t_end:
                 continue
-            violation = _violation(answer)
-            if violation > tolerance:
-                continue
-            fastest = answer
-            distance = refined.t_end / answer.t_end - 1.0
-            count = answer.program.intervals
-            best = Reference(
-                answer.t_end, distance, degree, count, violation, 0.0, answer
-            )
-    elapsed = time.perf_counter() - began
-    return best and dataclasses.replace(best, wall_time=elapsed)
+            found = _violation(answer)
+            if found <= tolerance:
+                fastest = answer
+                violation = found
+    if fastest is refined:
+        return None
+    return Reference(
+        t_end=fastest.t_end,
+        distance=refined.t_end / fastest.t_end - 1.0,
+        degree=fastest.program.phases[0].degree,
+        intervals=fastest.program.intervals,
+        violation=violation,
+        wall_time=time.perf_counter() - began,
+        refined=fastest,
+    )
 
 
 def _on_mesh(program: Program, degree: int, times: int) -> Program:

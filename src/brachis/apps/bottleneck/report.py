@@ -10,11 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from brachis.apps.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.apps.bottleneck.optimum import solve_again
-from brachis.apps.bottleneck.reference import (
-    MEANING,
-    Reference,
-    find_reference,
-)
+from brachis.apps.bottleneck.reference import MEANING, Reference, find_reference
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
     SHORTEST_SHARE,
@@ -22,20 +18,17 @@ from brachis.apps.bottleneck.saturation import (
     PhaseLimits,
     Saturation,
     limits_by_phase,
+    limits_in,
     saturations,
 )
 from brachis.apps.bottleneck.sensitivities import (
     TIMINGS,
-    BranchBoundary,
     Sensitivities,
     Sensitivity,
     sensitivities,
 )
 from brachis.common.summary import LINES
-from brachis.errors import (
-    InputError,
-)
-from brachis.limits import Role
+from brachis.errors import InputError
 from brachis.optimise.retiming import SOLVER
 from brachis.robot.joints import shown_unit
 from brachis.timing import TimingGap, find_timing_gap
@@ -99,10 +92,18 @@ class BottleneckReport:
         if self.check is not None:
             lines += _check_lines(self.check)
         lines += write_active(self.saturations)
-        if len(self.phases) > 1:
-            lines += write_phases(self.phases)
-        if self.reference is not None:
-            lines.append(_reference(self.reference, self.t_end))
+        rows = phase_rows([each.phase for each in self.phases])
+        if len(rows) > 1:
+            for (name, s, time, speed), each in zip(rows, self.phases, strict=True):
+                motion = f"phase {name}, s = {s}, {time}, {speed}"
+                lines.append(f"{motion}; active limits: {each}")
+        best = self.reference
+        if best is not None:
+            longer = f"{100.0 * best.distance:.2f} % ({1e3 * (self.t_end - best.t_end):.1f} ms)"
+            lines.append(
+                f"reference {best.t_end:.4f} s ({MEANING}; degree {best.degree}, {best.intervals} intervals): "
+                f"the motion takes {longer} longer"
+            )
         elif self.reference_sought:
             lines.append("reference: no faster motion was found")
         return "\n".join(lines)
@@ -169,37 +170,32 @@ def report(
     """
     if isinstance(motion, str | os.PathLike):
         motion = Trajectory.load(motion)
-    if isinstance(motion, Trajectory):
-        trajectory = motion
-        if trajectory.recovered is not None:
-            if check or reference:
-                raise InputError(
-                    "this motion was not planned, so the cost of its limits cannot be computed",
-                    where=trajectory.recovered.source,
-                    hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
-                )
-            active = saturations(trajectory)
-            phases = limits_by_phase(trajectory, active)
-            return BottleneckReport(trajectory.t_end, None, active, phases)
-        refined = solve_again(trajectory)
-        optimum = refined
-    else:
-        trajectory = motion.trajectory
-        if motion.candidate.refined is None:
+    trajectory = motion if isinstance(motion, Trajectory) else motion.trajectory
+    if trajectory.recovered is not None:
+        if check or reference:
             raise InputError(
-                "the result contains no solved optimisation problem",
-                where="result",
-                allowed="a result of brachis.plan",
+                "this motion was not planned, so the cost of its limits cannot be computed",
+                where=trajectory.recovered.source,
+                hint="brachis compare plans the same path; ask for the bottlenecks of that plan",
             )
-        refined = motion.candidate.refined
-        is_timed = refined.report.solver == SOLVER
-        is_free = refined.program.phases[0].joint_map.r > 0
-        optimum = solve_again(trajectory) if is_timed and is_free else refined
+        active = saturations(trajectory)
+        phases = limits_by_phase(trajectory, active)
+        return BottleneckReport(trajectory.t_end, None, active, phases)
+    if isinstance(motion, Trajectory):
+        refined = optimum = solve_again(trajectory)
+    elif motion.candidate.refined is None:
+        raise InputError(
+            "the result contains no solved optimisation problem",
+            where="result",
+            allowed="a result of brachis.plan",
+        )
+    else:
+        refined = optimum = motion.candidate.refined
+        if refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r:
+            optimum = solve_again(trajectory)
     found = sensitivities(optimum)
     tolerance = trajectory.task.refinement.tolerance
-    limits = [
-        limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD
-    ]
+    limits = limits_in(refined.program)
     active = saturations(trajectory, limits)
     return BottleneckReport(
         t_end=trajectory.t_end,
@@ -238,20 +234,25 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
             "motion is not an optimum, and the savings below are rough"
         )
     costly = [
-        entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end
+        _saving(entry, t_end, degrees=degrees)
+        for entry in found.limits
+        if -entry.change(_FRACTION) > _NOTHING * t_end
     ]
-    lines += [_saving(entry, t_end, degrees=degrees) for entry in costly]
+    lines += costly
     if len(costly) < len(found.limits):
         lines.append("no other limit costs time" if costly else "no limit costs time")
     how = f"multipliers by the {found.source}, residual {found.residual:.0e}"
     if found.source == TIMINGS:
         how = "timings of the same joint path with limits raised"
     lines.append(f"(to first order, from {how})")
-    lines += [
-        _boundary(entry)
-        for entry in found.boundaries
-        if entry.derivative * entry.margin > _NOTHING * t_end
-    ]
+    for boundary in found.boundaries:
+        saved = boundary.derivative * boundary.margin
+        if saved > _NOTHING * t_end:
+            lines.append(
+                f"the branch boundary of {boundary.label} costs {_figures(1e3 * saved)} ms (margin "
+                f"{boundary.margin:.3g}, to first order): not a limit of the robot; other redundant joints may be "
+                "faster"
+            )
     return lines
 
 
@@ -284,22 +285,14 @@ def _timing(found: TimingGap, t_end: float) -> list[str]:
     return [line]
 
 
-def _boundary(entry: BranchBoundary) -> str:
-    saved = _figures(1e3 * entry.derivative * entry.margin)
-    return (
-        f"the branch boundary of {entry.label} costs {saved} ms (margin {entry.margin:.3g}, to first order): not "
-        "a limit of the robot; other redundant joints may be faster"
-    )
-
-
 def _check_lines(check: SensitivityCheck) -> list[str]:
     """Say how the predictions compare with solving again."""
     lines = []
     for entry in check.entries:
         if not entry.predicted:
             continue
-        label = str(entry.sensitivity.label)
-        what = " ".join(filter(None, (label, entry.sensitivity.bound.side)))
+        side = entry.sensitivity.bound.side or ""
+        what = f"{entry.sensitivity.label} {side}".rstrip()
         line = (
             f"checked, {what} +{100.0 * check.step:g} %: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
             f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
@@ -309,8 +302,7 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
             line += f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
         if entry.other_optimum:
             which = "faster" if entry.other_optimum < 0.0 else "slower"
-            apart = f"{1e3 * abs(entry.other_optimum):.2g} ms {which}"
-            line += f"; from another local optimum, {apart}"
+            line += f"; from another local optimum, {1e3 * abs(entry.other_optimum):.2g} ms {which}"
         if not entry.optimal:
             line += " (solved again without reaching an optimum)"
         lines.append(line)
@@ -346,22 +338,3 @@ def write_active(found: tuple[Saturation, ...]) -> list[str]:
         *(lines or ["nothing stays at a limit"]),
         f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
     ]
-
-
-def write_phases(phases: tuple[PhaseLimits, ...]) -> list[str]:
-    """Say of each phase how long it takes and which limits are active in it."""
-    rows = phase_rows([each.phase for each in phases])
-    return [
-        f"phase {name}, s = {s}, {time}, {speed}; active limits: {each}"
-        for (name, s, time, speed), each in zip(rows, phases, strict=True)
-    ]
-
-
-def _reference(reference: Reference, t_end: float) -> str:
-    longer = (
-        f"{100.0 * reference.distance:.2f} % ({1e3 * (t_end - reference.t_end):.1f} ms)"
-    )
-    return (
-        f"reference {reference.t_end:.4f} s ({MEANING}; degree {reference.degree}, {reference.intervals} intervals): "
-        f"the motion takes {longer} longer"
-    )

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import freeze
+from brachis.common.arrays import freeze, spread
 from brachis.common.summary import Summary
-from brachis.limits import Label, Limit, Moments, limits_of
+from brachis.limits import Label, Limit, Moments, Role, limits_of
+from brachis.optimise.program import Program
 from brachis.trajectory import MotionPhase, Samples, Trajectory
 
 
@@ -44,13 +45,19 @@ def knot_times(trajectory: Trajectory) -> np.ndarray:
     return np.unique(trajectory.knots) * trajectory.t_end
 
 
-def dense_samples(trajectory: Trajectory, per_interval: int = 16) -> Samples:
+def dense_samples(trajectory: Trajectory) -> Samples:
     """Evaluate the trajectory at its knots, at its nodes and at some points in every knot interval."""
-    knots = knot_times(trajectory)
-    steps = np.arange(per_interval) / per_interval
-    grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
-    times = np.union1d(grid, trajectory.times)
-    return trajectory.at(np.clip(times, 0.0, trajectory.t_end))
+    return trajectory.at(_dense_times(trajectory, 16))
+
+
+def _dense_times(trajectory: Trajectory, per_interval: int) -> np.ndarray:
+    grid = spread(knot_times(trajectory), per_interval)
+    return np.union1d(grid, trajectory.times)
+
+
+def limits_in(program: Program) -> list[Limit]:
+    """List the limits of a program but its safeguards."""
+    return [limit for limit in program.limits if limit.role is not Role.SAFEGUARD]
 
 
 def limit_ratios(
@@ -69,35 +76,21 @@ def limit_ratios(
     LimitRatios
     """
     if limits is None:
-        robot = trajectory.robot
-        limits = limits_of(robot, trajectory.task)
+        limits = limits_of(trajectory.robot, trajectory.task)
     nodes = trajectory.times[1:]
-    before = (
-        nodes,
-        trajectory.q[1:],
-        trajectory.qdot[1:],
-        trajectory.qddot_before[1:],
-        trajectory.jerk_pieces.c[-1],
-        trajectory.path_spline(nodes),
-    )
-    samples = dense_samples(trajectory, 40)
-    behind = (
-        samples.t,
-        samples.q,
-        samples.qdot,
-        samples.qddot,
-        trajectory.jerk(samples.t),
-        samples.s,
-    )
     jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
     if trajectory.degree <= max((limit.order for limit in limits), default=0):
         gaps = np.abs(nodes[:-1, None] - knot_times(trajectory)).min(axis=1)
         jumps[:-1] |= gaps <= tolerances.TIME * trajectory.t_end
-    t, *motion = (
-        np.concatenate([first[jumps], then])
-        for first, then in zip(before, behind, strict=True)
-    )
+    t = np.concatenate([nodes[jumps], _dense_times(trajectory, 40)])
+    before = slice(0, np.count_nonzero(jumps))
+    qddot = trajectory.acceleration(t)
+    qddot[before] = trajectory.qddot_before[1:][jumps]
+    jerk = trajectory.jerk(t)
+    jerk[before] = trajectory.jerk_pieces.c[-1][jumps]
     order = np.argsort(t, kind="stable")
+    s = trajectory.path_coordinate(t)
+    motion = (trajectory.position(t), trajectory.velocity(t), qddot, jerk, s)
     moments = Moments(*(part[order] for part in motion))
     values = [np.empty((len(order), 0))]
     values += [limit.ratios(moments, t[order]) for limit in limits]

@@ -21,7 +21,6 @@ A motion that the phase plane timed has no multipliers: its joint path is timed 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -203,32 +202,24 @@ def multipliers_of(
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    tried = []
-    for multipliers in _balance(program, x, given):
-        tried.append(multipliers)
-        if multipliers.residual <= 1e-5:
-            break
-    return min(tried, key=lambda multipliers: multipliers.residual)
-
-
-def _balance(
-    program: Program, x: np.ndarray, given: np.ndarray | None
-) -> Iterator[Multipliers]:
-    """Yield multipliers of the rows at their bounds, the solver's first, then with rows a little farther away.
-
-    A row that is near its bound without being active would count as one that takes over within any step.
-    """
     gradient = program.gradient(x)
+    sources = {"solver": given, "least squares": None}
+    if given is None:
+        del sources["solver"]
+    tried = []
+    # A row that is near its bound without being active would count as one that takes over within any step.
     for near in (1e-8, 1e-7, 1e-6, 1e-5):
         active_set = ActiveSet.at(program, x, near)
         unique = not active_set.dependent
-        for source, own in (("solver", given), ("least squares", None)):
-            if source == "solver" and given is None:
-                continue
+        for source, own in sources.items():
             weights = active_set.weights_of(gradient, own)
             rest = np.linalg.norm(gradient - weights @ active_set.slopes)
             residual = float(rest / np.linalg.norm(gradient))
-            yield Multipliers(active_set, weights, source, residual, unique=unique)
+            found = Multipliers(active_set, weights, source, residual, unique=unique)
+            if residual <= 1e-5:
+                return found
+            tried.append(found)
+    return min(tried, key=lambda multipliers: multipliers.residual)
 
 
 STATIONARY = 1e-3

@@ -90,6 +90,10 @@ def _traces(
         "legendrank": curve.style,
     }
     hover = f"%{{y:.4g}} {panel.unit}".rstrip()
+    dash = "solid"
+    if isinstance(look["linestyle"], tuple):  # of Matplotlib: offset and lengths
+        lengths = look["linestyle"][1]
+        dash = ",".join(f"{1.8 * length:.1f}px" for length in lengths)
     line = {
         **shared,
         "x": encode(panel.t),
@@ -98,14 +102,16 @@ def _traces(
         "line": {
             "color": look["color"],
             "width": 1.8,
-            "dash": _dash(look["linestyle"]),
+            "dash": dash,
             "simplify": False,
         },
     }
     if curve.is_limited and not panel.is_ratio:
         line["customdata"] = encode(100.0 * np.abs(curve.ratios))
         hover += f", %{{customdata:.1f}} % ({panel.ratio_title})"
-    line["hovertemplate"] = f"{hover}<extra>{_escape(curve.name)}</extra>"
+    # Plotly must not read names as markup.
+    name = curve.name.replace("&", "&amp;").replace("<", "&lt;").replace("%{", "% {")
+    line["hovertemplate"] = f"{hover}<extra>{name}</extra>"
     traces = [line]
     for limit in (curve.lower, curve.upper):
         if not np.isfinite(limit).any():
@@ -132,14 +138,13 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
     is_last = np.append(np.diff(ratios.t) > 0.0, True)
     t = ratios.t[is_last]
-    part = np.empty((len(entries), len(t)))
+    shown = [columns[entry.label] for entry in entries]
+    part = np.abs(ratios.values[is_last][:, shown].T)
     colours = part.copy()
-    for row, entry in enumerate(entries):
-        part[row] = np.abs(ratios.values[is_last, columns[entry.label]])
-        colours[row] = part[row]
+    for row, entry in zip(colours, entries, strict=True):
         for active in entry.active:  # ripple included
             inside = (t >= active.begin) & (t <= active.end)
-            colours[row, inside] = np.maximum(colours[row, inside], THRESHOLD)
+            row[inside] = np.maximum(row[inside], THRESHOLD)
     top = 1.1
     active_from = THRESHOLD / top
     beyond = (1.0 + tolerance) / top
@@ -149,7 +154,7 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     heat = {
         "type": "heatmap",
         "x": encode(t),
-        "y": [f"{entry.label}" for entry in entries],
+        "y": [str(entry.label) for entry in entries],
         "z": encode(np.minimum(colours, top)),
         "customdata": encode(100.0 * part),
         "zmin": 0.0,
@@ -179,17 +184,10 @@ def _layout(trajectory: Trajectory, height: int) -> dict[str, Any]:
 
     Dotted lines are where phases meet.
     """
+    look = {"color": style.GREY, "width": 1, "dash": "dot"}
+    up = {"type": "line", "yref": "paper", "y0": 0.0, "y1": 1.0, "line": look}
     lines = [
-        {
-            "type": "line",
-            "x0": phase.end,
-            "x1": phase.end,
-            "yref": "paper",
-            "y0": 0.0,
-            "y1": 1.0,
-            "line": {"color": style.GREY, "width": 1, "dash": "dot"},
-        }
-        for phase in trajectory.phases[:-1]
+        {**up, "x0": phase.end, "x1": phase.end} for phase in trajectory.phases[:-1]
     ]
     return {
         "shapes": lines,
@@ -203,18 +201,6 @@ def _layout(trajectory: Trajectory, height: int) -> dict[str, Any]:
         },
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
     }
-
-
-def _dash(linestyle: object) -> str:
-    """Write Matplotlib's line style as Plotly's."""
-    if not isinstance(linestyle, tuple):
-        return "solid"
-    return ",".join(f"{1.8 * length:.1f}px" for length in linestyle[1])
-
-
-def _escape(name: str) -> str:
-    """Keep Plotly from reading names as markup."""
-    return name.replace("&", "&amp;").replace("<", "&lt;").replace("%{", "% {")
 
 
 def scene(motion: ReportedMotion) -> dict[str, Any]:
@@ -234,11 +220,17 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
     panels = panels_of(trajectory, samples, *rows, degrees=motion.degrees)
     joints = []
     for name, unit in zip(robot.joint_names, robot.position_units, strict=True):
+        quantities = []
+        for panel, curve in curves_of(panels, name):
+            entry: dict[str, Any] = {"unit": panel.unit, "values": encode(curve.values)}
+            if curve.is_limited:
+                entry["ratios"] = encode(np.abs(curve.ratios))
+            quantities.append(entry)
         joint = {
             "name": name,
             "redundant": name in trajectory.redundant_joints,
             "prismatic": unit == "m",
-            "quantities": [_quantity(*each) for each in curves_of(panels, name)],
+            "quantities": quantities,
         }
         joints.append(joint)
     return {
@@ -255,11 +247,3 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
             "beyond": 1.0 + trajectory.task.refinement.tolerance,
         },
     }
-
-
-def _quantity(panel: Panel, curve: Curve) -> dict[str, Any]:
-    """Write the values of one joint, and how much of its limit they use."""
-    entry = {"unit": panel.unit, "values": encode(curve.values)}
-    if curve.is_limited:
-        entry["ratios"] = encode(np.abs(curve.ratios))
-    return entry

@@ -108,33 +108,28 @@ def make_report(
     plotly = _plotly()
     reported = reported_motion(motion, degrees=degrees)
     checks = tables.check_rows(reported)
+    parts = {
+        "motion": motion_figure(reported),
+        "timeline": timeline_figure(reported),
+        "scene": scene(reported),
+    }
+    data = json.dumps(parts, allow_nan=False, separators=(",", ":"))
     page = template.render(
         title=title or reported.trajectory.robot.name or "motion",
-        verified=reported.verification.passed,
-        points=reported.verification.points,
-        failed=[check for check in checks if not check.passed],
+        motion=reported,
+        failed=[check for check in checks if not check["passed"]],
         checks=checks,
         figures=tables.figures_of_merit(reported),
         what_limits=tables.what_limits(reported),
         joints=tables.joint_rows(reported),
         phase_columns=(*PHASE_COLUMNS, "active limits"),
         phases=tables.phases_with_limits(reported),
-        held_back=reported.held_back,
-        remarks=reported.remarks,
-        not_completed=reported.not_completed,
-        guarantees=reported.guarantees,
         identity=tables.identity(reported),
         kinds=joint_rows_of(reported.trajectory),
         pictures=list(_pictures(reported)),
         task=tables.task_text(reported.trajectory.task),
         versions=tables.versions(),
-        data=_json(
-            {
-                "motion": motion_figure(reported),
-                "timeline": timeline_figure(reported),
-                "scene": scene(reported),
-            }
-        ),
+        data=data.replace("<", "\\u003c"),  # no text ends the script element
         plotly=plotly,
         style=_part("page.css"),
         program=_part("page.js"),
@@ -153,12 +148,6 @@ def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
     if any(fit.profile for fit in trajectory.task.fits):
         caption = "How far the points are from the path that was fitted to them"
         yield caption, as_html(plot_fit(trajectory))
-
-
-def _json(data: dict[str, Any]) -> str:
-    """Write data for a script element, which no text in it can end."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
 
 
 def _part(name: str) -> str:

@@ -21,7 +21,6 @@ from brachis.optimise.candidate import coordinates
 from brachis.robot.from_task import in_use
 from brachis.task import Task
 from brachis.trajectory import phase_rows
-from brachis.verify import Check
 
 NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
@@ -138,9 +137,9 @@ def describe_path(task: Task) -> str:
             if isinstance(given, dict):
                 entries = [_entry(key, value) for key, value in given.items()]
                 found.append(f"{shape.replace('_', ' ')} ({', '.join(entries)})")
+    text = ", then ".join(found[:_LISTED])
     rest = len(found) - _LISTED
-    more = f", and {rest} more" if rest > 0 else ""
-    return ", then ".join(found[:_LISTED]) + more
+    return f"{text}, and {rest} more" if rest > 0 else text
 
 
 def _entry(key: str, value: object) -> str:
@@ -182,13 +181,14 @@ def _file_name(text: str) -> str:
 
 def what_limits(motion: ReportedMotion) -> str:
     """Name the limits that are active longest, in one sentence."""
-    active = [entry for entry in motion.saturations if entry.active][:3]
     shares = [
-        f"{entry.label} ({100.0 * entry.share:.0f} % of the time)" for entry in active
+        f"{entry.label} ({100.0 * entry.share:.0f} % of the time)"
+        for entry in motion.saturations
+        if entry.active
     ]
     if not shares:
         return "No limit is active."
-    return f"At its limits longest: {', '.join(shares)}."
+    return f"At its limits longest: {', '.join(shares[:3])}."
 
 
 def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
@@ -226,64 +226,48 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
 
 def _peak(panel: Panel, curve: Curve, tolerance: float) -> Row:
     """Find the value of a joint that is nearest to its limit, or without a limit the largest one."""
-    values = curve.values
     if not curve.is_limited:
-        largest = values[np.argmax(np.abs(values))]
-        return Row(_write_value(largest, panel.unit), "", "", "")
+        largest = curve.values[np.argmax(np.abs(curve.values))]
+        return Row(f"{_write_number(largest)} {panel.unit}", "", "", "")
     ratios = np.abs(curve.ratios)
+    worst = np.argmax(ratios)
+    share = ratios[worst]
     limit = f"{_write_number(float(curve.upper))} {panel.unit}"
     if curve.upper != -curve.lower:
         limit = f"{_write_number(float(curve.lower))} to {limit}"
+    edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", NEAR))
     return Row(
-        value=_write_value(values[np.argmax(ratios)], panel.unit),
+        value=f"{_write_number(curve.values[worst])} {panel.unit}",
         limit=limit,
-        share=f"{100.0 * ratios.max():.1f} %",
-        level=_level(float(ratios.max()), tolerance),
+        share=f"{100.0 * share:.1f} %",
+        level=next((level for level, edge in edges if share >= edge), ""),
     )
-
-
-def _write_value(value: float, unit: str) -> str:
-    """Write a value with its unit, rounding noise as zero."""
-    return f"{_write_number(value if abs(value) > 1e-9 else 0.0)} {unit}"
 
 
 def _write_number(value: float) -> str:
-    """Write a number with four significant figures, large ones without an exponent."""
+    """Write a number with four significant figures, large ones without an exponent, rounding noise as zero."""
+    if abs(value) <= 1e-9:
+        return "0"
     return f"{value:.0f}" if 1e4 <= abs(value) < np.inf else f"{value:.4g}"
 
 
-def _level(share: float, tolerance: float) -> str:
-    """Grade how near a value is to its limit."""
-    edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", NEAR))
-    return next((level for level, edge in edges if share >= edge), "")
-
-
-@dataclass(frozen=True)
-class CheckRow:
-    """One check of the verification in words."""
-
-    name: str
-    found: str
-    allowed: str
-    where: str
-    passed: bool
-    remark: str
-
-
-def check_rows(motion: ReportedMotion) -> list[CheckRow]:
-    """List the checks of the verification, those that failed first."""
-    checks = sorted(motion.verification.checks, key=lambda check: check.passed)
-    return [_check_row(check, degrees=motion.degrees) for check in checks]
-
-
-def _check_row(check: Check, *, degrees: bool) -> CheckRow:
-    found, allowed, unit = check.figures(degrees=degrees)
-    after = "" if unit == "-" else f" {unit}"
-    time = "" if check.time is None else f"{check.time:.4f} s"
-    where = " at ".join(filter(None, (check.subject, time)))
-    return CheckRow(
-        check.name, found + after, allowed + after, where, check.passed, check.remark
-    )
+def check_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
+    """List the checks of the verification in words, those that failed first."""
+    rows = []
+    for check in sorted(motion.verification.checks, key=lambda check: check.passed):
+        found, allowed, unit = check.figures(degrees=motion.degrees)
+        after = "" if unit == "-" else f" {unit}"
+        time = "" if check.time is None else f"{check.time:.4f} s"
+        row = {
+            "name": check.name,
+            "found": found + after,
+            "allowed": allowed + after,
+            "where": " at ".join(filter(None, (check.subject, time))),
+            "passed": check.passed,
+            "remark": check.remark,
+        }
+        rows.append(row)
+    return rows
 
 
 def versions() -> dict[str, str]:
