@@ -8,12 +8,12 @@ from __future__ import annotations
 import shutil
 import signal
 import stat
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import brachis
@@ -47,14 +47,6 @@ _BEGINNINGS = {
 }
 
 
-def beginnings_of(suffix: str) -> tuple[bytes, ...]:
-    """Return how files of a suffix begin that brachis wrote; a file that begins otherwise is never overwritten."""
-    from brachis.apps.export.formats import FORMATS
-
-    exported = [form.beginnings for form in FORMATS.values() if form.suffix == suffix]
-    return sum(exported, _BEGINNINGS.get(suffix, ()))
-
-
 def check_output(
     out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]
 ) -> None:
@@ -73,6 +65,8 @@ def check_output(
     ------
     InputError
     """
+    from brachis.apps.export.formats import FORMATS
+
     with writing_errors(out):
         status = status_of(out)
     if status is None or not stat.S_ISREG(status.st_mode):
@@ -95,7 +89,8 @@ def check_output(
             found=f"suffix {suffix}" if suffix else "no suffix",
             allowed=f"a new file, or one that ends in {' or '.join(allowed)}",
         )
-    known = beginnings_of(suffix)
+    exported = [form.beginnings for form in FORMATS.values() if form.suffix == suffix]
+    known = sum(exported, _BEGINNINGS.get(suffix, ()))
     with writing_errors(out), out.open("rb") as stream:
         beginning = stream.read(max(map(len, known)))
     if beginning and not beginning.startswith(known):
@@ -209,15 +204,11 @@ def end_cleanly() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGTERM, _leave)
+    before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         yield
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
-
-
-def _leave(number: int, _frame: FrameType | None) -> None:
-    raise SystemExit(128 + number)
 
 
 _UNVERIFIED = {
@@ -229,15 +220,15 @@ _UNVERIFIED = {
 """Names of files of a motion that is not verified; all others get the prefix ``unverified_``."""
 
 
-def _name_files(names: Iterable[str], *, verified: bool) -> list[str]:
-    """Return the names of files of a motion."""
+def _name_files(names: Iterable[str], *, verified: bool) -> dict[str, str]:
+    """Return the names of a motion's files, by those of one that is verified."""
     if verified:
-        return list(names)
-    return [_UNVERIFIED.get(name, f"unverified_{name}") for name in names]
+        return {name: name for name in names}
+    return {name: _UNVERIFIED.get(name, f"unverified_{name}") for name in names}
 
 
 def make_folder(
-    out: Path | None, names: Sequence[str], inputs: Iterable[Path | None]
+    out: Path | None, names: Sequence[str], inputs: Sequence[Path | None]
 ) -> None:
     """Make the folder for a motion's files, and refuse what `check_output` refuses; without a folder do nothing.
 
@@ -255,10 +246,8 @@ def make_folder(
         raise InputError(
             "the folder cannot be made", where=str(out), found=found
         ) from error
-    inputs = tuple(inputs)
-    for verified in (True, False):
-        for name in _name_files(names, verified=verified):
-            check_output(out / name, (Path(name).suffix,), inputs)
+    for name in (*names, *_name_files(names, verified=False).values()):
+        check_output(out / name, (Path(name).suffix,), inputs)
 
 
 def finish(
@@ -297,36 +286,31 @@ def finish(
     """
     failures: list[InputError] = []
     if out is not None:
-        files: dict[str, Writer] = {}
-        drawings: dict[str, Writer] = {}
-        stale = set(_name_files(names, verified=not verified))
-        for name, own in zip(names, _name_files(names, verified=verified), strict=True):
-            if name in results:
-                files[own] = results[name]
-            elif name in figures:
-                drawings[own] = partial(_draw, figures[name])
-            elif name.endswith(".json"):
-                files[own] = lambda path: write_text(json_text(data), path)
-            else:
-                stale.add(own)
-        data["files"], failures = write_files(
-            out, files, drawings, stale=stale - {*files}
-        )
+        own = _name_files(names, verified=verified)
+        files = {own[name]: write for name, write in results.items()}
+        (data_file,) = (own[name] for name in names if name.endswith(".json"))
+        files[data_file] = lambda path: write_text(json_text(data), path)
+        drawings = {own[name]: partial(draw, make) for name, make in figures.items()}
+        others = _name_files(names, verified=not verified)
+        stale = {*own.values(), *others.values()} - {*files}
+        data["files"], failures = write_files(out, files, drawings, stale=stale)
     if show is None:
         print_json(data)
     else:
         show()
         print_lines(*(f"wrote {name}" for name in data.get("files", ())))
-    if result is not None and result.interrupted:
-        print_error("the search was ended early; this is the best motion so far")
-    for each in result.not_completed if result is not None else ():
-        print_error(f"not completed: {each}")
+    if result is not None:
+        if result.interrupted:
+            print_error("the search was ended early; this is the best motion so far")
+        for each in result.not_completed:
+            print_error(f"not completed: {each}")
     if not verified:
         print_error(f"the motion found did not pass the verification; {complaint}")
     return exit_code(verified, failures)
 
 
-def _draw(make: Drawing, path: Path) -> None:
+def draw(make: Drawing, path: Path) -> None:
+    """Draw a figure and write it."""
     brachis.plots.save_figure(make(), path)
 
 

@@ -7,7 +7,7 @@ import math
 import os
 import sys
 import webbrowser
-from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +16,7 @@ from typer import Argument, Option
 
 import brachis
 from brachis.apps.cli.app import Degrees, Json, Verbosity, get_verbosity, motion_file
-from brachis.apps.cli.folder import write_one, write_text
+from brachis.apps.cli.folder import draw, write_one, write_text
 from brachis.apps.cli.output import (
     json_text,
     print_error,
@@ -107,12 +107,16 @@ def export(
     settings = formats.format_of(out, form)
     names = None if joints is None else [name.strip() for name in joints.split(",")]
 
-    def write(path: Path) -> None:
-        formats.write(
-            trajectory, path, form=form, dt=dt, last=last, joints=names, slower=slower
-        )
-
-    _write_motion(out, write, (settings.suffix,), result, trajectory)
+    write = partial(
+        formats.write,
+        trajectory,
+        form=form,
+        dt=dt,
+        last=last,
+        joints=names,
+        slower=slower,
+    )
+    write_one(out, write, (settings.suffix,), _inputs(result, trajectory))
     period = settings.dt if dt is None else dt
     if period > trajectory.t_end:
         print_error(
@@ -140,11 +144,9 @@ def plot(
     check_suffix(out)
     result, trajectory = _load(result)
 
-    def write(path: Path) -> None:
-        plots.save_figure(plots.PLOTS[kind](trajectory), path)
-
+    write = partial(draw, partial(plots.PLOTS[kind], trajectory))
     suffixes = [f".{suffix}" for suffix in SUFFIXES]
-    _write_motion(out, write, suffixes, result, trajectory)
+    write_one(out, write, suffixes, _inputs(result, trajectory))
     print_lines(f"wrote {out}")
 
 
@@ -166,7 +168,7 @@ def report(
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
     page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
-    _write_motion(out, page.save, (".html",), result, trajectory)
+    write_one(out, page.save, (".html",), _inputs(result, trajectory))
     print_lines(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
         print_error(
@@ -181,17 +183,10 @@ def _load(result: Path) -> tuple[Path, Trajectory]:
     return result, brachis.Trajectory.load(result)
 
 
-def _write_motion(
-    out: Path,
-    write: Callable[[Path], object],
-    suffixes: Sequence[str],
-    result: Path,
-    trajectory: Trajectory,
-) -> None:
-    """Write one file that is made of a motion, not over the motion or its URDF."""
+def _inputs(result: Path, trajectory: Trajectory) -> list[Path]:
+    """Return the files that nothing made of a motion may overwrite: the motion's and its URDF."""
     urdf = trajectory.task.robot.urdf
-    inputs = (result, None if urdf is None else Path(urdf))
-    write_one(out, write, suffixes, inputs)
+    return [result, Path(urdf)] if urdf else [result]
 
 
 def view(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,6 +24,7 @@ from brachis.apps.cli.app import (
 from brachis.apps.cli.folder import (
     Drawing,
     Writer,
+    draw,
     end_cleanly,
     exit_code,
     finish,
@@ -122,7 +124,6 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
     branch = result.family
     if trajectory.branch not in {"", branch}:
         branch = f"{trajectory.branch} ({branch})"
-    iterations = sum(report.iterations for report in candidate.reports)
     solves = write_count(len(candidate.reports), "solve")
     least_motion = result.least_motion
     rows = {
@@ -133,7 +134,7 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         "end posture": _posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
-        "iterations": f"{iterations} in {solves} (refined to {candidate.collocation_points} collocation points)",
+        "iterations": f"{data['iterations']} in {solves} (refined to {data['collocation_points']} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",
         "least motion": "off" if least_motion is None else least_motion.status,
         "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
@@ -147,10 +148,9 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         )
     print_table("plan", ("", ""), rows.items())
     if len(trajectory.phases) > 1:
-        phases = phase_rows(trajectory.phases)
-        print_table("phases", PHASE_COLUMNS, phases)
+        print_table("phases", PHASE_COLUMNS, phase_rows(trajectory.phases))
     print_lines(*(f"path from {fit}" for fit in result.fits))
-    if len(data["candidates"]) > 1:
+    if len(result.candidates) > 1:
         _print_candidates(data["candidates"])
     print_verification(result.verification, degrees=degrees)
 
@@ -160,9 +160,8 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     from brachis.robot.joints import shown_unit
 
     parts = []
-    for name, value, si_unit in zip(
-        data["joint_names"], data[key], data["position_units"], strict=True
-    ):
+    columns = (data["joint_names"], data[key], data["position_units"])
+    for name, value, si_unit in zip(*columns, strict=True):
         unit, factor = shown_unit(si_unit, degrees=degrees)
         parts.append(f"{name} {factor * value:.4f} {unit}")
     return ", ".join(parts)
@@ -173,10 +172,11 @@ def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
     from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
 
     rows = candidate_rows(candidates)[:40]
-    others = len(candidates) - len(rows)
-    more = f", {others} of them in the JSON only" if others else ""
-    title = f"candidates ({len(candidates)}{more})"
-    print_table(title, (*WORDS, *TIMES, STATUS), rows, numbers=TIMES)
+    count = str(len(candidates))
+    if len(candidates) > len(rows):
+        count += f", {len(candidates) - len(rows)} of them in the JSON only"
+    columns = (*WORDS, *TIMES, STATUS)
+    print_table(f"candidates ({count})", columns, rows, numbers=TIMES)
 
 
 def bottleneck(
@@ -317,9 +317,7 @@ def sweep(
     verified = result.count(VERIFIED) > 0
     figures: dict[str, Writer] = {}
     if result.varied and verified:
-        figures["sweep.png"] = lambda path: brachis.plots.save_figure(
-            result.plot(), path
-        )
+        figures["sweep.png"] = partial(draw, result.plot)
     drawn, failures = write_files(result.folder, {}, figures, stale=("sweep.png",))
     files = [*map(str, result.files), *drawn]
     if json:
@@ -339,12 +337,14 @@ def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
         f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
     )
     title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
-    shown = [name for name in ("best", "median", "worst") if name in found]
-    if shown:
-        rows = []
-        for key in ("t_end_s", "plan", *result.keys):
-            heading = "t_end [s]" if key == "t_end_s" else key
-            rows.append((heading, *(_write_value(found[name][key]) for name in shown)))
+    if "best" in found:
+        shown = ("best", "median", "worst")
+        headings = {"t_end_s": "t_end [s]", "plan": "plan"}
+        headings |= {key: key for key in result.keys}
+        rows = [
+            (heading, *(_write_value(found[name][key]) for name in shown))
+            for key, heading in headings.items()
+        ]
         print_table(title, ("", *shown), rows, numbers=shown)
     else:
         print_lines(title)

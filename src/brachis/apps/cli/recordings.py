@@ -21,7 +21,6 @@ from brachis.apps.cli.output import (
 
 if TYPE_CHECKING:
     from brachis.apps.comparison import Comparison
-    from brachis.trajectory import Trajectory
 
 _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")
 """The recorded motion, the plan, the figures and the drawing."""
@@ -99,7 +98,14 @@ def import_(
     """Turn a recorded motion into a result file."""
     from brachis.apps.comparison import bound_ratios
 
-    trajectory = _load(csv, robot, task_space, angle, length, time, tolerance, noise)
+    trajectory = brachis.import_motion(
+        csv,
+        str(robot),
+        task_space=task_space_of(task_space),
+        units=_units(angle=angle, length=length, time=time),
+        tolerance=tolerance,
+        noise=noise,
+    )
     write_one(out, trajectory.save, (".npz",), (csv, robot))
     verification = brachis.verify_trajectory(trajectory)
     recovered = trajectory.recovered
@@ -155,10 +161,16 @@ def compare(
 
     make_folder(out, _FILES, (csv, robot))
     with show_progress() as listener:
-        trajectory = _load(
-            csv, robot, task_space, angle, length, time, tolerance, noise
+        found = brachis.compare(
+            csv,
+            str(robot),
+            task_space=task_space_of(task_space),
+            units=_units(angle=angle, length=length, time=time),
+            tolerance=tolerance,
+            noise=noise,
+            keep_end=keep_end,
+            listener=listener,
         )
-        found = brachis.compare(trajectory, keep_end=keep_end, listener=listener)
     code = finish(
         found.to_dict(),
         {"today.npz": found.recorded.save, "result.npz": found.result.trajectory.save},
@@ -173,26 +185,9 @@ def compare(
     raise typer.Exit(code)
 
 
-def _load(
-    file: Path,
-    robot: Path,
-    task_space: str | None,
-    angle: str | None,
-    length: str | None,
-    time: str | None,
-    tolerance: float | None,
-    noise: float | None,
-) -> Trajectory:
-    """Import a recorded motion."""
-    units = {"angle": angle, "length": length, "time": time}
-    return brachis.import_motion(
-        file,
-        str(robot),
-        task_space=task_space_of(task_space),
-        units={name: unit for name, unit in units.items() if unit is not None},
-        tolerance=tolerance,
-        noise=noise,
-    )
+def _units(**units: str | None) -> dict[str, str]:
+    """Return the units that the user states."""
+    return {name: unit for name, unit in units.items() if unit is not None}
 
 
 def _print_comparison(found: Comparison) -> None:
@@ -204,9 +199,9 @@ def _print_comparison(found: Comparison) -> None:
     if not found.proven:
         kept = "not known"
     verified = "kept and verified" if found.result.verified else "NOT verified"
-    times = [f"{t_end:.4f} s" for t_end in (found.recorded.t_end, found.result.t_end)]
-    rows = [("end time t_E", times[0], "", times[1])]
-    rows += [
+    recorded = f"{found.recorded.t_end:.4f} s"
+    planned = f"{found.result.t_end:.4f} s"
+    uses = [
         (
             f"{use.limit}, used",
             f"{100 * use.recorded:.2f} % {use.recorded_at}",
@@ -215,8 +210,9 @@ def _print_comparison(found: Comparison) -> None:
         )
         for use in found.uses
     ]
-    rows.append(("limits", kept, "", verified))
+    first = ("end time t_E", recorded, "", planned)
+    last = ("limits", kept, "", verified)
     columns = ("", "recorded", "between its rows up to", "planned")
-    print_table("", columns, rows, numbers=columns[1:])
+    print_table("", columns, [first, *uses, last], numbers=columns[1:])
     assert found.recorded.recovered is not None
     print_lines(*found.remarks, *found.recorded.recovered.told)

@@ -29,34 +29,26 @@ from brachis.errors import InputError
 def list_robots(json: Json = False) -> None:
     """List the included robots."""
     robots = brachis.robots
-    listed = [
-        {
-            "name": name,
-            "what": _describe_robot(robots.path_of(name)),
-            "joints": list(getattr(robots, name).joint_names),
-            "urdf": str(robots.path_of(name)),
-        }
-        for name in robots.names()
-    ]
+    listed = []
+    rows = []
+    for name in robots.names():
+        urdf = robots.path_of(name)
+        page = urdf.with_name("README.md").read_text(encoding="utf-8")
+        what = page.splitlines()[0].partition(": ")[
+            2
+        ]  # the heading "# name: what it is"
+        joints = list(getattr(robots, name).joint_names)
+        listed.append({"name": name, "what": what, "joints": joints, "urdf": str(urdf)})
+        rows.append((name, what, len(joints), ", ".join(joints)))
     if json:
         print_json({"robots": listed})
         return
     columns = ("name", "what it is", "joints", "their names")
-    rows = [
-        (each["name"], each["what"], len(each["joints"]), ", ".join(each["joints"]))
-        for each in listed
-    ]
     print_table("included robots", columns, rows, numbers=("joints",))
     print_lines(
         *(f"{each['name']}: {each['urdf']}" for each in listed),
         "A name may stand for the URDF: brachis inspect scara3, brachis new scara3",
     )
-
-
-def _describe_robot(urdf: Path) -> str:
-    """Read what a robot is from the heading of its page, ``# name: what it is``."""
-    heading = urdf.with_name("README.md").read_text(encoding="utf-8").partition("\n")[0]
-    return heading.partition(": ")[2]
 
 
 def new(
