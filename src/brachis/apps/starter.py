@@ -6,9 +6,10 @@ Limits that a plan needs and the URDF does not state get placeholders, which the
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from brachis.robot.limits import UrdfLimit
 from brachis.robot.task_map.protocol import AXES
 from brachis.robot.urdf import default_chain, read_chain, read_file
 from brachis.task import LimitSpec, load_task
+from brachis.task.fields import plain
 from brachis.task.yaml_reader import read_yaml
 
 _INNER = 0.15
@@ -179,12 +181,7 @@ def placeholders(names: Sequence[str], stated: Sequence[UrdfLimit]) -> LimitSpec
     Limits of zero, and a range from zero to zero, are what exporters write for a missing limit. Without a torque a
     joint gets a limit of acceleration, since its time would go to zero otherwise.
     """
-    given: dict[str, dict[str, Any]] = {
-        "torque": {},
-        "acceleration": {},
-        "velocity": {},
-        "position": {},
-    }
+    given: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     for name, limit in zip(names, stated, strict=True):
         if not limit.effort:
             given["torque"][name] = None
@@ -194,7 +191,7 @@ def placeholders(names: Sequence[str], stated: Sequence[UrdfLimit]) -> LimitSpec
         is_empty = limit.lower is not None and limit.lower == limit.upper
         if limit.needs_range or is_empty:
             given["position"][name] = (-1.5, 1.5)  # rad or m
-    return LimitSpec(**{kind: values for kind, values in given.items() if values})  # type: ignore[arg-type]
+    return LimitSpec(**given)  # type: ignore[arg-type]
 
 
 def spaces(robot: Robot) -> Iterator[str | list[str]]:
@@ -298,14 +295,9 @@ def _joint(robot: Robot, i: int, position: float) -> str:
 def _limits(robot: Robot, limits: LimitSpec) -> str:
     """Write the placeholders, or how to change limits if none are needed."""
     lines = []
-    for each in fields(limits):
-        values = getattr(limits, each.name)
+    for kind, values in vars(limits).items():
         if isinstance(values, dict):
-            plain = {
-                name: list(value) if isinstance(value, tuple) else value
-                for name, value in values.items()
-            }
-            lines.append(f"    {each.name}: {_inline(plain)}")
+            lines.append(f"    {kind}: {_inline(plain(values))}")
     if lines:
         return "\n".join([_PLACEHOLDERS, *lines])
     return _OWN_LIMITS.format(

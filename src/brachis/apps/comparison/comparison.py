@@ -18,11 +18,10 @@ from brachis.common.arguments import check_callable, check_keywords, file_name
 from brachis.common.progress import Listener
 from brachis.common.summary import Summary
 from brachis.errors import PathError, PlanningError
-from brachis.planner import plan
+from brachis.planner import Given, plan
 from brachis.result import Result
-from brachis.robot import Robot
 from brachis.robot.task_map import JOINTS
-from brachis.task import SplineSettings, Task
+from brachis.task import Source, Task
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification, verify_trajectory
 
@@ -205,9 +204,9 @@ class Comparison(Summary):
 @check_keywords
 def compare(
     recorded: str | os.PathLike[str] | Trajectory,
-    robot: str | os.PathLike[str] | Robot | Task | None = None,
+    robot: Given = None,
     *,
-    task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
+    task: Source | None = None,
     task_space: str | Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
     tolerance: float | None = None,
@@ -290,8 +289,7 @@ def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
     yield task
     if task.spline.intervals != "auto":
         finer = min(10_000, 3 * task.spline.intervals)
-        settings = {**task.spline.model_dump(), "intervals": finer}
-        spline = SplineSettings.model_validate(settings)
+        spline = task.spline.model_copy(update={"intervals": finer})
         task = task.model_copy(update={"spline": spline})
         yield task
     if task.task_space != JOINTS:

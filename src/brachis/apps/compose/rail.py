@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from lxml import etree
 
 from brachis.apps.compose import elements
 from brachis.apps.compose.elements import Element
@@ -41,24 +40,6 @@ _FIGURES: dict[str, tuple[str, tuple[int, ...], Callable[[np.ndarray], Any]]] = 
     "carriage_size": ("three lengths > 0 m", (3,), _is_positive),
 }
 """Figures of a rail: what is allowed, the shape, and a test of values, which have to be finite too."""
-
-
-def rename_link(robot: Element, old: str, new: str) -> None:
-    """Give a link another name wherever the URDF mentions it."""
-    for element in robot.iter(etree.Element):
-        if element.tag == "link" and element.get("name") == old:
-            element.set("name", new)
-        for attribute in ("link", "reference"):
-            if element.get(attribute) == old:
-                element.set(attribute, new)
-
-
-def drop_meshes(robot: Element) -> None:
-    """Remove every visual and collision whose geometry is a mesh; primitives stay."""
-    for link in robot.findall("link"):
-        for element in (*link.findall("visual"), *link.findall("collision")):
-            if element.find("geometry/mesh") is not None:
-                link.remove(element)
 
 
 def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
@@ -147,8 +128,7 @@ class Rail:
             if figure == "axis":
                 value /= np.abs(value).max()  # squares of its size may overflow
                 value /= np.linalg.norm(value)
-            plain = value.tolist()
-            plain = tuple(plain) if shape else plain
+            plain = tuple(value.tolist()) if shape else float(value)
             object.__setattr__(self, figure, plain)
         for figure in ("name", "root"):
             given = getattr(self, figure)
@@ -166,9 +146,13 @@ class Rail:
         """Put the arm, whose XML is changed, on the carriage, and return the URDF's text."""
         root = f"{self.name}_base" if arm.root == self.root else arm.root
         self._check_names(arm, source, root)
-        rename_link(arm.robot, arm.root, root)
+        for mention in arm.robot.xpath("//link/@name | //@link | //@reference"):
+            if mention == arm.root:
+                mention.getparent().set(mention.attrname, root)
         if not meshes:
-            drop_meshes(arm.robot)
+            drawn = "link/*[self::visual or self::collision]"
+            for element in arm.robot.xpath(f"{drawn}[geometry/mesh]"):
+                element.getparent().remove(element)
         relocate_meshes(arm.robot, source, target)
         arm.robot.set("name", f"{arm.robot.get('name') or source.stem}_{self.name}")
         for place, element in enumerate(self._elements(root)):

@@ -91,12 +91,10 @@ def rows_of(
     """
     names = trajectory.joint_names
     real = trajectory.robot.urdf_joints
-    chosen = list(real)
-    if joints is not None:
-        chosen = list(joints)
-    unknown = [name for name in chosen if name not in names]
-    if unknown:
-        raise UnknownNameError("joint", unknown[0], names, where="joints")
+    chosen = list(real if joints is None else joints)
+    for name in chosen:
+        if name not in names:
+            raise UnknownNameError("joint", name, names, where="joints")
     index = [names.index(name) for name in chosen]
     samples = trajectory.sample(dt, last=last)
     left_out = []

@@ -14,8 +14,6 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 import brachis
 from brachis import planner
 from brachis.apps.sweeps.settings import SweepSettings
@@ -33,9 +31,8 @@ from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
 from brachis.robot.urdf import read_file
 from brachis.task import Task, with_keys
-from brachis.task.fields import plain
 from brachis.task.load import LARGEST_TASK, task_from
-from brachis.task.messages import show, task_error
+from brachis.task.messages import show, validate
 from brachis.task.yaml_reader import read_yaml
 
 
@@ -165,10 +162,7 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         )
     if isinstance(content.get("task"), Task):
         content = {**content, "task": content["task"].to_dict()}
-    try:
-        settings = SweepSettings.model_validate(plain(content))
-    except ValidationError as error:
-        raise task_error(error, name, SweepSettings) from None
+    settings = validate(SweepSettings, content, name)
     base: object = settings.task
     task_name = f"{name}: task"
     if isinstance(base, str):
@@ -231,7 +225,13 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
         if isinstance(plan, BrachisError):
             return plan
         if plan.digest not in unknown:
-            unknown[plan.digest] = _unknown_name(plan)
+            unknown[plan.digest] = None
+            try:
+                Problem.of(robot_of(plan), plan.task)
+            except BrachisError as error:
+                # Other errors depend on values, and other values of the same key may be right.
+                if isinstance(error, UnknownNameError):
+                    unknown[plan.digest] = error
         return unknown[plan.digest]
 
     refused: dict[str, str] = {}
@@ -245,23 +245,8 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
             )
     if refused:
         # One wrong key refuses the plans of all others.
-        named = [key for key in refused if key in refused[key]]
-        key = named[0] if named else next(iter(refused))
+        key = next((key for key in refused if key in refused[key]), next(iter(refused)))
         raise TaskError(refused[key], where=f"{name}: {key}")
-
-
-def _unknown_name(plan: Plan) -> BrachisError | None:
-    """Return the error of a plan that names a joint or frame that the robot does not have.
-
-    Other errors of robot and path depend on values, and other values of the same key may be right.
-    """
-    try:
-        Problem.of(robot_of(plan), plan.task)
-    except UnknownNameError as error:
-        return error
-    except BrachisError:
-        return None
-    return None
 
 
 def robot_of(plan: Plan) -> Robot:
@@ -298,8 +283,8 @@ def run_plan(plan: Plan) -> Outcome:
             motion = path.read_bytes()
     except Exception as error:  # noqa: BLE001  (one of thousands of plans must not end the others)
         return Outcome.of_error(error, time.perf_counter() - began)
-    undone = (f"not completed: {each}" for each in result.not_completed)
-    remarks = [*map(str, result.warnings), *undone]
+    remarks = [str(each) for each in result.warnings]
+    remarks += [f"not completed: {each}" for each in result.not_completed]
     facts = {
         "status": VERIFIED if result.verified else UNVERIFIED,
         "t_end_s": result.t_end,

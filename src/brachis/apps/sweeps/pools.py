@@ -20,11 +20,12 @@ from concurrent.futures import (
 )
 from typing import Any
 
+from brachis.apps.export.rows import require_library
 from brachis.apps.sweeps.plans import Outcome, Plan, run_plan
 from brachis.common import interrupts
 from brachis.common.arguments import count
 from brachis.common.files import is_file
-from brachis.errors import BrachisError, ClusterError, InputError, NotInstalledError
+from brachis.errors import BrachisError, ClusterError, InputError
 
 Outcomes = Generator[tuple[Plan, Outcome], None, None]
 Pool = Callable[[Sequence[Plan]], Outcomes]
@@ -156,13 +157,10 @@ def on_dask(
     ClusterError
         The scheduler does not answer, or was lost.
     """
-    try:
-        from dask.distributed import Client, KilledWorker
-    except ImportError as error:
-        raise NotInstalledError("a Dask cluster", "dask", "cluster") from error
+    dask = require_library("dask.distributed", "a Dask cluster", extra="cluster")
     where = {"scheduler_file" if is_file(address) else "address": address}
     try:
-        client: Any = Client(**where, timeout=_CONNECTING, set_as_default=False)  # type: ignore[no-untyped-call]
+        client = dask.Client(**where, timeout=_CONNECTING, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise ClusterError(
             "no Dask scheduler answers", where=address, found=str(error)
@@ -181,7 +179,7 @@ def on_dask(
                 plans,
                 lambda plan: executor.submit(run_plan, plan),
                 lambda: AHEAD * max(1, sum(client.nthreads().values())),
-                (KilledWorker,),
+                (dask.KilledWorker,),
             )
     except (OSError, CancelledError) as error:
         raise ClusterError(

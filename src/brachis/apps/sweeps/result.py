@@ -12,9 +12,9 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from brachis.apps.export.rows import require_library
 from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED, Outcome
 from brachis.apps.sweeps.settings import SweepSettings
 from brachis.common.files import (
@@ -25,7 +25,7 @@ from brachis.common.files import (
     writing_errors,
 )
 from brachis.common.summary import Summary
-from brachis.errors import InputError, NotInstalledError, UnknownNameError
+from brachis.errors import InputError, UnknownNameError
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -54,23 +54,6 @@ _ABOUT = "sweep.json"
 _MARK = "brachis_sweep"
 
 
-def arrow() -> ModuleType:
-    """Import pyarrow.
-
-    Raises
-    ------
-    NotInstalledError
-        It is not installed.
-    """
-    try:
-        import pyarrow as pa
-        import pyarrow.csv
-        import pyarrow.parquet
-    except ImportError as error:
-        raise NotInstalledError("a sweep", "pyarrow", "sweep") from error
-    return pa
-
-
 class Store:
     """The folder of a sweep.
 
@@ -82,12 +65,13 @@ class Store:
     Raises
     ------
     InputError
-        The folder is not a sweep's, or cannot be written.
+        The folder is not a sweep's, or cannot be written; or, as `NotInstalledError`, pyarrow is not installed.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._arrow = arrow()
+        self._arrow = require_library("pyarrow", "a sweep", extra="sweep")
+        self._parquet = require_library("pyarrow.parquet", "a sweep", extra="sweep")
         with writing_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
             is_foreign = any(folder.iterdir()) and self.read_description() is None
@@ -129,23 +113,22 @@ class Store:
             facts["motion"] = motion.relative_to(self.folder).as_posix()
         schema = self._arrow.schema(COLUMNS.items())
         with atomic_write(part) as stream:
-            self._arrow.parquet.write_table(
-                self._arrow.Table.from_pylist([facts], schema), stream
-            )
+            table = self._arrow.Table.from_pylist([facts], schema)
+            self._parquet.write_table(table, stream)
         return facts
 
     def read(self, digest: str) -> dict[str, Any] | None:
         """Return the columns of a finished plan; None if it is not stored completely."""
         try:
             content = read_file(self._place(digest, ".parquet"))
-            table = self._arrow.parquet.read_table(self._arrow.BufferReader(content))
+            table = self._parquet.read_table(self._arrow.BufferReader(content))
             (facts,) = table.to_pylist()
         except (OSError, ValueError, self._arrow.ArrowException):
             return None
         if set(facts) != set(COLUMNS):
             return None
         motion = facts["motion"]
-        return None if motion and not is_file(self.folder / motion) else facts
+        return facts if not motion or is_file(self.folder / motion) else None
 
     def write_table(
         self,
@@ -161,6 +144,8 @@ class Store:
         rows : sequence of (mapping, mapping)
             Values of these keys, and the columns of the outcome.
         """
+        from pyarrow import csv
+
         pa = self._arrow
         columns = {"plan": pa.array(range(len(rows)), "int64")}
         for key in keys:
@@ -168,7 +153,7 @@ class Store:
         for name, kind in COLUMNS.items():
             columns[name] = pa.array([facts[name] for _, facts in rows], kind)
         table = pa.table(columns)
-        writers = (pa.parquet.write_table, pa.csv.write_csv)
+        writers = (self._parquet.write_table, csv.write_csv)
         for name, write in zip(TABLES, writers, strict=True):
             with atomic_write(self.folder / name) as stream:
                 write(table, stream)
@@ -184,7 +169,7 @@ class Store:
         """
         path = self.folder / TABLES[0]
         try:
-            return self._arrow.parquet.read_table(path)
+            return self._parquet.read_table(path)
         except (OSError, self._arrow.ArrowException) as error:
             raise InputError(
                 "the file is not the table of a sweep",
@@ -285,8 +270,7 @@ class SweepResult(Summary):
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the table as a list of rows."""
-        rows: list[dict[str, Any]] = self.table.to_pylist()
-        return rows
+        return list(self.table.to_pylist())
 
     def trajectory(self, plan: int) -> Trajectory:
         """Load the motion of a plan.
@@ -316,10 +300,8 @@ class SweepResult(Summary):
 
     def ranked(self) -> list[dict[str, Any]]:
         """Return the rows of verified plans, the fastest first."""
-        return sorted(
-            (row for row in self.rows() if row["status"] == VERIFIED),
-            key=lambda row: row["t_end_s"],
-        )
+        verified = [row for row in self.rows() if row["status"] == VERIFIED]
+        return sorted(verified, key=lambda row: row["t_end_s"])
 
     def count(self, status: str) -> int:
         """Count the plans of a status: verified, unverified or failed."""
@@ -327,14 +309,11 @@ class SweepResult(Summary):
 
     def failures(self) -> dict[str, tuple[int, str]]:
         """Return, for each class of error, the commonest first, how many plans failed with it, and one message."""
-        failed = [
-            (row["error"], row["message"])
-            for row in self.rows()
-            if row["status"] == FAILED
-        ]
-        counts = collections.Counter(error for error, _ in failed)
+        failed = [row for row in self.rows() if row["status"] == FAILED]
+        counts = collections.Counter(row["error"] for row in failed)
+        messages = {row["error"]: row["message"] for row in failed}
         return {
-            error: (count, dict(failed)[error]) for error, count in counts.most_common()
+            error: (count, messages[error]) for error, count in counts.most_common()
         }
 
     def summary(self) -> dict[str, Any]:
