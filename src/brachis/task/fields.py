@@ -294,11 +294,7 @@ class ByKey:
                 return f"<{type(value).__name__}>"
             if not isinstance(value, Mapping):
                 return None
-            chosen = [
-                tag
-                for tag, keys in required.items()
-                if any(key in value for key in keys)
-            ]
+            chosen = [tag for tag, keys in required.items() if set(keys) & set(value)]
             return chosen[0] if len(chosen) == 1 else None
 
         forms = (f"{{{', '.join(keys)}}}" for keys in required.values())

@@ -196,8 +196,6 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
     TaskError
         A file is missing or wrong; the message names its line.
     """
-    if not any(isinstance(segment, CsvSegment) for segment in task.path):
-        return task
     path: list[Segment] = []
     for i, segment in enumerate(task.path):
         if isinstance(segment, CsvSegment):

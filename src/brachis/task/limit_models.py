@@ -159,8 +159,7 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
     def __post_init__(self) -> None:
         """Take arrays for plain numbers, and a mapping for the scale."""
         if not isinstance(self.scale, LimitScale):
-            given = self.scale or {}
-            factors = {kind: plain(factor) for kind, factor in given.items()}
+            factors: Any = plain(self.scale or {})
             scale = LimitScale().model_copy(update=factors)
             object.__setattr__(self, "scale", scale)
         for each in fields(self):

@@ -289,26 +289,17 @@ def _joints_of(
     from lxml import etree
 
     try:
-        joints = (
-            etree.parse(str(urdf), etree.XMLParser(resolve_entities=False))
-            .getroot()
-            .findall("joint")
-        )
+        tree = etree.parse(str(urdf), etree.XMLParser(resolve_entities=False))
     except (OSError, ValueError, etree.XMLSyntaxError):
         return [], []
-    ends = [(joint, joint.find("parent"), joint.find("child")) for joint in joints]
-    above = {
-        child.get("link"): (joint, parent.get("link"))
-        for joint, parent, child in ends
-        if None not in (parent, child)
-    }
-    leaves = set(above) - {parent for _, parent in above.values()}
+    joints = tree.getroot().findall("joint")
+    above = {joint.xpath("string(child/@link)"): joint for joint in joints}
+    leaves = set(above) - {joint.xpath("string(parent/@link)") for joint in joints}
     link = leaves.pop() if tool is None and len(leaves) == 1 else tool
     moving: list[str] = []
-    for _ in above:
-        if link == base or link not in above:
-            break
-        joint, link = above[link]
+    while link in above and link != base:
+        joint = above.pop(link)
+        link = joint.xpath("string(parent/@link)")
         if joint.get("type") != "fixed":
             moving.append(joint.get("name"))
     return [joint.get("name") for joint in joints], moving

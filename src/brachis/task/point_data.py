@@ -46,28 +46,21 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
     return BeforeValidator(read)
 
 
-_QUANTITY_SCHEMA = WithJsonSchema(
-    {
-        "anyOf": [
-            {"type": "number", "exclusiveMinimum": 0},
-            {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"},
-        ]
-    }
-)
-Length = Annotated[
+_Quantity = Annotated[
     float,
-    _quantity_of(LENGTHS, "0.05 mm"),
     Strict(),
-    Field(ge=1e-7, le=1.0),
-    _QUANTITY_SCHEMA,
+    Field(ge=1e-7),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0},
+                {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"},
+            ]
+        }
+    ),
 ]
-Angle = Annotated[
-    float,
-    _quantity_of(ANGLES, "0.1 deg"),
-    Strict(),
-    Field(ge=1e-7, le=0.5),
-    _QUANTITY_SCHEMA,
-]
+Length = Annotated[_Quantity, Field(le=1.0), _quantity_of(LENGTHS, "0.05 mm")]
+Angle = Annotated[_Quantity, Field(le=0.5), _quantity_of(ANGLES, "0.1 deg")]
 
 
 OrientationWord = Annotated[

@@ -249,8 +249,7 @@ class SplineThrough(Model):
         if not (_are_matrices(through) or _are_matrices(orientations)):
             return content
         poses = poses_of(through, "spline.through", orientations)
-        places = [position for position, _ in poses]
-        turns = [turn for _, turn in poses]
+        places, turns = zip(*poses, strict=True)
         return {**content, "through": places, "orientations": turns}
 
     @model_validator(mode="after")
@@ -458,14 +457,16 @@ class BSplineSegment(MovingSegment):
 
     def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
         """Return the first control point; None where the curve is relative."""
+        if self.bspline.relative:
+            return None
         first = self.bspline.control_points[0]
-        if self.bspline.relative or not of_poses or not self.bspline.has_quaternions:
-            return None if self.bspline.relative else first
-        length = math.hypot(*first[_POSITIONS:]) or 1.0
-        turn = [number / length for number in first[_POSITIONS:]]
-        return ToolPose.model_validate(
-            {"position": first[:_POSITIONS], "quaternion_wxyz": turn}
-        )
+        if not of_poses or not self.bspline.has_quaternions:
+            return first
+        position = first[:_POSITIONS]
+        quaternion = first[_POSITIONS:]
+        length = math.hypot(*quaternion) or 1.0
+        turn = [number / length for number in quaternion]
+        return ToolPose.model_validate({"position": position, "quaternion_wxyz": turn})
 
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> Self:

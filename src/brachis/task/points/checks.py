@@ -62,8 +62,8 @@ class Scatter:
     def __str__(self) -> str:
         """Say what the scatter looks like."""
         spacing = f"at {1e3 * self.spacing:.3g} mm spacing"
-        rounding = np.inf if self.decimals is None else 10.0**-self.decimals
-        if rounding / 12.0**0.5 > self.deviation / 3.0 and np.isfinite(rounding):
+        rounding = 0.0 if self.decimals is None else 10.0**-self.decimals
+        if rounding / 12.0**0.5 > self.deviation / 3.0:
             return f"positions rounded to {rounding:g} m {spacing}"
         return f"positions that scatter by {1e3 * self.deviation:.3g} mm (standard deviation) {spacing}"
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from cmath import phase
 from dataclasses import dataclass, field
-from math import acos, ceil, pi, sqrt
+from math import acos, ceil, nan, pi, sqrt
 from typing import Final
 
 import numpy as np
@@ -47,7 +47,7 @@ class _Machine:
     offset: str = "54"
     ended: bool = False
     absolute: bool = True
-    feed: float = float("nan")
+    feed: float = nan
     skipped: set[str] = field(default_factory=set)
     points: list[Array] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
@@ -86,7 +86,7 @@ def read_gcode(
             allowed="x, y, z",
             where=source,
         )
-    unknown = [float("nan") if name in names else 0.0 for name in POSITION]
+    unknown = [nan if name in names else 0.0 for name in POSITION]
     machine = _Machine(source, np.array(unknown))
     for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
         machine.line = number
@@ -226,7 +226,7 @@ def _move(machine: _Machine, values: dict[str, float]) -> None:
     else:
         places = _arc(machine, start, end, values)
     machine.points.extend(places)
-    speed = float("nan") if machine.motion == "0" else machine.feed
+    speed = nan if machine.motion == "0" else machine.feed
     machine.speeds.extend([speed] * len(places))
     machine.lines.extend([machine.line] * len(places))
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 if TYPE_CHECKING:
     import numpy.typing as npt
     from scipy.spatial.transform import Rotation
@@ -104,7 +106,6 @@ def choices(names: tuple[str, ...] = tuple(CONVENTIONS), suffix: str = "") -> st
 
 def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
     """Return the rotations of orientations, (..., 3) in rad or (..., 4), in one of the `CONVENTIONS`."""
-    import numpy as np
     from scipy.spatial.transform import Rotation
 
     if convention == "quaternion_xyzw":
@@ -118,6 +119,4 @@ def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
 
 def quaternions_of(rotation: Rotation) -> npt.NDArray[Any]:
     """Return the unit quaternions w, x, y, z, (..., 4), one of both, of rotations."""
-    import numpy as np
-
     return np.roll(rotation.as_quat(), 1, axis=-1)
