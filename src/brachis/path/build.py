@@ -113,7 +113,7 @@ def _join(
             rounded = coordinates.blend(curve, curves[i + 1], size, join)
             pieces.append(Piece(rounded, 0.0, rounded.length))
     pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
-    refuse_corners([corner for corner in corners if corner is not None])
+    refuse_corners(corners)
     # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
     return tuple(piece for piece in pieces if piece.length > 1e-11 * piece.curve.length)
 

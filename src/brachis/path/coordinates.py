@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -123,18 +123,21 @@ class RowCoordinates:
         PathError
             The segment has zero length, or does not fit these coordinates.
         """
-        context = SegmentContext(f"path[{index}]", start, self.rows)
+        context = SegmentContext(f"path[{index}].{segment.kind}", start, self.rows)
         found = f"task_space [{', '.join(self.rows)}]"
         hint = "Set task_space: pose"
         if isinstance(segment, TurnSegment):
-            problem = "a turn needs a task space of poses"
             if YAW in self.rows:
                 hint = "Use line: {by: [0, 0, ...]} to turn yaw"
-            raise context.wrong(problem, ".turn", found=found, hint=hint)
+            problem = "a turn needs a task space of poses"
+            raise context.wrong(problem, found=found, hint=hint)
         if segment.orientation is not None:
-            problem = "an orientation along a segment needs a task space of poses"
-            raise context.wrong(problem, ".orientation", found=found, hint=hint)
-        context = replace(context, key=f"{context.key}.{segment.kind}")
+            raise PathError(
+                "an orientation along a segment needs a task space of poses",
+                found=found,
+                where=f"path[{index}].orientation",
+                hint=hint,
+            )
         return BUILDERS[type(segment.shape)](segment.shape, context)
 
 

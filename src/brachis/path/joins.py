@@ -143,12 +143,13 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
     return f"a jump of {np.linalg.norm(after[3] - before[3]):.4g} 1/m^2 in the third derivative"
 
 
-def refuse_corners(corners: Sequence[Corner]) -> None:
+def refuse_corners(corners: Sequence[Corner | None]) -> None:
     """Raise a `PathError` for the first of the corners, naming the others, if there are any."""
-    if not corners:
+    refused = [corner for corner in corners if corner is not None]
+    if not refused:
         return
-    join, found, advice = corners[0]
-    others = ", ".join(other.blend_key for other, *_ in corners[1:])
+    join, found, advice = refused[0]
+    others = ", ".join(other.blend_key for other, *_ in refused[1:])
     raise PathError(
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
