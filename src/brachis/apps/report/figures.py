@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.bottleneck import THRESHOLD
-from brachis.apps.bottleneck.saturation import knot_times
+from brachis.apps.bottleneck.saturation import THRESHOLD, knot_times
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import (
     Curve,
@@ -50,45 +49,32 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     heights = [210 if len(panel.curves) > 2 else 130 for panel in panels]
     ends = 1.0 - np.cumsum([0, *heights]) / sum(heights)
     layout = _layout(trajectory, sum(heights))
+    layout["xaxis"] |= {
+        "anchor": f"y{len(panels)}",
+        "minor": {"tickvals": knot_times(trajectory).tolist()},
+    }
     data = []
     named: set[str] = set()
     for row, panel in enumerate(panels):
         number = "" if row == 0 else str(row + 1)
         layout[f"yaxis{number}"] = {
             "domain": (max(ends[row + 1], 0.0) + 0.012, ends[row] - 0.012),
-            "title": {"text": panel.heading, "standoff": 8},
-            "anchor": "x",
-            "zeroline": True,
+            "title": {"text": panel.heading},
             "range": panel.view(),
         }
         for curve in panel.curves:
             is_new = curve.name in trajectory.joint_names and curve.name not in named
             data += _traces(panel, curve, f"y{number}", is_named=is_new)
             named.add(curve.name)
-    layout["xaxis"] |= {
-        "anchor": f"y{len(panels)}",
-        "minor": {
-            "tickvals": knot_times(trajectory).tolist(),
-            "ticks": "inside",
-            "ticklen": 3,
-        },
-    }
     return {"data": data, "layout": layout}
 
 
 def _traces(
     panel: Panel, curve: Curve, axis: str, *, is_named: bool
 ) -> list[dict[str, Any]]:
-    """Draw one curve, and its limits as thin dashed lines."""
+    """Draw one curve, and its limits, which the page draws thin and dashed."""
     look = style.joint_style(curve.style)
-    shared = {
-        "type": "scatter",
-        "mode": "lines",
-        "yaxis": axis,
-        "name": curve.name,
-        "legendgroup": curve.name,
-        "legendrank": curve.style,
-    }
+    shared = {"yaxis": axis, "name": curve.name, "legendrank": curve.style}
     hover = f"%{{y:.4g}} {panel.unit}".rstrip()
     dash = "solid"
     if isinstance(look["linestyle"], tuple):  # of Matplotlib: offset and lengths
@@ -99,12 +85,7 @@ def _traces(
         "x": encode(panel.t),
         "y": encode(curve.values),
         "showlegend": is_named,
-        "line": {
-            "color": look["color"],
-            "width": 1.8,
-            "dash": dash,
-            "simplify": False,
-        },
+        "line": {"color": look["color"], "dash": dash},
     }
     if curve.is_limited and not panel.is_ratio:
         line["customdata"] = encode(100.0 * np.abs(curve.ratios))
@@ -121,9 +102,7 @@ def _traces(
             **shared,
             "x": encode(t),
             "y": encode(np.where(np.isfinite(limit), limit, np.nan) + 0.0 * t),
-            "line": {"color": look["color"], "width": 1, "dash": "4px,4px"},
-            "showlegend": False,
-            "hoverinfo": "skip",
+            "line": {"color": look["color"]},
             "meta": "limit",
         }
         traces.append(dashed)
@@ -133,7 +112,6 @@ def _traces(
 def timeline_figure(motion: ReportedMotion) -> Figure:
     """Draw how near the motion is to every limit over time, a row each: blue, orange where active, red beyond it."""
     ratios = motion.ratios
-    tolerance = motion.trajectory.task.refinement.tolerance
     columns = {label: column for column, label in enumerate(ratios.labels)}
     entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
     is_last = np.append(np.diff(ratios.t) > 0.0, True)
@@ -145,62 +123,19 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
         for active in entry.active:  # ripple included
             inside = (t >= active.begin) & (t <= active.end)
             row[inside] = np.maximum(row[inside], THRESHOLD)
-    top = 1.1
-    active_from = THRESHOLD / top
-    beyond = (1.0 + tolerance) / top
-    layout = _layout(motion.trajectory, 26 * max(len(entries), 1))
-    layout["yaxis"] = {"automargin": True, "fixedrange": True, "ticks": ""}
-    layout["hovermode"] = "closest"
     heat = {
-        "type": "heatmap",
         "x": encode(t),
         "y": [str(entry.label) for entry in entries],
-        "z": encode(np.minimum(colours, top)),
+        "z": encode(colours),
         "customdata": encode(100.0 * part),
-        "zmin": 0.0,
-        "zmax": top,
-        "ygap": 3,
-        "colorscale": [
-            [0.0, "#F7FBFF"],
-            [0.5 * active_from, "#9ECAE1"],
-            [active_from, "#08306B"],
-            [active_from, "#E69F00"],
-            [beyond, "#E69F00"],
-            [beyond, "#C00000"],
-            [1.0, "#C00000"],
-        ],
-        "colorbar": {
-            "title": {"text": "part of the limit"},
-            "thickness": 12,
-            "tickvals": [0, 0.25, 0.5, 0.75, 1],
-        },
-        "hovertemplate": "%{y}: %{customdata:.1f} % of its limit at %{x:.4f} s<extra></extra>",
     }
+    layout = _layout(motion.trajectory, 26 * max(len(entries), 1))
     return {"data": [heat] if entries else [], "layout": layout}
 
 
 def _layout(trajectory: Trajectory, height: int) -> dict[str, Any]:
-    """Layout with one time axis and panels of this height together, pixels; the page sets colours.
-
-    Dotted lines are where phases meet.
-    """
-    look = {"color": style.GREY, "width": 1, "dash": "dot"}
-    up = {"type": "line", "yref": "paper", "y0": 0.0, "y1": 1.0, "line": look}
-    lines = [
-        {**up, "x0": phase.end, "x1": phase.end} for phase in trajectory.phases[:-1]
-    ]
-    return {
-        "shapes": lines,
-        "height": height + 110,
-        "margin": {"l": 70, "r": 20, "t": 40, "b": 50},
-        "hovermode": "x unified",
-        "xaxis": {
-            "range": [0.0, trajectory.t_end],
-            "hoverformat": ".4f",
-            "title": {"text": "t (s)"},
-        },
-        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
-    }
+    """Layout with one time axis and panels of this height together, pixels; the page sets how it looks."""
+    return {"height": height + 110, "xaxis": {"range": [0.0, trajectory.t_end]}}
 
 
 def scene(motion: ReportedMotion) -> dict[str, Any]:
@@ -241,6 +176,7 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         "plane": plane_of(trajectory),
         "joints": joints,
         "kinds": rows,
+        "phase_ends": trajectory.phase_ends[:-1].tolist(),
         "levels": {
             "near": NEAR,
             "at": THRESHOLD,

@@ -7,9 +7,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from brachis.apps import bottleneck
-from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
 from brachis.apps.bottleneck.report import write_active
-from brachis.apps.bottleneck.saturation import dense_samples, limits_in, saturations
+from brachis.apps.bottleneck.saturation import (
+    LimitRatios,
+    Saturation,
+    dense_samples,
+    limit_ratios,
+    limits_in,
+    saturations,
+)
 from brachis.errors import BrachisError
 from brachis.limits import Limit, describe_guarantees, limits_of
 from brachis.optimise.candidate import Candidate

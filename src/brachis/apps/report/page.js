@@ -195,18 +195,47 @@ function play() {
   playing = requestAnimationFrame(step);
 }
 
-// The figures, in the page's colours.
+// The figures, in the page's looks and colours.
+const TOP = 1.1, { at, beyond } = scene.levels;
+const HEAT = {
+  type: "heatmap", zmin: 0, zmax: TOP, ygap: 3,
+  colorscale: [
+    [0, "#F7FBFF"], [at / TOP / 2, "#9ECAE1"], [at / TOP, "#08306B"], [at / TOP, "#E69F00"],
+    [beyond / TOP, "#E69F00"], [beyond / TOP, "#C00000"], [1, "#C00000"],
+  ],
+  colorbar: { title: { text: "part of the limit" }, thickness: 12, tickvals: [0, 0.25, 0.5, 0.75, 1] },
+  hovertemplate: "%{y}: %{customdata:.1f} % of its limit at %{x:.4f} s<extra></extra>",
+};
+function curve(trace, text) {
+  const limit = trace.meta === "limit", line = { simplify: limit, width: limit ? 1 : 1.8, ...trace.line };
+  if (limit) line.dash = "4px,4px";
+  if (line.color === "#000000") line.color = text;
+  const looks = { type: "scatter", mode: "lines", legendgroup: trace.name, ...trace, line };
+  return limit ? { ...looks, showlegend: false, hoverinfo: "skip" } : looks;
+}
 function dressed(figure, light) {
   const [text, grid] = light ? ["#1a1a1a", "#d0d4d9"] : [styled("--text"), styled("--line")];
-  const layout = structuredClone(figure.layout), clear = "rgba(0,0,0,0)";
-  Object.assign(layout, { paper_bgcolor: clear, plot_bgcolor: clear, font: { color: text, size: 12 } });
-  layout.hoverlabel = { bgcolor: light ? "#ffffff" : styled("--card"), font: { color: text } };
+  const layout = structuredClone(figure.layout), clear = "rgba(0,0,0,0)", isTimeline = figure === timeline;
+  Object.assign(layout, {
+    paper_bgcolor: clear, plot_bgcolor: clear, font: { color: text, size: 12 },
+    hoverlabel: { bgcolor: light ? "#ffffff" : styled("--card"), font: { color: text } },
+    hovermode: isTimeline ? "closest" : "x unified", margin: { l: 70, r: 20, t: 40, b: 50 },
+    legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0 },
+    shapes: scene.phase_ends.map((time) => ({ // where phases meet
+      type: "line", x0: time, x1: time, yref: "paper", y0: 0, y1: 1, line: { color: "#666666", width: 1, dash: "dot" },
+    })),
+  });
+  Object.assign(layout.xaxis, { hoverformat: ".4f", title: { text: "t (s)" } });
+  if (isTimeline) layout.yaxis = { automargin: true, fixedrange: true, ticks: "" };
+  else Object.assign(layout.xaxis.minor, { ticks: "inside", ticklen: 3 });
   Object.keys(layout).filter((key) => /^[xy]axis/.test(key)).forEach((key) => {
     Object.assign(layout[key], { gridcolor: grid, linecolor: grid, zerolinecolor: grid, mirror: true, showline: true });
+    if (key[0] === "y" && !isTimeline) {
+      Object.assign(layout[key], { anchor: "x", zeroline: true });
+      layout[key].title.standoff = 8;
+    }
   });
-  const data = figure.data.map((trace) => trace.line?.color === "#000000"
-    ? { ...trace, line: { ...trace.line, color: text } } : trace);
-  return [data, layout];
+  return [figure.data.map((trace) => isTimeline ? { ...HEAT, ...trace } : curve(trace, text)), layout];
 }
 function drawFigure(id, figure) {
   const place = element(id), config = { responsive: true, displaylogo: false };
