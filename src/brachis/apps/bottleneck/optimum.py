@@ -68,11 +68,11 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         program, x = _problem(trajectory)
         first = program.phases[0].joint_map
-        is_timed = task.spline.intervals == "auto" and is_timing_all(program)
-        if is_timed and not first.r:
-            return SolvedProgram(program, (keep(program, x),))
         longest = 1e-3
+        is_timed = task.spline.intervals == "auto" and is_timing_all(program)
         if is_timed:
+            if not first.r:
+                return SolvedProgram(program, (keep(program, x),))
             program, x = _over_few_knots(program, x, task.spline.points_per_interval)
             longest = _TIMED_FASTER
         has_law = any(phase.time_law is not None for phase in program.phases)
@@ -118,7 +118,7 @@ def _over_few_knots(
     parts = []
     for (phase, _), motion in zip(program.split(x), program.motions(x), strict=True):
         knots = clamped_knots(phase.degree, breaks)
-        few = phase.with_grid(FixedGrid(knots, phase.degree, spread(breaks, points)))
+        few = phase.with_knots(knots, spread(breaks, points))
         t_norm = spread(breaks, _FIT)
         curves = motion.at(t_norm * motion.t_end)[0]
         phases.append(few)
@@ -130,26 +130,24 @@ def _over_few_knots(
 def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     """Build the problem over the saved knots; the motion is its point x."""
     task = trajectory.task
+    robot = trajectory.robot
     joint_map: JointMap
     if len(trajectory.chart_rows):
-        problem = Problem.of(trajectory.robot, task)
+        problem = Problem.of(robot, task)
         rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
         s = trajectory.path_coordinate(trajectory.times)
         path = problem.path
         joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
     elif task.task_space == JOINTS:
-        problem = Problem.of(trajectory.robot, task)
+        problem = Problem.of(robot, task)
         joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
-        names = tuple(
-            name
-            for name in trajectory.redundant_joints
-            if name in trajectory.robot.urdf_joints
-        )
-        own = task.model_copy(
-            update={"redundant_joints": names, "branch": trajectory.branch}
-        )
-        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, own))
+        names = [
+            name for name in trajectory.redundant_joints if name in robot.urdf_joints
+        ]
+        chosen = {"redundant_joints": tuple(names), "branch": trajectory.branch}
+        own = Problem.of(robot, task.model_copy(update=chosen))
+        (decomposition,) = decompositions_of(own)
         problem = decomposition.problem
         joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
     parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)

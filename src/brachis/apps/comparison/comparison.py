@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.bottleneck import limit_ratios
-from brachis.apps.bottleneck.saturation import dense_samples
+from brachis.apps.bottleneck.saturation import dense_samples, limit_ratios
 from brachis.apps.comparison.rows import RatioBounds, bound_ratios
 from brachis.apps.plots import style
 from brachis.apps.recording import import_motion, joint_path_of
@@ -115,12 +114,9 @@ class Comparison(Summary):
         for check in self.result.verification.checks:
             limit = check.name.removesuffix(" ratio")
             if check.of_limit and limit in proven and check.name in interpolated:
-                ratio, subject, time = proven[limit]
-                up_to = max(ratio, interpolated[check.name])
-                planned_at = check.subject or ""
-                uses.append(
-                    Use(limit, ratio, subject, time, up_to, check.value, planned_at)
-                )
+                up_to = max(proven[limit][0], interpolated[check.name])
+                planned = (check.value, check.subject or "")
+                uses.append(Use(limit, *proven[limit], up_to, *planned))
         return tuple(uses)
 
     @property

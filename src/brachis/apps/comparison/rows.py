@@ -55,9 +55,8 @@ def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
     """Compare the rows of an imported motion with every limit of its task."""
     assert trajectory.recovered is not None
     t = trajectory.recovered.rows[:, 0]
-    robot = trajectory.robot
     bounds = []
-    for limit in limits_of(robot, trajectory.task):
+    for limit in limits_of(trajectory.robot, trajectory.task):
         subjects = tuple(label.subject for label in limit.labels)
         ratios = _bound_limit(trajectory, t, limit)
         bounds.append(RatioBounds(limit.name, subjects, t, ratios))
@@ -92,7 +91,7 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
         middle = windows[:, order // 2]
         if is_mean:
             mean = np.trapezoid(values, t[middle], axis=0) / t[-1]
-            return np.abs(limit.ratio(mean))[None] + ratios
+            return np.abs(limit.ratio(mean)) + ratios
         np.maximum.at(ratios, middle, np.abs(limit.ratio(values)))
     return ratios
 

@@ -88,9 +88,8 @@ def frames(
     pace = f", {slower:g} times slower" if slower != 1.0 else ""
     title = figure.suptitle(f"t{pace}", fontsize=style.LABEL_SIZE)
     canvas.draw()
-    figure.set_layout_engine(
-        "none"
-    )  # it would find the same layout for every picture anew
+    # The engine would find the same layout for every picture anew.
+    figure.set_layout_engine("none")
     title.set_animated(True)
     canvas.draw()
     still = canvas.copy_from_bbox(figure.bbox)
@@ -150,9 +149,11 @@ def film_of(
         The period or the joints do not fit.
     """
     if joints is not None:
-        problem = "an animation cannot leave out joints"
         raise InputError(
-            problem, where="joints", found=", ".join(joints), allowed="all joints"
+            "an animation cannot leave out joints",
+            where="joints",
+            found=", ".join(joints),
+            allowed="all joints",
         )
     if not 0.0 < slower < np.inf:
         raise InputError(

@@ -53,7 +53,11 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
             found=len(keys),
             allowed="1 or 2 keys that vary",
         )
-    cells = _find_fastest(rows, keys)
+    cells: dict[tuple[Any, ...], float] = {}
+    for row in rows:
+        cell = tuple(row[key] for key in keys)
+        t_end = row["t_end_s"] if row["status"] == VERIFIED else math.inf
+        cells[cell] = min(t_end, cells.get(cell, math.inf))
     times = np.array([*cells.values()])
     is_verified = np.isfinite(times)
     if not is_verified.any():
@@ -114,18 +118,6 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     return figure
 
 
-def _find_fastest(
-    rows: Sequence[Mapping[str, Any]], keys: Sequence[str]
-) -> dict[tuple[Any, ...], float]:
-    """Return the shortest end time by the values of the keys; infinity where no plan is verified."""
-    cells: dict[tuple[Any, ...], float] = {}
-    for row in rows:
-        cell = tuple(row[key] for key in keys)
-        t_end = row["t_end_s"] if row["status"] == VERIFIED else math.inf
-        cells[cell] = min(t_end, cells.get(cell, math.inf))
-    return cells
-
-
 def _places(
     column: Sequence[Any], distinct: Sequence[Any], side_by_side: bool
 ) -> np.ndarray:
@@ -158,9 +150,9 @@ def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) ->
         return image
     differences = np.diff(np.unique(times[np.isfinite(times)]))
     differences = differences[differences > 1e-5 * np.nanmax(times)]
-    decimals = 2
-    if len(differences):  # as many as show them, five at most
-        decimals = int(np.clip(np.ceil(-np.log10(differences.min()) - 1e-6), 2, 5))
+    # As many as show them, two to five.
+    smallest = differences.min(initial=1.0)
+    decimals = int(np.clip(np.ceil(-np.log10(smallest) - 1e-6), 2, 5))
     middle = 0.5 * (np.nanmin(times) + np.nanmax(times))
     for column, row, time in zip(x, y, times, strict=True):
         if math.isfinite(time):

@@ -123,9 +123,8 @@ def _run(
             found[digest] = facts
     stored = len(found)
     began = time.monotonic()
-    tell(
-        f"{stored} of {write_count(len(plans), 'plan')}{' are stored already' if stored else ''}"
-    )
+    every = write_count(len(plans), "plan")
+    tell(f"{stored} of {every}{' are stored already' if stored else ''}")
     missing = [plan for digest, plan in plans.items() if digest not in found]
     try:
         # Workers end with this block, even if an outcome cannot be stored.
@@ -137,9 +136,7 @@ def _run(
                 each = (time.monotonic() - began) / (done - stored)
                 left = write_duration(each * (len(plans) - done))
                 failures = f", {failed} failed" if failed else ""
-                tell(
-                    f"{done} of {write_count(len(plans), 'plan')}{failures}; {left} left"
-                )
+                tell(f"{done} of {every}{failures}; {left} left")
     except KeyboardInterrupt as interrupt:
         interrupts.clear()
         message = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"

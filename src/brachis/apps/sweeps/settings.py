@@ -124,15 +124,13 @@ class RandomSettings(Model):
 
     def draws(self) -> list[dict[str, JsonValue]]:
         """Draw: for each of the draws the values of all keys."""
-        columns = []
+        drawn: list[dict[str, JsonValue]] = [{} for _ in range(self.count)]
         for key, distribution in self.keys.items():
             seed = [self.seed, zlib.crc32(key.encode())]
-            generator = np.random.default_rng(seed)
-            columns.append(distribution.draw(generator, self.count))
-        return [
-            dict(zip(self.keys, values, strict=True))
-            for values in zip(*columns, strict=True)
-        ]
+            values = distribution.draw(np.random.default_rng(seed), self.count)
+            for changes, value in zip(drawn, values, strict=True):
+                changes[key] = value
+        return drawn
 
 
 class SweepSettings(Model):
@@ -170,12 +168,7 @@ class SweepSettings(Model):
 
     @model_validator(mode="after")
     def _check_places(self) -> SweepSettings:
-        places: dict[str, Collection[str]] = {
-            "fixed": self.fixed,
-            "grid": self.grid,
-            "rows": self._row_keys(),
-            "random": self.random.keys if self.random else (),
-        }
+        places = {"fixed": self.fixed, **self._varied}
         found: dict[str, str] = {}
         for place, keys in places.items():
             for key in keys:
@@ -189,14 +182,19 @@ class SweepSettings(Model):
                 found[key] = place
         return self
 
-    def _row_keys(self) -> Collection[str]:
-        return dict.fromkeys(key for row in self.rows for key in row)
+    @property
+    def _varied(self) -> dict[str, Collection[str]]:
+        """Keys that are varied, by the place that varies them."""
+        return {
+            "grid": self.grid,
+            "rows": dict.fromkeys(key for row in self.rows for key in row),
+            "random": self.random.keys if self.random else (),
+        }
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys that are varied, in the order of the file."""
-        drawn = self.random.keys if self.random else ()
-        return (*self.grid, *self._row_keys(), *drawn)
+        return tuple(itertools.chain(*self._varied.values()))
 
     def changes(self) -> list[dict[str, JsonValue]]:
         """List what every plan sets of the varied keys: the grid's first key changes slowest, equal ones come once.
@@ -207,7 +205,7 @@ class SweepSettings(Model):
             There are more than `MOST_PLANS`.
         """
         columns = [
-            list(values) if isinstance(values, tuple) else values.values()
+            values.values() if isinstance(values, Spacing) else values
             for values in self.grid.values()
         ]
         draws = self.random.count if self.random else 1
