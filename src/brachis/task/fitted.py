@@ -21,7 +21,7 @@ from brachis.task.point_data import (
     PointFile,
 )
 from brachis.task.points.checks import refuse_repetitions
-from brachis.task.points.curves import check_interpolation, cut_at_corners, fit_curves
+from brachis.task.points.curves import cut_at_corners, fit_curves
 from brachis.task.points.gcode import SUFFIXES, read_gcode
 from brachis.task.points.points import Points, points_from
 from brachis.task.points.tables import (
@@ -68,6 +68,7 @@ def segments_along(
             allowed="no orientation",
             where=f"{where}.orientation",
         )
+    stops = settings.corner == "stop"
     if settings.tolerance is None:
         if points.speed is not None:
             raise TaskError(
@@ -77,19 +78,16 @@ def segments_along(
                 where=where,
                 hint="Set csv.tolerance, or remove the feed rates",
             )
-        report = check_interpolation(points, notes)
-        parts = [points]
-        if settings.corner == "stop":
-            parts, report = cut_at_corners(points, report)
+        parts, report = cut_at_corners(points, notes, stops=stops)
         _check_corners(report, segment, where)
+        fit = report.model_copy(update={"source": settings.file})
         return [
             SplineSegment(
                 **_end_of(segment, is_last=i == len(parts) - 1),
-                spline=_spline_through(part, report, settings, number=i),
+                spline=_spline_through(part, None if i else fit, settings),
             )
             for i, part in enumerate(parts)
         ]
-    stops = settings.corner == "stop"
     curves, report = fit_curves(points, settings.tolerance, notes, stops=stops)
     _check_corners(report, segment, where)
     fit = report.model_copy(update={"source": settings.file})
@@ -103,7 +101,7 @@ def segments_along(
                     "control_points": curve.spline.c.tolist(),
                     "relative": settings.relative or i > 0,
                     "speeds": curve.speeds,
-                    "fit": fit if i == 0 else None,
+                    "fit": None if i else fit,
                 }
             ),
         )
@@ -122,26 +120,25 @@ def _end_of(
 
 
 def _spline_through(
-    points: Points, report: FitReport, settings: PointFile, *, number: int
+    points: Points, fit: FitReport | None, settings: PointFile
 ) -> SplineThrough:
-    """Return the spline through the points of a part of a file, of which only the first one has the report.
+    """Return the spline through the points of a part of a file, of which only the first one has the report, `fit`.
 
     Behind a corner the waypoints begin with it, so that the first one after it is passed, however near it is.
     """
-    first = 0 if number else 1
+    first = 1 if fit else 0
     places = points.columns.tolist()
     turns = None
     if points.has_quaternions:
         places = points.position.tolist()
         turns = [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()]
-    fit = report.model_copy(update={"source": settings.file})
     return SplineThrough(
         through=places[first:],
         orientations=tuple(turns[first:]) if turns else None,
         relative=settings.relative,
         starts_at=places[0],
         starts_oriented=turns[0] if turns else None,
-        fit=None if number else fit,
+        fit=fit,
     )
 
 

@@ -16,7 +16,7 @@ from brachis.task.points.checks import (
     scatter_of,
     without_repetitions,
 )
-from brachis.task.points.curves import check_interpolation, fit_curves
+from brachis.task.points.curves import cut_at_corners, fit_curves
 from support.seams import bent, points, wave
 
 MM = 1e-3
@@ -118,7 +118,7 @@ def test_rounding_is_told_from_scatter():
     assert decimals_of(rounded) == 6
     assert decimals_of(wave(100)) is None
     with pytest.raises(TaskError) as caught:
-        check_interpolation(points(rounded))
+        cut_at_corners(points(rounded))
     message = str(caught.value)
     for text in (
         "too rough",
@@ -127,13 +127,13 @@ def test_rounding_is_told_from_scatter():
         "tolerance: {position:",
     ):
         assert text in message
-    check_interpolation(points(np.round(wave(2_000), 12)))
-    check_interpolation(points(wave(2_000)))
+    cut_at_corners(points(np.round(wave(2_000), 12)))
+    cut_at_corners(points(wave(2_000)))
     with pytest.raises(
         TaskError,
         match=r"scatter by 0.02\d* mm \(standard deviation\) at 0.5\d* mm spacing",
     ):
-        check_interpolation(points(wave(2_000, 0.02 * MM)))
+        cut_at_corners(points(wave(2_000, 0.02 * MM)))
 
 
 def test_orientations_that_scatter_are_told_from_smooth_ones():

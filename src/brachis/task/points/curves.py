@@ -341,37 +341,32 @@ def _profile(*columns: Array) -> tuple[Any, ...]:
     return tuple(zip(*largest, strict=True))
 
 
-def cut_at_corners(points: Points, report: FitReport) -> tuple[list[Points], FitReport]:
-    """Return the parts of points between corners, which are their first and last points; report the corners."""
-    corners = find_corners(points, scatter_of(points), 0.0)
-    distances = sum_up(points.steps)
-    cuts = [0, *(corner.index for corner in corners), len(points) - 1]
-    parts = [points.only(slice(first, last + 1)) for first, last in pairwise(cuts)]
-    found = [
-        _report_corner(points, corner, float(distances[corner.index]), 0.0)
-        for corner in corners
-    ]
-    return parts, report.model_copy(update={"corners": tuple(found)})
+def cut_at_corners(
+    points: Points, notes: tuple[str, ...] = (), *, stops: bool = False
+) -> tuple[tuple[Points, ...], FitReport]:
+    """Return the parts of points through which one curve each is to go, and what is said of them.
 
-
-def check_interpolation(points: Points, notes: tuple[str, ...] = ()) -> FitReport:
-    """Return what is said of a curve through all points, after a check that its curvature is not that of their scatter.
+    It is checked that the curvature of these curves is not that of the points' scatter.
 
     Parameters
     ----------
     points : Points
     notes : tuple of str, optional
         What was found out before.
+    stops : bool, optional
+        Whether the tool stops at corners, which are then the first and last points of parts. All points are one part
+        otherwise.
 
     Raises
     ------
     TaskError
-        So are repetitions and spikes.
+        The points are too rough, repeat each other, or have spikes.
     """
     refuse_repetitions(points)
     scatter = scatter_of(points)
     refuse_spikes(points, scatter, 0.0)
-    length = float(points.steps.sum())
+    distances = sum_up(points.steps).tolist()
+    length = distances[-1]
     largest = 0.5  # of the curvature that scatter makes times the length
     if scatter.curvature * length > largest:
         raise TaskError(
@@ -381,11 +376,19 @@ def check_interpolation(points: Points, notes: tuple[str, ...] = ()) -> FitRepor
             where=points.source,
             hint=f"Give a tolerance, for example tolerance: {{position: {6.0 * 1e3 * scatter.deviation:.1g} mm}}",
         )
-    return FitReport(
+    corners = find_corners(points, scatter, 0.0) if stops else ()
+    cuts = [0, *(corner.index for corner in corners), len(points) - 1]
+    report = FitReport(
         source=points.source,
         points=len(points),
         length=length,
         intervals=len(points) - 1,
+        corners=tuple(
+            _report_corner(points, corner, distances[corner.index], 0.0)
+            for corner in corners
+        ),
         told=notes,
         doubt=plausibility_note(points),
     )
+    parts = (points.only(slice(first, last + 1)) for first, last in pairwise(cuts))
+    return tuple(parts), report
