@@ -27,7 +27,7 @@ from brachis.path.joins import pose_corner, row_corner
 from brachis.path.orientation import orientation_along, turn_of
 from brachis.path.pose import POSITIONS, PosePath, pose_curve, rotations
 from brachis.path.protocol import Array, Curve, MappedCurve
-from brachis.path.rotations import matrices, rotation_of
+from brachis.path.rotations import rotation_of
 from brachis.path.sequence import SequencePath
 from brachis.path.splines import (
     bspline_curve,
@@ -37,7 +37,6 @@ from brachis.path.splines import (
 )
 from brachis.robot.task_map.protocol import AXES, POSE_COORDINATES, ROWS, YAW, joints_of
 from brachis.task.point_data import PointFile
-from brachis.task.points.units import quaternions_of
 from brachis.task.segments import (
     ArcCenter,
     ArcVia,
@@ -214,7 +213,7 @@ class PoseCoordinates(RowCoordinates):
                 allowed=allowed,
                 where="start",
             )
-        nearest = matrices(quaternions_of(rotation_of(rotation))[None])[0]
+        nearest = rotation_of(rotation).as_matrix()
         return np.concatenate([start[:POSITIONS], nearest.ravel()])
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:

@@ -75,8 +75,7 @@ class LineCurve:
         """Return the line and its derivatives by sigma, shape (order + 1, K, m)."""
         result = np.zeros((order + 1, sigma.size, self.start.size))
         result[0] = self.start + sigma[:, None] * self.slope
-        if order:
-            result[1] = self.slope
+        result[1:2] = self.slope
         return result
 
 

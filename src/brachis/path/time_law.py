@@ -86,8 +86,8 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
     knots = tool.path.knots
     distances = tool.slopes(spread(knots, 32))[0]
     if np.ptp(distances) <= tolerances.ROUNDING * distances.max():
-        duration = float(distances.mean()) * (leg.end - leg.begin) / leg.speed
-        rate = (leg.end - leg.begin) / duration
+        rate = leg.speed / float(distances.mean())
+        duration = (leg.end - leg.begin) / rate
         ends = np.array([[leg.begin, rate, 0.0, 0.0], [leg.end, rate, 0.0, 0.0]])
         times = np.array([0.0, 0.0, duration, duration])
         line = BSpline(times, ends[:, 0], 1)
