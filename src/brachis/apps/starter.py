@@ -167,9 +167,8 @@ def _follow(
             q = q + np.linalg.pinv(jacobian) @ error
         else:
             return None
-        is_low = q <= robot.limits.position_lower
-        is_high = q >= robot.limits.position_upper
-        if np.any(is_low | is_high):
+        limits = robot.limits
+        if np.any((q <= limits.position_lower) | (q >= limits.position_upper)):
             return None
         postures.append(q)
     return np.array(postures)
@@ -198,7 +197,7 @@ def spaces(robot: Robot) -> Iterator[str | list[str]]:
     """Give what a robot might prescribe, the most natural first, then ever fewer rows of its tool's position."""
     yield default_task_space(robot)
     for count in range(min(robot.n, len(AXES)), 0, -1):
-        yield from (list(rows) for rows in combinations(AXES, count))
+        yield from map(list, combinations(AXES, count))
 
 
 _TEXT = """\

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from brachis.common.deadline import Deadline
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import (
     Solver,
@@ -113,7 +114,7 @@ def find_reference(
         None if no motion faster than the answer was found.
     """
     began = time.perf_counter()
-    deadline = began + time_limit
+    deadline = Deadline.after(time_limit)
     own = refined.program.without_orders_above(_JUMPING)
     # Fewer intervals with several redundant joints: a step of the active-set method takes seconds then.
     r = own.phases[0].joint_map.r
@@ -123,7 +124,7 @@ def find_reference(
     violation = np.inf
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         for degree, times in (*meshes, (_PARABOLAS, finest)):
-            if fastest is not refined and time.perf_counter() > deadline:
+            if fastest is not refined and deadline.passed:
                 break
             program = _on_mesh(own, degree, times)
             answer = _plan_on_mesh(program, fastest, tolerance, deadline)
@@ -164,7 +165,7 @@ def _on_mesh(program: Program, degree: int, times: int) -> Program:
 
 
 def _plan_on_mesh(
-    program: Program, fastest: SolvedProgram, tolerance: float, deadline: float
+    program: Program, fastest: SolvedProgram, tolerance: float, deadline: Deadline
 ) -> SolvedProgram | None:
     """Solve from a motion and refine, with one backend after the other, until one gives a motion within the rows.
 
@@ -184,7 +185,7 @@ def _plan_on_mesh(
         return None
 
     def solve_with(backend: Solver, program: Program, x: np.ndarray) -> SolverReport:
-        seconds = float(np.clip(deadline - time.perf_counter(), 0.1, 2.5))
+        seconds = float(np.clip(deadline.left, 0.1, 2.5))
         options = SolverOptions(max_iterations=200, time_limit=seconds)
         return backend.solve(program, x, options, None)
 

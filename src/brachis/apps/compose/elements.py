@@ -126,15 +126,12 @@ def joint(
 
 
 def robot_text(robot: Element) -> str:
-    """Text of a ``<robot>`` element and of the comments before it, indented."""
+    """Text of a ``<robot>`` element and of the comments around it, indented."""
     etree.cleanup_namespaces(robot)
     etree.indent(robot, "  ")
-    comments = list(robot.itersiblings(etree.Comment, preceding=True))[::-1]
-    parts = [
-        etree.tostring(each, encoding="unicode", with_tail=False)
-        for each in (*comments, robot)
-    ]
-    return "\n".join(['<?xml version="1.0"?>', *parts, ""])
+    tree = robot.getroottree()
+    text = etree.tostring(tree, encoding="unicode", pretty_print=True)
+    return f'<?xml version="1.0"?>\n{text}'
 
 
 def _origin(xyz: Sequence[float], rpy: Sequence[float]) -> list[Element]:

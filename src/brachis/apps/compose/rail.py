@@ -155,8 +155,7 @@ class Rail:
                 element.getparent().remove(element)
         relocate_meshes(arm.robot, source, target)
         arm.robot.set("name", f"{arm.robot.get('name') or source.stem}_{self.name}")
-        for place, element in enumerate(self._elements(root)):
-            arm.robot.insert(place, element)
+        arm.robot[:0] = self._elements(root)
         return elements.robot_text(arm.robot)
 
     def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:

@@ -10,7 +10,7 @@ import os
 import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -168,20 +168,14 @@ def import_motion(
         np.column_stack([recording.t, np.pad(recording.q, rolling)]),
         np.pad(error, rolling[1]),
     )
-    at_rest = nodes.at_rest[0]
-    splines = [
-        fit_coordinate(
-            t, s, at_rest=(at_rest and s[0] == 0.0, at_rest and s[-1] == 1.0)
-        )
-        for t, s in followed.parts
-    ]
+    at_rest, _ = nodes.at_rest
+    splines = [fit_coordinate(t, s, at_rest=at_rest) for t, s in followed.parts]
     for number, (first, end) in enumerate(rests):
         knots = np.repeat([0.0, 1.0], DEGREE + 1)
         points = np.full((1, DEGREE + 1), splines[2 * number].control_points[0, -1])
         wait = PhaseSpline(nodes.t[end] - nodes.t[first], knots, DEGREE, points)
         splines.insert(2 * number + 1, wait)
     knots, control_points = join_splines(splines)
-    ends = [number for rest in rests for number in rest]
     return Trajectory(
         task=_task_of(settings, bound, task_map, nodes, followed.segments, space),
         urdf=bound.urdf,
@@ -196,7 +190,7 @@ def import_motion(
         knots=knots,
         degree=DEGREE,
         control_points=control_points,
-        phase_ends=nodes.t[[*ends, -1]],
+        phase_ends=nodes.t[[*chain(*rests), -1]],
         chart_rows=np.empty((0, 0, 0)),
         chart_knots=np.empty(0),
         recovered=recovered,
@@ -372,9 +366,7 @@ DEGREE = 3
 """Degree of the spline of the path coordinate."""
 
 
-def fit_coordinate(
-    t: np.ndarray, s: np.ndarray, *, at_rest: tuple[bool, bool]
-) -> PhaseSpline:
+def fit_coordinate(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> PhaseSpline:
     """Return s over time as the spline of a phase.
 
     The knots lie where s bends. The control points do not decrease, and so the spline does not either.
@@ -383,14 +375,15 @@ def fit_coordinate(
     ----------
     t, s : (K,) ndarray
         Ascending.
-    at_rest : (bool, bool)
-        Whether ds/dt vanishes at the beginning, and at the end; at waits, which begin between rows, it nearly does.
+    at_rest : bool
+        Whether ds/dt vanishes at the ends of the path; at waits, which begin between rows, it nearly does.
     """
     from scipy.interpolate import splrep
 
     duration = t[-1] - t[0]
     t_norm = (t - t[0]) / duration
-    first, last = (2 if rests else 1 for rests in at_rest)
+    first = 2 if at_rest and s[0] == 0.0 else 1
+    last = 2 if at_rest and s[-1] == 1.0 else 1
     for rms in (2e-8, 1e-9, 2e-10):  # of what the spline may differ from s
         knots, points, _ = splrep(t_norm, s, k=DEGREE, s=len(s) * rms**2)
         points = points[: len(knots) - DEGREE - 1].clip(s[0], s[-1])

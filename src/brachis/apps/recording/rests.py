@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -45,5 +45,5 @@ def with_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> Nodes:
 
 def split_at_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> list[Nodes]:
     """Return the parts between waits in which the motion moves."""
-    edges = [0, *(number for rest in rests for number in rest), len(nodes.t) - 1]
+    edges = [0, *chain(*rests), len(nodes.t) - 1]
     return [nodes.part(*ends) for ends in list(pairwise(edges))[::2]]

@@ -18,7 +18,7 @@ from concurrent.futures import (
     Future,
     wait,
 )
-from typing import Any
+from functools import partial
 
 from brachis.apps.export.rows import require_library
 from brachis.apps.sweeps.plans import Outcome, Plan, run_plan
@@ -37,13 +37,16 @@ HEARTBEAT = 1.0
 _CONNECTING = 10.0
 """Time in which a scheduler has to answer, s."""
 _ENDED = "each worker process ended during this plan: a crash, or too little memory"
-_ONE_THREAD = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
-    "NUMEXPR_NUM_THREADS": "1",
-}
+_ONE_THREAD = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+    ),
+    "1",
+)
 """Environment of worker processes."""
 
 
@@ -211,14 +214,13 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
     processors = cpu_count()
     width = min(jobs or processors, processors, max(len(plans), 1))
 
-    def executor() -> Any:
-        return ProcessPoolExecutor(
-            width,
-            env=_ONE_THREAD,
-            initializer=_end_with_parent,
-            initargs=(os.getpid(),),
-        )
-
+    executor = partial(
+        ProcessPoolExecutor,
+        width,
+        env=_ONE_THREAD,
+        initializer=_end_with_parent,
+        initargs=(os.getpid(),),
+    )
     processes = executor()
 
     def submit(plan: Plan) -> Future[Outcome]:
