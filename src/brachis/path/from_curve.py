@@ -10,7 +10,7 @@ import numpy as np
 from brachis.errors import InputError
 from brachis.path.protocol import Array, Path
 from brachis.path.sequence import SequencePath
-from brachis.task import BSplineSegment, Segment, SpeedTable, Task
+from brachis.task import Segment, SpeedTable, Task
 from brachis.task.segments import SMOOTHNESS
 
 if TYPE_CHECKING:
@@ -194,8 +194,7 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     ):
         if piece.segment is None:
             continue
-        segment = segments[piece.segment]
-        speeds = segment.bspline.speeds if isinstance(segment, BSplineSegment) else ()
+        speeds = getattr(segments[piece.segment].shape, "speeds", ())
         for sigma, speed in map(np.transpose, speeds):
             at = np.unique(np.clip(sigma, piece.first, piece.last))
             if len(at) > 1:

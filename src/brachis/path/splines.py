@@ -171,9 +171,7 @@ def _waypoints_of(shape: SplineThrough, context: SegmentContext) -> Array:
         origin = 0.0 if expected is None else expected
         points = [point + start - origin for point in points]
     elif expected is not None:
-        off = start - expected
-        count = len(context.positions)
-        _check_start(".starts_at", off[:count], off[count:], context)
+        _check_start(".starts_at", start - expected, context)
     return np.stack([start, *points])
 
 
@@ -187,17 +185,17 @@ def _repeats_start(steps: Array) -> bool:
     return bool(steps[0] < START_TOLERANCE and steps[0] <= 0.01 * steps[1])
 
 
-def _check_start(key: str, off: Array, turned: Array, context: SegmentContext) -> None:
-    """Refuse a segment whose start is off where it is expected: `off` in the position rows, `turned`, rad, in others.
+def _check_start(key: str, off: Array, context: SegmentContext) -> None:
+    """Refuse a segment whose start is off where it is expected, by `off`, m in the position rows and rad in others.
 
     Raises
     ------
     PathError
     """
-    expected = context.position - off
-    hint = place_hint(context.position, expected, context.positions)
+    moved, turned = np.split(off, [len(context.positions)])
+    hint = place_hint(context.position, context.position - moved, context.positions)
     unit = "rad or m" if joints_of(context.rows) else "m"
-    for away, of, looks in ((off, unit, hint), (turned, "rad", None)):
+    for away, of, looks in ((moved, unit, hint), (turned, "rad", None)):
         distance = float(np.linalg.norm(away))
         if distance > START_TOLERANCE:
             here = place(context.rows, context.start)
@@ -242,11 +240,12 @@ def _chord_knots(
     """
     if np.all(chords < tolerances.LENGTH):
         chords = otherwise
-    if np.all(chords < tolerances.LENGTH):
+    stands_still = chords < tolerances.LENGTH
+    if stands_still.all():
         raise context.zero_length(".through", [list(each) for each in shape.through])
-    if np.any(chords < tolerances.LENGTH):
+    if stands_still.any():
         before = len(shape.through) - len(chords)
-        repeated = int(np.argmax(chords < tolerances.LENGTH)) + before
+        repeated = int(np.argmax(stands_still)) + before
         raise context.wrong(
             "a waypoint repeats the one before",
             f".through[{repeated}]",
@@ -312,9 +311,8 @@ def bspline_curve(shape: BSplineCurve, context: SegmentContext) -> SplineCurve:
     first = context.coordinates(shape.control_points[0], key, context.rows)
     points = np.array(shape.control_points)
     off = context.start - first
-    count = len(context.positions)
     if not shape.relative:
-        _check_start(f".{key}", off[:count], off[count:], context)
+        _check_start(f".{key}", off, context)
     if not np.ptp(points, axis=0).any():
         raise context.wrong(
             "the segment has zero length", allowed="control points that differ"
@@ -347,7 +345,8 @@ def pose_bspline(
     turn = quaternion_product(start, first * [1.0, -1.0, -1.0, -1.0])
     off = context.start - points[0, :POSITIONS]
     if not shape.relative:
-        _check_start(".control_points[0]", off, 2.0 * turn[1:], context)
+        all_off = np.concatenate([off, 2.0 * turn[1:]])
+        _check_start(".control_points[0]", all_off, context)
     points[:, :POSITIONS] += off
     points[:, POSITIONS:] = quaternion_product(turn, points[:, POSITIONS:])
     return quaternion_curve(_of_control_points(shape, points))

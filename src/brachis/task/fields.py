@@ -103,12 +103,11 @@ class Model(BaseModel):
 
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
         """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
-        given = [
-            (name, getattr(self, name), field.default)
+        return [
+            (name, _Shown(getattr(self, name)))
             for name, field in type(self).model_fields.items()
-            if name in self.model_fields_set
+            if name in self.model_fields_set and getattr(self, name) != field.default
         ]
-        return [(name, _Shown(value)) for name, value, usual in given if value != usual]
 
     def __str__(self) -> str:
         """Show it as `repr` does."""

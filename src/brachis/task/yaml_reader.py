@@ -44,29 +44,27 @@ class _Loader(yaml.SafeLoader):
         node: yaml.MappingNode,
         deep: bool = False,  # noqa: FBT002
     ) -> dict[Hashable, Any]:
-        """Make a mapping of a node, as PyYAML does, unless a key occurs twice (ConstructorError)."""
+        """Make a mapping of a node, as PyYAML does, unless a key occurs twice (MarkedYAMLError)."""
         # Before merge keys (<<) are expanded: what they bring in may be overridden.
         seen: set[str] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
                 if key.value in seen:
-                    raise yaml.constructor.ConstructorError(
-                        None,
-                        None,
-                        f"the key {key.value!r} occurs twice",
-                        key.start_mark,
+                    raise yaml.MarkedYAMLError(
+                        problem=f"the key {key.value!r} occurs twice",
+                        problem_mark=key.start_mark,
                     )
                 seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
     def get_single_node(self) -> yaml.Node | None:
-        """Parse the document, unless its aliases make it endless or far too long (ComposerError)."""
+        """Parse the document, unless its aliases make it endless or far too long (MarkedYAMLError)."""
         node = super().get_single_node()
         if node is not None and (size := _size(node, {})) > _LARGEST:
             problem = f"{size:.3g} values with all aliases expanded, more than the {_LARGEST} allowed"
             if size == math.inf:
                 problem = "the task contains itself (an alias inside its own anchor)"
-            raise yaml.composer.ComposerError(None, None, problem, node.start_mark)
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
         return node
 
 
@@ -86,16 +84,14 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
 
 
 def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
-    """Read a number with a unit, such as ``!degrees 90``, in SI units (ConstructorError)."""
+    """Read a number with a unit, such as ``!degrees 90``, in SI units (MarkedYAMLError)."""
     text = node.value if isinstance(node, yaml.ScalarNode) else "something else"
     try:
         return float(text) * _UNITS[node.tag]
     except ValueError:
-        raise yaml.constructor.ConstructorError(
-            None,
-            None,
-            f"{node.tag} needs a number, not {text!r}",
-            node.start_mark,
+        raise yaml.MarkedYAMLError(
+            problem=f"{node.tag} needs a number, not {text!r}",
+            problem_mark=node.start_mark,
         ) from None
 
 

@@ -83,13 +83,13 @@ def scatter_of(points: Points) -> Scatter:
     turning = points.turning
     chords = points.steps
     spacing = float(np.median(chords)) if len(chords) else 0.0
-    if len(points) < 20 or position.shape[1] not in (2, 3) or not spacing:
+    if len(points) < 20 or points.dimension not in (2, 3) or not spacing:
         return Scatter(0.0, 0.0, spacing, None)
     along = position[4:] - position[:-4]
     along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
     away = _residuals(position, chords)
     across = away - np.sum(away * along, axis=1)[:, None] * along
-    deviation = _deviation(across, _MEDIANS[position.shape[1] - 1])
+    deviation = _deviation(across, _MEDIANS[points.dimension - 1])
     of_turning = 0.0
     if turning.shape[1]:
         # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.

@@ -56,7 +56,7 @@ def find_corners(
     tolerance : float
         Corners that are rounded within it are corners, m.
     """
-    if len(points) < 3 or points.position.shape[1] < 2:
+    if len(points) < 3 or points.dimension < 2:
         return ()
     noisy = scatter.deviation > 0.0
     u = lengths_along(points.position, scatter.deviation)
@@ -194,7 +194,7 @@ def fill_gaps(points: Points) -> tuple[Points, tuple[str, ...]]:
     index = np.arange(len(points))
     at = spread(index, np.where(long, parts, 1).astype(int))
     columns = interpolate_columns(at, index, points.columns)
-    position, turning = np.hsplit(columns, [points.position.shape[1]])
+    position, turning = np.hsplit(columns, [points.dimension])
     if points.has_quaternions:
         turning = with_like_signs(turning)
     ways = write_count(int(np.count_nonzero(long)), "way")

@@ -119,7 +119,7 @@ def _fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
 
 def _measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fit:
     """Return the fit with the places on the curve that are nearest to the points, by Newton steps from `sigma`."""
-    dimension = points.position.shape[1]
+    dimension = points.dimension
     sigma = sigma.copy()
     # Of a path that winds, a first rough curve is near points of other windings, too: these are not for the taking.
     far = 0.02 * (breaks[-1] - breaks[0])
@@ -138,12 +138,12 @@ def _measure(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fi
     return Fit(spline, breaks, sigma, distances, angles)
 
 
-def _over_arc_length(fit: Fit, dimension: int) -> tuple[Array, Array]:
+def _over_arc_length(fit: Fit, points: Points) -> tuple[Array, Array]:
     """Return the points' places and the knots, measured by the arc length of the fitted position instead of sigma."""
     fine = spread(fit.breaks, 16)
     middle = (fine[1:] + fine[:-1]) / 2.0
     speed, between = (
-        np.linalg.norm(fit.spline(at, nu=1)[:, :dimension], axis=1)
+        np.linalg.norm(fit.spline(at, nu=1)[:, : points.dimension], axis=1)
         for at in (fine, middle)
     )
     steps = np.diff(fine) * (speed[:-1] + 4.0 * between + speed[1:]) / 6.0
@@ -205,7 +205,6 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
     every = -(-len(points) // 8_000)  # points that are looked at while knots are added
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
     noisy = scatter.noisy(tolerance)
-    dimension = points.position.shape[1]
     rough = _add_knots(
         points.only(chosen),
         sigma[chosen],
@@ -215,7 +214,7 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
     )
     if rough is None:
         return _interpolate(points, sigma)
-    places, breaks = _over_arc_length(rough, dimension)
+    places, breaks = _over_arc_length(rough, points)
     sigma = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
     fit = _add_knots(points, sigma, breaks, tolerance, noisy=noisy)
     if fit is not None and fit.ratios(tolerance).max() <= 1.0:
@@ -293,7 +292,7 @@ def _use_fewest_knots(points: Points, fit: Fit, tolerance: FitTolerance) -> Fit:
 
     Their number is halved between one that will do and one that will not.
     """
-    sigma, breaks = _over_arc_length(fit, points.position.shape[1])
+    sigma, breaks = _over_arc_length(fit, points)
     most = len(breaks) - 1
     fewest = most // 2
     trial = _fit_over(points, sigma, breaks)
@@ -357,7 +356,7 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     breaks = np.unique(spline.t)
     count = max(64, 20_000 // (len(breaks) - 1))
     sigma = spread(breaks, count)
-    dimension = points.position.shape[1]
+    dimension = points.dimension
     place = spline(sigma)[:, :dimension]
     nearest = _nearest(points.position, place)
     distances = np.full(len(points), np.inf)

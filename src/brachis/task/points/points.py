@@ -51,6 +51,11 @@ class Points:
         return len(self.position)
 
     @property
+    def dimension(self) -> int:
+        """Number of coordinates of a position, p."""
+        return self.position.shape[1]
+
+    @property
     def has_quaternions(self) -> bool:
         """Whether the points are poses."""
         return self.turning.shape[1] == QUATERNION
