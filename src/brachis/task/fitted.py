@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -24,12 +23,7 @@ from brachis.task.points.checks import refuse_repetitions
 from brachis.task.points.curves import cut_at_corners, fit_curves
 from brachis.task.points.gcode import SUFFIXES, read_gcode
 from brachis.task.points.points import Points, points_from
-from brachis.task.points.tables import (
-    allowed_columns,
-    points_of,
-    read_columns,
-    read_table,
-)
+from brachis.task.points.tables import read_points, read_table
 from brachis.task.segments import (
     BSplineCurve,
     BSplineSegment,
@@ -217,33 +211,19 @@ def _read(
     )
     if rows == "joints":
         return [_along_joints(segment, text, path, where)]
-    points, notes = _points_of(segment.csv, rows, text, path, where)
-    _check_count(len(points), path)
-    return segments_along(points, segment, where, notes)
-
-
-def _points_of(
-    settings: PointFile,
-    rows: tuple[str, ...] | str,
-    text: str,
-    path: Path,
-    where: str,
-) -> tuple[Points, tuple[str, ...]]:
-    """Return the points of a file, and notes on how it was read."""
     if path.suffix.lower() in SUFFIXES:
-        if settings.orientation is not None:
+        if segment.csv.orientation is not None:
             raise TaskError(
                 "G-code has no orientations",
-                found=settings.orientation,
+                found=segment.csv.orientation,
                 allowed="no csv.orientation",
                 where=f"{where}.csv.file",
             )
-        return read_gcode(text, rows, str(path))
-    check = partial(read_columns, rows=rows, stated=settings.orientation)
-    table = read_table(text, str(path), allowed_columns(rows), check)
-    columns = check(table.header, f"{path}: line {table.header_line}")
-    points, notes = points_of(table, columns, settings.units, str(path))
-    return points, (*table.notes, *notes)
+        points, notes = read_gcode(text, rows, str(path))
+    else:
+        points, notes = read_points(text, rows, segment.csv, str(path))
+    _check_count(len(points), path)
+    return segments_along(points, segment, where, notes)
 
 
 def _along_joints(

@@ -8,26 +8,15 @@ import numpy as np
 import pytest
 
 from brachis.errors import TaskError
-from brachis.task.point_data import FileUnits
-from brachis.task.points.tables import (
-    allowed_columns,
-    points_of,
-    read_columns,
-    read_table,
-)
+from brachis.task.point_data import FileUnits, PointFile
+from brachis.task.points.tables import read_points
 
 
 def read(text, rows="pose", units=None, orientation=None):
-    allowed = allowed_columns(rows)
-    table = read_table(
-        text,
-        "a.csv",
-        allowed,
-        lambda header, where: read_columns(header, where, rows, orientation),
+    settings = PointFile(
+        file="a.csv", units=units or FileUnits(), orientation=orientation
     )
-    where = f"a.csv: line {table.header_line}"
-    columns = read_columns(table.header, where, rows, orientation)
-    return points_of(table, columns, units or FileUnits(), "a.csv"), table.notes
+    return read_points(text, rows, settings, "a.csv")
 
 
 @pytest.mark.parametrize(
@@ -50,7 +39,7 @@ def read(text, rows="pose", units=None, orientation=None):
     ],
 )
 def test_forms_are_found_out(text, told):
-    (points, _), found = read(text)
+    points, found = read(text)
     np.testing.assert_array_equal(points.position, [[1.5, 2.0, 3.0], [4.0, 5.0, 6.0]])
     assert found == told
 
@@ -59,7 +48,7 @@ def test_forms_are_found_out(text, told):
     "header", ["x_mm,y_mm,z_mm", "X [mm],Y [mm],Z [mm]", "x (mm),y(mm),z mm"]
 )
 def test_units_in_the_header(header):
-    (points, told), _ = read(f"{header}\n1,2,3\n4,5,6\n")
+    points, told = read(f"{header}\n1,2,3\n4,5,6\n")
     np.testing.assert_allclose(
         points.position, np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]) / 1e3
     )
@@ -68,7 +57,7 @@ def test_units_in_the_header(header):
 
 def test_units_of_the_task():
     text = "x,y,z,rx,ry,rz,f\n1,2,3,0,0,90,600\n4,5,6,0,0,45,1200\n"
-    (points, told), _ = read(
+    points, told = read(
         text,
         units=FileUnits(length="mm", angle="deg", speed="mm/min"),
         orientation="rotation_vector",
@@ -83,7 +72,7 @@ def test_units_of_the_task():
 
 
 def test_quaternions_get_like_signs():
-    (points, _), _ = read(
+    points, _ = read(
         "x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n1,0,0,-1,0,0,0\n2,0,0,1,0,0,0\n"
     )
     np.testing.assert_allclose(points.turning, [[1.0, 0.0, 0.0, 0.0]] * 3, atol=1e-15)
@@ -145,14 +134,14 @@ def test_the_example_is_read_as_it_is_written(tmp_path):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     module.write(tmp_path / "seam.csv")
-    (points, _), told = read(
+    points, told = read(
         (tmp_path / "seam.csv").read_text(encoding="utf-8"),
         orientation="rotation_vector",
     )
     rows = module.seam()
     np.testing.assert_allclose(points.position, rows[:, :3] / 1e3, atol=5.1e-8)
     np.testing.assert_allclose(points.speed, rows[:, 6] / 6e4)
-    assert told == (
+    assert told[:3] == (
         "a byte order mark",
         "columns separated by semicolons",
         "decimal commas",

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
 from brachis.task.fields import LARGEST
-from brachis.task.point_data import FileUnits
+from brachis.task.point_data import FileUnits, PointFile
 from brachis.task.points.points import Array, Indices, Points
 from brachis.task.points.units import (
     CONVENTIONS,
@@ -185,7 +186,7 @@ _HEADING = re.compile(
 )
 
 
-def allowed_columns(rows: tuple[str, ...] | str) -> str:
+def _allowed_columns(rows: tuple[str, ...] | str) -> str:
     """Return the columns that a file may have, for messages."""
     return " | ".join(",".join(choice) for choice in _choices(rows))
 
@@ -197,7 +198,7 @@ def _choices(rows: tuple[str, ...] | str) -> tuple[tuple[str, ...], ...]:
 
 
 @dataclass(frozen=True)
-class Columns:
+class _Columns:
     """What the columns of a table of points are.
 
     Attributes
@@ -218,12 +219,12 @@ class Columns:
     where: str
 
 
-def read_columns(
+def _read_columns(
     header: tuple[str, ...],
     where: str,
     rows: tuple[str, ...] | str,
     stated: str | None = None,
-) -> Columns:
+) -> _Columns:
     """Return what the columns of a table are.
 
     Parameters
@@ -251,12 +252,12 @@ def read_columns(
         raise TaskError(
             "the columns are wrong",
             found=", ".join(header),
-            allowed=allowed_columns(rows),
+            allowed=_allowed_columns(rows),
             where=where,
             hint="The first line names the columns, separated by commas, semicolons, tabs or spaces; units may follow "
             "names (x_mm); a column feed may be added",
         )
-    return Columns(places, choice, _convention(choice, stated, where), where)
+    return _Columns(places, choice, _convention(choice, stated, where), where)
 
 
 def _heading(text: str) -> tuple[str, str | None]:
@@ -299,7 +300,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
     return stated or next(iter(possible), None)
 
 
-def _unit_of(name: str, kind: str, columns: Columns, units: FileUnits) -> str:
+def _unit_of(name: str, kind: str, columns: _Columns, units: FileUnits) -> str:
     """Return the unit of a column: the heading's, else the task's, else the default.
 
     Raises
@@ -335,27 +336,33 @@ def _unit_of(name: str, kind: str, columns: Columns, units: FileUnits) -> str:
     return unit
 
 
-def points_of(
-    table: Table, columns: Columns, units: FileUnits, source: str
+def read_points(
+    text: str, rows: tuple[str, ...] | str, settings: PointFile, source: str
 ) -> tuple[Points, tuple[str, ...]]:
-    """Return the points of a table in SI units, and what was found out about the units.
+    """Return the points of a table in SI units, and notes on how it was read.
 
     Parameters
     ----------
-    table : Table
-    columns : Columns
-        What its columns are.
-    units : FileUnits
-        As the task states them.
+    text : str
+        The table.
+    rows : tuple of str or str
+        Rows of the task space, or the word for one of poses.
+    settings : PointFile
+        Units, and convention of the orientations, as the task states them.
     source : str
         The file, for messages.
 
     Raises
     ------
     TaskError
-        Units are missing or contradict each other, a quaternion has no unit length, or a feed rate is not positive.
+        Columns are missing or unknown, units are missing or contradict each other, a quaternion has no unit length, or
+        a feed rate is not positive.
     """
-    notes = []
+    check = partial(_read_columns, rows=rows, stated=settings.orientation)
+    table = read_table(text, source, _allowed_columns(rows), check)
+    columns = check(table.header, f"{source}: line {table.header_line}")
+    notes = [*table.notes]
+    units = settings.units
 
     def read(names: Sequence[str], kind: str) -> Array:
         chosen = [columns.places[name] for name in names]
