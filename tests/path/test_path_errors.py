@@ -312,8 +312,9 @@ def test_every_derivative_is_compared(
     before[1] = after[1] = far[1] = [1.0, 0.0]
     far[0] = [2.0, 1.0]
     after[order] += jump
-    join = Join(0, 0.5, np.zeros(2), ("x", "y"))
-    corner = row_corner(join, septic(-far, before, 2.0), septic(after, far, 2.0))
+    first = septic(-far, before, 2.0)
+    second = septic(after, far, 2.0)
+    corner = row_corner(Join(first, second, 0, 0.5, ("x", "y")))
     assert (corner and corner.found) == expected
 
 

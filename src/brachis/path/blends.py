@@ -44,28 +44,26 @@ def septic(start: Array, end: Array, length: float) -> SplineCurve:
     return SplineCurve(spline, length, ends)
 
 
-def blend_rows(first: Curve, second: Curve, size: float, join: Join) -> Curve:
+def blend_rows(join: Join, size: float) -> Curve:
     """Return the blend that replaces the last `size` of one curve and the first `size` of the next.
 
     Parameters
     ----------
-    first, second : Curve
-        The curves that meet.
+    join : Join
+        Where the curves meet.
     size : float
         Replaced range of sigma on either side, m.
-    join : Join
-        Where they meet.
 
     Raises
     ------
     PathError
         The blend is longer than half of a neighbour, or (nearly) stops or reverses; or a neighbour moves yaw alone.
     """
-    _check_neighbours(first, second, size, join, still="yaw alone moves", turning="yaw")
-    return _blend(*_ends(first, second, size), join)
+    _check_neighbours(join, size, still="yaw alone moves", turning="yaw")
+    return _blend(join, *join.sides(size))
 
 
-def blend_poses(first: Curve, second: Curve, size: float, join: Join) -> Curve:
+def blend_poses(join: Join, size: float) -> Curve:
     """Return the blend that replaces the last `size` of one curve of poses and the first `size` of the next.
 
     It is the polynomial of the position and the quaternion, which is then divided by its length; see `blend_rows`.
@@ -75,19 +73,11 @@ def blend_poses(first: Curve, second: Curve, size: float, join: Join) -> Curve:
     PathError
         As for rows; or the tool turns too much in the blend.
     """
-    _check_neighbours(
-        first,
-        second,
-        size,
-        join,
-        still="the tool turns on the spot",
-        turning="the tool",
-    )
-    start, corner, end = _ends(first, second, size)
-    start = _with_quaternion(start)
-    end = _with_quaternion(end)
-    end[:, POSITIONS:] *= _sign(first, second, size)
-    columns = _blend(start, corner, end, join)
+    still = "the tool turns on the spot"
+    _check_neighbours(join, size, still=still, turning="the tool")
+    start, end = map(_with_quaternion, join.sides(size))
+    end[:, POSITIONS:] *= _sign(join, size)
+    columns = _blend(join, start, end)
     _, least = least_quality(columns)
     if least < LEAST_QUALITY:
         raise join.wrong_blend(
@@ -99,9 +89,7 @@ def blend_poses(first: Curve, second: Curve, size: float, join: Join) -> Curve:
     return quaternion_curve(columns)
 
 
-def _check_neighbours(
-    first: Curve, second: Curve, size: float, join: Join, *, still: str, turning: str
-) -> None:
+def _check_neighbours(join: Join, size: float, *, still: str, turning: str) -> None:
     """Refuse a blend where the position stands still, or that is too long.
 
     `still` says what happens where it stands still, and `turning` names what turns there.
@@ -111,14 +99,14 @@ def _check_neighbours(
     PathError
     """
     found = f"{size:g} {join.unit}"
-    if stands_still(first, join.positions) or stands_still(second, join.positions):
+    if any(stands_still(curve, join.positions) for curve in (join.first, join.second)):
         raise join.wrong_blend(
             f"a blend needs motion of the position on both sides, and {still} on one",
             found,
             "no blend here",
             f"Turn {turning} along a line, or stop there, with stop: true instead of the blend",
         )
-    longest = min(first.length, second.length) / 2
+    longest = join.shorter / 2
     if size > longest * (1.0 + tolerances.ROUNDING):
         raise join.wrong_blend(
             "the blend is longer than half of a neighbouring segment",
@@ -129,14 +117,7 @@ def _check_neighbours(
         )
 
 
-def _ends(first: Curve, second: Curve, size: float) -> tuple[Array, Array, Array]:
-    """Return the derivatives, (4, m), at the start of a blend, the corner, (m,), and the derivatives at its end."""
-    start = first.derivatives(np.array([first.length - size]))[:, 0]
-    corner = second.derivatives(np.zeros(1), 0)[0, 0]
-    return start, corner, second.derivatives(np.array([size]))[:, 0]
-
-
-def _blend(start: Array, corner: Array, end: Array, join: Join) -> SplineCurve:
+def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
     """Return the septic polynomial between derivatives (4, m), after a check that its position keeps going.
 
     Its length is the mean of the chord and of the polygon over the corner, which keeps its speed near 1.
@@ -146,7 +127,7 @@ def _blend(start: Array, corner: Array, end: Array, join: Join) -> SplineCurve:
     PathError
     """
     rows = join.positions
-    corners = [start[0, :rows], corner[:rows], end[0, :rows]]
+    corners = [start[0, :rows], join.point[:rows], end[0, :rows]]
     before, chord, after = (
         float(np.linalg.norm(one - other)) for one, other in combinations(corners, 2)
     )
@@ -171,12 +152,12 @@ def _with_quaternion(pose: Array) -> Array:
     )
 
 
-def _sign(first: Curve, second: Curve, size: float) -> float:
+def _sign(join: Join, size: float) -> float:
     """Return the sign of the end's quaternion that continues the start's along both curves."""
     steps = np.linspace(0.0, size, 9)
     poses = [
-        first.derivatives(first.length - size + steps, 0)[0],
-        second.derivatives(steps, 0)[0],
+        join.first.derivatives(join.first.length - size + steps, 0)[0],
+        join.second.derivatives(steps, 0)[0],
     ]
     quaternions = quaternions_of(rotation_of(rotations(np.concatenate(poses))))
     return float(np.sign(with_like_signs(quaternions)[-1] @ quaternions[-1]))

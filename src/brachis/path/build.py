@@ -101,16 +101,15 @@ def _join(
     taken = 0.0
     for join in find_joins(curves, coordinates.rows):
         i = join.index
-        curve = curves[i]
         size = segments[i].blend or 0.0
-        pieces.append(Piece(curve, taken, curve.length - size, i))
+        pieces.append(Piece(join.first, taken, join.first.length - size, i))
         taken = size
         if segments[i].stop:
             continue
         if not size:
-            corners.append(coordinates.corner(join, curve, curves[i + 1]))
+            corners.append(coordinates.corner(join))
         else:
-            rounded = coordinates.blend(curve, curves[i + 1], size, join)
+            rounded = coordinates.blend(join, size)
             pieces.append(Piece(rounded, 0.0, rounded.length))
     pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
     refuse_corners(corners)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,24 +19,41 @@ from brachis.robot.task_map.protocol import joints_of, position_rows
 
 @dataclass(frozen=True, eq=False)
 class Join:
-    """The place where segment `index` of the path ends and the next one begins, before blends.
+    """The place where one segment of the path ends and the next one begins, before blends.
 
     Attributes
     ----------
+    first, second : Curve
+        The curves that meet.
     index : int
         Index of the segment that ends.
     s : float
         Path coordinate.
-    point : ndarray, shape (m,)
-        Task coordinates; of a pose twelve.
     rows : tuple of str
         Rows of the task space; of a pose its position rows.
     """
 
+    first: Curve
+    second: Curve
     index: int
     s: float
-    point: Array
     rows: tuple[str, ...]
+
+    @property
+    def point(self) -> Array:
+        """Task coordinates, (m,); of a pose twelve."""
+        return self.second.derivatives(np.zeros(1), 0)[0, 0]
+
+    @property
+    def shorter(self) -> float:
+        """Length of the shorter curve, sigma."""
+        return min(self.first.length, self.second.length)
+
+    def sides(self, distance: float = 0.0) -> tuple[Array, Array]:
+        """Return the derivatives, (4, m), of both curves at a distance before and after the join, sigma."""
+        before = self.first.derivatives(np.array([self.first.length - distance]))
+        after = self.second.derivatives(np.array([distance]))
+        return before[:, 0], after[:, 0]
 
     @property
     def positions(self) -> int:
@@ -92,23 +110,15 @@ class Corner(NamedTuple):
 def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
     """Return the joins between consecutive curves."""
     ends = np.cumsum([curve.length for curve in curves])
-    points = [curve.derivatives(np.zeros(1), 0)[0, 0] for curve in curves[1:]]
     return [
-        Join(i, float(ends[i] / ends[-1]), point, rows)
-        for i, point in enumerate(points)
+        Join(first, second, i, float(ends[i] / ends[-1]), rows)
+        for i, (first, second) in enumerate(pairwise(curves))
     ]
 
 
-def at_join(first: Curve, second: Curve) -> tuple[Array, Array, float]:
-    """Return the derivatives, (4, m), of both curves where they meet, and the length of the shorter one."""
-    before = first.derivatives(np.array([first.length]))[:, 0]
-    after = second.derivatives(np.zeros(1))[:, 0]
-    return before, after, min(first.length, second.length)
-
-
-def row_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
+def row_corner(join: Join) -> Corner | None:
     """Return what jumps from one curve of rows to the next, or None where three derivatives continue."""
-    found = mismatch(*at_join(first, second), join.positions)
+    found = mismatch(*join.sides(), join.shorter, join.positions)
     return Corner(join, found, f"Set {join.rounding}") if found else None
 
 
@@ -177,21 +187,24 @@ def _of_yaw(before: Array, after: Array, positions: int) -> str:
     return f" in yaw alone, which turns by {before[1, -1]:.4g} rad/m before and {after[1, -1]:.4g} rad/m after"
 
 
-def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
+def pose_corner(join: Join) -> Corner | None:
     """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
-    on_the_spot = [stands_still(curve, POSITIONS) for curve in (first, second)]
+    on_the_spot = [
+        stands_still(curve, POSITIONS) for curve in (join.first, join.second)
+    ]
     if on_the_spot[0] != on_the_spot[1]:
         return Corner(
             join,
             "a stop: the position moves on one side, and the tool turns on the spot on the other",
             f"Turn the tool along a segment, by its orientation, or set {join.stopping}",
         )
-    before, after, length = at_join(first, second)
-    jump = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)
+    before, after = join.sides()
+    places = (before[:, :POSITIONS], after[:, :POSITIONS])
+    jump = mismatch(*places, join.shorter, POSITIONS)
     if jump:
         return Corner(join, jump, f"Set {join.rounding}")
     unit = "rad" if on_the_spot[0] else "m"
-    jump = _turning_mismatch(before, after, length, unit)
+    jump = _turning_mismatch(before, after, join.shorter, unit)
     otherwise = join.stopping if on_the_spot[0] else join.rounding
     advice = f"Set profile: smooth where the tool turns, or {otherwise}"
     return Corner(join, jump, advice) if jump else None
