@@ -239,7 +239,7 @@ class PoseCoordinates(RowCoordinates):
             return pose_curve(still, turn.over(still.length))
         shape = segment.shape
         if isinstance(shape, SplineThrough) and shape.orientations is not None:
-            return pose_spline(shape, shape.orientations, context, rotation)
+            return pose_spline(shape, context, rotation)
         if isinstance(shape, BSplineCurve) and shape.has_quaternions:
             return pose_bspline(shape, context, rotation)
         curve = BUILDERS[type(shape)](shape, context)

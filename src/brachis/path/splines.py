@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +27,6 @@ from brachis.path.rotations import (
 )
 from brachis.robot.plausibility import place_hint, turn_hint
 from brachis.robot.task_map.protocol import joints_of
-from brachis.task.orientation import Attitude
 from brachis.task.points.points import steps_of, sum_up
 from brachis.task.points.units import quaternions_of
 from brachis.task.segments import BSplineCurve, SplineThrough
@@ -61,10 +59,7 @@ def spline_through(
 
 
 def pose_spline(
-    shape: SplineThrough,
-    attitudes: Sequence[Attitude],
-    context: SegmentContext,
-    rotation: Array,
+    shape: SplineThrough, context: SegmentContext, rotation: Array
 ) -> MappedCurve:
     """Return the smooth curve through poses; where there is only one, the line with a uniform turn.
 
@@ -74,9 +69,7 @@ def pose_spline(
     Parameters
     ----------
     shape : SplineThrough
-        The waypoints.
-    attitudes : sequence of Attitude
-        The orientations at the waypoints.
+        The waypoints, with orientations.
     context : SegmentContext
         Place of the segment, in three position rows.
     rotation : ndarray, shape (3, 3)
@@ -89,7 +82,7 @@ def pose_spline(
         half a turn apart or turn back and forth too much.
     """
     points = _waypoints_of(shape, context)
-    turned = _rotations(shape, attitudes, context, rotation)
+    turned = _rotations(shape, context, rotation)
     if _repeats_start(np.hypot(steps_of(points), _angles(turned))):
         kept = np.delete(np.arange(len(points)), 1)
         points = points[kept]
@@ -97,11 +90,11 @@ def pose_spline(
     angles = _angles(turned)
     for i in np.flatnonzero(angles > np.pi - AMBIGUOUS):
         raise half_turn(
-            f"{context.key}.orientations[{i + len(attitudes) - len(angles)}]"
+            f"{context.key}.orientations[{i + len(shape.through) - len(angles)}]"
         )
     knots = _chord_knots(steps_of(points), angles, shape, context)
     if len(points) == 2:
-        last = f"{context.key}.orientations[{len(attitudes) - 1}]"
+        last = f"{context.key}.orientations[{len(shape.through) - 1}]"
         turn = turn_between(rotation, turned[1], last)
         position = _interpolate(knots, points)
         return pose_curve(position, turn.over(position.length))
@@ -126,14 +119,11 @@ def _angles(turned: Rotation) -> Array:
 
 
 def _rotations(
-    shape: SplineThrough,
-    attitudes: Sequence[Attitude],
-    context: SegmentContext,
-    matrix: Array,
+    shape: SplineThrough, context: SegmentContext, matrix: Array
 ) -> Rotation:
     """Return the n rotations at the start and the waypoints."""
     start = rotation_of(matrix)
-    given = [rotation_from(attitude) for attitude in attitudes]
+    given = [rotation_from(attitude) for attitude in shape.orientations or ()]
     expected = start
     if shape.starts_oriented is not None:
         expected = rotation_from(shape.starts_oriented)

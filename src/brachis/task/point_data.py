@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import degrees
 from typing import Annotated, Any, Literal
 
@@ -23,9 +24,12 @@ from brachis.task.fields import (
     must,
     refuse,
 )
-from brachis.task.points.units import ANGLES, CONVENTIONS, LENGTHS, choices, quantity
+from brachis.task.points.units import ANGLES, CONVENTIONS, LENGTHS, choices
 
 _LISTED = 10
+_NUMBER_AND_UNIT = re.compile(
+    r"^\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z/]+)\s*$"
+)
 
 
 def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
@@ -34,14 +38,14 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
     def read(value: object) -> object:
         if not isinstance(value, str):
             return value
-        number = quantity(value, units)
-        if number is None:
+        match = _NUMBER_AND_UNIT.match(value)
+        if match is None or match[2] not in units:
             raise refuse(
                 "this is not a number with a unit",
                 found=value,
                 allowed=f"a number with a unit ({', '.join(units)}), as {example}",
             )
-        return number
+        return float(match[1]) * units[match[2]]
 
     return BeforeValidator(read)
 

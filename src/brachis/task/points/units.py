@@ -1,11 +1,10 @@
-"""Units of lengths, angles and speeds, and quantities that are written with them.
+"""Units of lengths, angles and speeds.
 
 How orientations are written down: by quaternions, rotation vectors, and the angles that the makers of robots use.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
@@ -36,17 +35,6 @@ SPEEDS: Final = {
 }
 UNITS: Final = {"length": LENGTHS, "angle": ANGLES, "speed": SPEEDS}
 """Factors to SI units by kind of quantity."""
-_QUANTITY = re.compile(
-    r"^\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z/]+)\s*$"
-)
-
-
-def quantity(text: str, units: dict[str, float]) -> float | None:
-    """Read ``0.05 mm`` as a number in SI units; None for any other text."""
-    match = _QUANTITY.match(text)
-    if match is None or match[2] not in units:
-        return None
-    return float(match[1]) * units[match[2]]
 
 
 @dataclass(frozen=True)
