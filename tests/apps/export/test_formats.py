@@ -17,7 +17,7 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_typestore
 
 from brachis import export
-from brachis.apps.export.animation import frame_times, frames
+from brachis.apps.export.animation import frames
 from brachis.errors import BrachisWarning, InputError, UnknownNameError
 from brachis.robot import Robot
 from brachis.trajectory import Trajectory
@@ -244,7 +244,7 @@ def test_a_joint_that_stands_still_may_be_left_out_without_a_word(ur10, tmp_path
 
 def test_gif(line_trajectory, written):
     path = written(".gif", dt=1.2)
-    times = frame_times(line_trajectory, 1.2)
+    times = line_trajectory.sample(1.2).t
     assert times[-1] == line_trajectory.t_end
     durations, pictures = [], []
     with Image.open(path) as film:
@@ -275,7 +275,7 @@ def test_an_animation_may_be_slower_and_nothing_else_may(line_trajectory, tmp_pa
     path = tmp_path / "slow.gif"
     export.write(line_trajectory, path, dt=1.2, slower=3.0)
     with Image.open(path) as film:
-        assert film.n_frames == len(frame_times(line_trajectory, 0.4))
+        assert film.n_frames == len(line_trajectory.sample(0.4).t)
     (figure, _), *_ = frames(line_trajectory, np.zeros(1), 3.0)
     assert figure._suptitle.get_text().endswith("3 times slower")
     with pytest.raises(
@@ -308,7 +308,7 @@ def test_mp4(line_trajectory, written):
         check=True,
     )
     (stream,) = json.loads(done.stdout)["streams"]
-    assert stream["nb_read_frames"] == str(len(frame_times(line_trajectory, 0.5)))
+    assert stream["nb_read_frames"] == str(len(line_trajectory.sample(0.5).t))
     assert stream["r_frame_rate"] == "2/1"
 
 

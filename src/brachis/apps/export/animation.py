@@ -34,12 +34,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def frame_times(trajectory: Trajectory, dt: float) -> np.ndarray:
-    """Return the times of the pictures, (K,), s: multiples of the period, and the end, at which the last one stands."""
-    times = np.arange(np.ceil(trajectory.t_end / dt * (1.0 - 1e-12)) + 1.0) * dt
-    return np.minimum(times, trajectory.t_end)
-
-
 def frames(
     trajectory: Trajectory, times: np.ndarray, slower: float = 1.0
 ) -> Iterator[tuple[Figure, np.ndarray]]:
@@ -171,7 +165,7 @@ def film_of(
             found=f"{dt} s",
             allowed=f"a multiple of {step:g} s, with no more than {most} pictures in all",
         )
-    found = frames(trajectory, frame_times(trajectory, dt / slower), slower)
+    found = frames(trajectory, trajectory.sample(dt / slower).t, slower)
     return Film((pixels[:, :, :3].copy() for _, pixels in found), dt)
 
 
