@@ -32,6 +32,7 @@ from brachis.apps.plots import (
     plot_timeline,
     plot_torques,
 )
+from brachis.task import Tolerances
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "docs/figures"
@@ -176,6 +177,23 @@ def weld_seams() -> Planned:
     return {"rail": result}
 
 
+def round_the_post() -> Planned:
+    """Draw how near a motion comes to its limits, a post among them."""
+    result = planned("14_round_the_post")
+    save(plot_limits(result.trajectory), "round_the_post")
+    task = brachis.load_task(ROOT / "examples/14_round_the_post.yaml")
+    return {"round the post": result, "without a scene": brachis.plan(task, scene=())}
+
+
+def tilted_torch() -> Planned:
+    """Draw a motion whose tool may tilt."""
+    result = planned("15_tilted_torch")
+    save(plot_overview(result.trajectory), "tilted_torch")
+    task = brachis.load_task(ROOT / "examples/15_tilted_torch.yaml")
+    fixed = brachis.plan(task, tolerances=Tolerances())
+    return {"tilt up to 15 degrees": result, "no tilt": fixed}
+
+
 def crane() -> Planned:
     """Draw the motion with a plug-in's closed form."""
     family = load("examples/ik_plugin/src/brachis_polar/__init__.py").polar
@@ -209,6 +227,8 @@ EXAMPLES: dict[str, Callable[[], Planned]] = {
     "11": joint_path,
     "12": today,
     "13": weld_seams,
+    "14": round_the_post,
+    "15": tilted_torch,
     "ik_plugin": crane,
     "limit_plugin": coupled,
 }

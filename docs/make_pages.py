@@ -24,6 +24,8 @@ PICTURES = {
     "11": "joint_path.png",
     "12": "today.png",
     "13": "weld_seams.png",
+    "14": "round_the_post.png",
+    "15": "tilted_torch.png",
     "ik_plugin": "crane.png",
     "limit_plugin": "coupled.png",
 }

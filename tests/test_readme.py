@@ -316,6 +316,16 @@ def test_example_13():
     assert phases[3].duration == pytest.approx(0.5, abs=1e-12)
 
 
+@pytest.mark.parametrize("name", ["14_round_the_post", "15_tilted_torch"])
+def test_examples_of_cells(name):
+    """They keep their clearance and their cone, and say so."""
+    task = brachis.load_task(ROOT / f"examples/{name}.yaml")
+    result = brachis.plan(task, effort="single", least_motion=False)
+    assert result.verified
+    kinds = {check.name for check in result.verification.checks}
+    assert kinds >= ({"clearance ratio"} if task.scene else {"tool tilt ratio"})
+
+
 def test_published_figure_lies_between_16_and_17_intervals():
     benchmark = load(ROOT / "studies/published_figure.py")
     assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)

@@ -17,7 +17,7 @@ from brachis.limits import (
     limits_of,
 )
 from brachis.robot import dynamics
-from brachis.task import LimitSpec, SpeedTable, Tolerances, ToolLimits
+from brachis.task import LimitSpec, Margins, SpeedTable, Tolerances, ToolLimits
 from brachis.task.scene import CollisionSettings, SceneBody
 from support.chains import planar_robot
 from support.phases import FRICTION
@@ -54,6 +54,8 @@ TASK = SimpleNamespace(
     collisions=CollisionSettings(capsules="auto"),
     collision_mode="avoid",
     tolerances=Tolerances(),
+    margins=Margins(singularity=0.2, joint_ends=0.1),
+    task_space=("x", "z"),
 )
 OF_TOLERANCES = ("tool_tilt", "tool_distance", "tool_range")
 """They need the virtual joints of the tool; see `test_tolerances.py`."""
@@ -111,7 +113,8 @@ def test_every_value_has_a_label_and_a_figure(limit):
     assert len(limit.labels) == len(limit.upper) == count
     assert len({str(label) for label in limit.labels}) == count
     assert all(
-        label.unit and label.key.split(".")[0] in ("robot", "tool_limits", "collisions")
+        label.unit
+        and label.key.split(".")[0] in ("robot", "tool_limits", "collisions", "margins")
         for label in limit.labels
     )
     assert {bound.column for bound in limit.bounds} == set(range(count))
@@ -160,6 +163,7 @@ def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
         collisions=CollisionSettings(),
         collision_mode="off",
         tolerances=Tolerances(),
+        margins=Margins(),
     )
     kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
     assert kinds == ["torque", "velocity", "position"]

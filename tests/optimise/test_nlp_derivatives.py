@@ -10,7 +10,14 @@ from brachis.optimise.program import Program
 from support.jacobians import dense, differences, told
 from support.phases import CASES, phase_of, reachable_points
 
-OTHER_ROBOTS = ("tool_tilt", "tool_distance", "tool_range", "clearance")
+OTHER_ROBOTS = (
+    "singularity",
+    "joint_ends",
+    "tool_tilt",
+    "tool_distance",
+    "tool_range",
+    "clearance",
+)
 KINDS = [*(kind for kind in limits.TABLE if kind not in OTHER_ROBOTS), "branch_margin"]
 UNTIMED = ("position", "branch_margin")
 

@@ -21,6 +21,7 @@ from brachis.limits.checks import build_user_limits
 from brachis.limits.clearance import build_clearance
 from brachis.limits.drives import build_torque_speed, build_total_power
 from brachis.limits.joint import JOINT_LIMITS
+from brachis.limits.margins import build_joint_ends, build_singularity
 from brachis.limits.protocol import (
     Bound,
     Description,
@@ -66,6 +67,8 @@ TABLE: dict[str, Build] = {}
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_LIMITS[_kind].build
     TABLE |= _AFTER.get(_kind, {})
+TABLE["singularity"] = build_singularity
+TABLE["joint_ends"] = build_joint_ends
 TABLE["tool_tilt"] = build_tool_tilt
 TABLE["tool_distance"] = build_tool_distance
 TABLE["tool_range"] = build_tool_range

@@ -41,7 +41,7 @@ class Clearance(Limit):
     lower : (P,) ndarray, optional
         Bounds of the values, where they are not the clearance.
     spare : float, optional
-        Distance that `restrict_to` adds to them, m.
+        By how much they are above it, as a violation.
     """
 
     kind = "clearance"
@@ -55,13 +55,13 @@ class Clearance(Limit):
         scene: Scene,
         clearance: float,
         lower: np.ndarray | None = None,
-        spare: float = _SPARE,
+        spare: float = 0.0,
     ) -> None:
         count = len(scene.pairs)
         self._chain = chain
         self._scene = scene
         self._clearance = clearance
-        self._spare = spare
+        self.spare = spare
         self._last: tuple[bytes, ClosePairs] | None = None
         self.labels = tuple(
             Label(scene.names(pair), "clearance", "m", "collisions.clearance")
@@ -82,9 +82,10 @@ class Clearance(Limit):
         kept = np.unique(close.pair)
         if not len(kept):
             return None
-        lower = self.lower[kept] + self._spare / UNIT
+        spare = _SPARE / UNIT
+        lower = self.lower[kept] + (spare - self.spare)
         scene = self._scene.with_pairs(kept)
-        return Clearance(self._chain, scene, self._clearance, lower, spare=0.0)
+        return Clearance(self._chain, scene, self._clearance, lower, spare)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
         """Tell in which postures, (K, n), no pair is too close, (K,)."""

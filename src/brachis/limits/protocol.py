@@ -223,6 +223,8 @@ class Description:
         Highest time derivative of q in the values: 2, or 3 for the jerk. The splines' degree must be at least as high.
     violation_scale : (c,) ndarray or float
         Violation of a value that is beyond its bound by 1 (see the module).
+    spare : float
+        Violation that does no harm, because bounds are narrower by so much than the user wants them.
     refusal : str
         What a message says of an arm at rest beyond the limit, after "the ... limit".
     """
@@ -238,6 +240,7 @@ class Description:
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     violation_scale: np.ndarray | float = 1.0
+    spare: float = 0.0
     refusal: str = "is exceeded at rest"
 
     @property

@@ -33,6 +33,8 @@ _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
 _MESHES = 5
 """Choices of knots that are tried, no more."""
+_BETTER = 0.5
+"""Part of a violation of limits on postures that is left by a finer mesh worth its time."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
 _LOOKS = (4, 10)
@@ -97,6 +99,7 @@ def follow(
         return None
     best = None
     lost = _FIRST_LOSS * tolerance
+    outside = np.inf
     for number in range(1, _MESHES + 1):
         breaks = _knots(phase, own, timing, lost)
         if len(breaks) > _MOST_INTERVALS:
@@ -105,8 +108,9 @@ def follow(
         laid = _hold_limits(phase, own, timing, breaks, allowed)
         if best is None or laid.is_better_than(best):
             best = laid
-        if laid.slower < tolerance and laid.outside <= _ENOUGH:
+        if laid.slower < tolerance and not _ENOUGH < laid.outside < _BETTER * outside:
             break
+        outside = laid.outside
         wanted = _AIM * tolerance / laid.slower
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
@@ -244,7 +248,9 @@ def _hold_limits(
             limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
         }
         violation = max((each.max() for each in beyond.values()), default=0.0)
-        outside = [own.violation(own.values(state)).max() for own in of_postures]
+        outside = [
+            own.violation(own.values(state)).max() - own.spare for own in of_postures
+        ]
         laid = _Laid(motion, float(violation), outside=max(outside, default=0.0))
         idle = 0 if laid.needed < best.needed * (1.0 - _ENOUGH) else idle + 1
         if laid.needed < best.needed:

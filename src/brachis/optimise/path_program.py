@@ -42,7 +42,7 @@ _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
 _SMALL = 5e-5
 """Violation of a limit on postures that is left."""
-_SPARE = 1e-4
+_SPARE = 1e-3
 """Violation that they stay away from, but for the ends."""
 _RAMP = 5.0
 """Places from an end at which they do."""
@@ -130,7 +130,7 @@ class PathPhase:
         self._bounds = np.repeat(lower_and_upper[:, None], len(places), axis=1)
         # Splines over time leave a joint path by a little.
         for values, limit in self._posture_limits():
-            self._narrow(values, _SPARE / limit.violation_scale)
+            self._narrow(values, max(_SPARE - limit.spare, 0.0) / limit.violation_scale)
         self._set_pattern(columns)
         self._last: tuple[bytes, Evaluation] | None = None
 
@@ -236,7 +236,7 @@ class PathPhase:
         motion = Moments.at_rest(self.phase.joint_map.postures(curves))
         worst = 0.0
         for columns, limit in self._posture_limits():
-            violation = limit.violation(limit.values(motion)).max(axis=0)
+            violation = limit.violation(limit.values(motion)).max(axis=0) - limit.spare
             worst = max(worst, float(violation.max()))
             more = np.where(violation > _SMALL, _MORE * violation, 0.0)
             self._narrow(columns, more / limit.violation_scale)

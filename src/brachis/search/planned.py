@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from brachis.common.summary import Summary
@@ -128,6 +128,7 @@ class PlannedMotion(Summary):
             "verified": self.verified,
             "timing_gap": self.timing_gap and self.timing_gap.to_dict(),
             "worst_ratio": self.verification.worst_ratio,
+            "margins": [asdict(margin) for margin in self.verification.margins],
             "path_error": self.verification.path_error,
             "joint_names": list(trajectory.joint_names),
         }

@@ -57,7 +57,7 @@ from brachis.task.settings import (
     SolverSettings,
     SplineSettings,
 )
-from brachis.task.tolerances import Tolerances
+from brachis.task.tolerances import Margins, Tolerances
 
 __all__ = [
     "FROM_URDF",
@@ -79,6 +79,7 @@ __all__ = [
     "LimitsFile",
     "LineBy",
     "LineSegment",
+    "Margins",
     "Payload",
     "Placement",
     "PointFile",

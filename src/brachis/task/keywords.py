@@ -25,7 +25,7 @@ from brachis.task.settings import (
     SolverSettings,
     SplineSettings,
 )
-from brachis.task.tolerances import Tolerances
+from brachis.task.tolerances import Margins, Tolerances
 
 Posture = (
     Array
@@ -64,6 +64,7 @@ class TaskKeywords(TypedDict, total=False):
     scene: Sequence[SceneBody | Settings] | Settings
     collisions: CollisionSettings | Settings
     tolerances: Tolerances | Settings
+    margins: Margins | Settings
     custom_limits: Mapping[str, Settings]
     strict: bool | None
     # robot

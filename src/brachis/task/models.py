@@ -56,6 +56,7 @@ from brachis.task.settings import (
     expand_solver_name,
 )
 from brachis.task.tolerances import (
+    Margins,
     OrientationTolerance,
     PositionTolerance,
     Tolerances,
@@ -203,6 +204,8 @@ class Task(Model):
     """The clearance, which pairs of bodies keep it, and whether it is a limit of the plan."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """Ranges within which the tool may leave the path's orientation and position."""
+    margins: Margins = Field(default_factory=Margins)
+    """Margins from singular postures and from the ends of joint ranges."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"
@@ -399,6 +402,7 @@ class Task(Model):
                     ("redundant_joints", "auto"),
                     ("branch", "auto"),
                     ("search.guesses", "lattice"),
+                    ("margins.singularity", None),
                 )
             ),
         )

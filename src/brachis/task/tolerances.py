@@ -1,4 +1,4 @@
-"""Tolerances of the tool: ranges within which it may leave the orientation and the position that the path states."""
+"""Tolerances of the tool, within which it may leave the path, and margins that the arm keeps."""
 
 from __future__ import annotations
 
@@ -101,3 +101,12 @@ class Tolerances(Model):
     """Ranges of the orientation: {tilt: 15}, in degrees."""
     position: PositionTolerance = Field(default_factory=PositionTolerance)
     """Ranges of the position: {sphere: 0.002}, in m."""
+
+
+class Margins(Model):
+    """Margins that the motion keeps; their smallest values are reported in any case."""
+
+    singularity: Positive | None = None
+    """Least singular value of the Jacobian of what the path prescribes (m and rad, per rad and m). Null: none."""
+    joint_ends: Annotated[float, Field(gt=0.0, lt=0.5)] | None = None
+    """Part of each joint's range that is kept free at both ends, such as 0.05. Null: none."""

@@ -15,6 +15,35 @@ POSITION_SCALE = "0: the middle of the range, 1: an end"
 
 
 @dataclass(frozen=True)
+class Margin:
+    """The smallest value of a margin at the instants that were looked at.
+
+    Attributes
+    ----------
+    name : str
+        What it is.
+    value : float
+    unit : str
+        ``-`` or ``%``.
+    subject : str
+        Of what: a joint, or the arm.
+    time : float
+        s.
+    """
+
+    name: str
+    value: float
+    unit: str
+    subject: str
+    time: float
+
+    def in_words(self) -> str:
+        """Say how large it is, of what, and when."""
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        return f"{self.value:.3g}{unit}, {self.subject} at {self.time:.4g} s"
+
+
+@dataclass(frozen=True)
 class Check:
     """One thing that was checked.
 
@@ -94,6 +123,8 @@ class Verification(Summary):
         Largest ratio of any quantity to its limit.
     path_error : float
         Largest distance from the path: m for position rows, rad for yaw, whichever is larger.
+    margins : tuple of Margin
+        How near the motion comes to singular postures, and to the ends of joint ranges.
 
     Examples
     --------
@@ -107,6 +138,7 @@ class Verification(Summary):
     points: int
     worst_ratio: float
     path_error: float
+    margins: tuple[Margin, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -123,6 +155,7 @@ class Verification(Summary):
             "passed": "yes" if self.passed else "NO",
             "worst ratio": self.worst_ratio,
             **{check.name: check.in_words() for check in self.checks},
+            **{margin.name: margin.in_words() for margin in self.margins},
         }
 
 

@@ -25,6 +25,7 @@ from brachis.verify.checks import (
     check_splines,
 )
 from brachis.verify.limits import check_limits
+from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Given, MotionStates, Pieces, all_places
 from brachis.verify.phases import check_process_speed, check_stops
@@ -103,7 +104,8 @@ def verify_trajectory(
         *check_continuity(given),
     ]
     worst = max((check.value for check in ratios), default=0.0)
-    return Verification(tuple(checks), len(states.t), worst, path_check.value)
+    margins = find_margins(given)
+    return Verification(tuple(checks), len(states.t), worst, path_check.value, margins)
 
 
 def _check_path(given: Given) -> Check:

@@ -140,6 +140,7 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
         numbers=("worst", "allowed", "time [s]"),
     )
     print_lines(*scales)
+    print_lines(*(f"{each.name}: {each.in_words()}" for each in verification.margins))
 
 
 def print_error(message: str) -> None:

@@ -90,7 +90,7 @@ def rows_of(
         A joint that moves is not among them.
     """
     names = trajectory.joint_names
-    real = trajectory.robot.urdf_joints
+    real = names[: len(trajectory.robot.urdf_joints)]
     chosen = list(real if joints is None else joints)
     for name in chosen:
         if name not in names:

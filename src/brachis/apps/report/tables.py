@@ -267,6 +267,10 @@ def check_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
             "remark": check.remark,
         }
         rows.append(row)
+    kept = {"allowed": "", "passed": True, "remark": ""}
+    for margin in motion.verification.margins:
+        found, where = margin.in_words().split(", ", 1)
+        rows.append({"name": margin.name, "found": found, "where": where, **kept})
     return rows
 
 

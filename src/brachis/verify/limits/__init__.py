@@ -19,6 +19,7 @@ from brachis.verify.limits.joint import (
     worst_torque_at_speed,
     worst_total_power,
 )
+from brachis.verify.limits.margins import MARGIN_CHECKS
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.limits.tolerance import TOLERANCE_CHECKS
 from brachis.verify.limits.tool import TOOL_CHECKS
@@ -37,6 +38,7 @@ TABLE: dict[str, LimitCheck] = {}
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_CHECKS[_kind]
     TABLE |= _AFTER.get(_kind, {})
+TABLE |= MARGIN_CHECKS
 TABLE |= TOLERANCE_CHECKS
 TABLE["clearance"] = worst_clearance
 

@@ -1,0 +1,121 @@
+"""Margins that a motion keeps on request: from singular postures of the arm, and from the ends of joint ranges.
+
+With the singular vectors u and v of its least singular value the Jacobian J(q) gives the slope u^T dJ v.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials
+from brachis.robot import Robot, task_map_of
+from brachis.robot.joints import in_turn_of
+from brachis.task import Task
+
+
+class SingularityLimit(Limit):
+    """Least singular value of the task Jacobian of the arm's own joints over the least that is wanted.
+
+    Parameters
+    ----------
+    robot : Robot
+    task : Task
+    figure : float
+        The least singular value.
+    """
+
+    kind = "singularity"
+    at_rest = "posture"
+    refusal = "is not kept"
+
+    def __init__(self, robot: Robot, task: Task, figure: float) -> None:
+        self._task_map = task_map_of(robot, task.task_space)
+        self._count = len(robot.urdf_joints)
+        self._figure = figure
+        key = "margins.singularity"
+        self.labels = (Label("arm", "least singular value", "-", key),)
+        self.lower = np.ones(1)
+        self.upper = np.full(1, np.inf)
+        self.bounds = (Bound(0, figure, figure, 1.0 / figure, "lower"),)
+
+    def _arm_jacobian(self, twists: np.ndarray) -> np.ndarray:
+        return self._task_map.jacobian(twists)[:, :, : self._count]
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        jacobian = self._arm_jacobian(self._task_map.twists(motion.q))
+        least = np.linalg.svd(jacobian, compute_uv=False)[:, -1:]
+        return np.asarray(least / self._figure)
+
+    def partials(self, motion: JointStates) -> Partials:
+        twists = self._task_map.twists(motion.q)
+        left, sizes, right = np.linalg.svd(self._arm_jacobian(twists))
+        last = sizes.shape[1] - 1
+        moving = np.zeros_like(motion.q)
+        moving[:, : self._count] = right[:, last]
+        slopes = self._task_map.velocity_slopes(twists, moving)
+        by_q = np.einsum("ki,kij->kj", left[:, :, last], slopes)
+        return Partials(q=by_q[:, None] / self._figure)
+
+
+class JointEndLimit(Limit):
+    """Joint positions away from the ends of their ranges, as parts of these, 0 to 1.
+
+    Parameters
+    ----------
+    robot : Robot
+    share : float
+        Part of each range that is kept free at both ends.
+    """
+
+    kind = "joint_ends"
+    at_rest = "posture"
+    refusal = "is not kept"
+
+    def __init__(self, robot: Robot, share: float) -> None:
+        count = len(robot.urdf_joints)
+        lower = robot.limits.position_lower[:count]
+        width = robot.limits.position_upper[:count] - lower
+        joints = np.flatnonzero(np.isfinite(width))
+        self._joints = joints
+        self._begin = lower[joints]
+        self._width = width[joints]
+        self._revolute = robot.revolute[joints]
+        self._rows = np.eye(robot.n)[joints] / self._width[:, None]
+        kind = "position in its range"
+        self.labels = tuple(
+            Label(robot.joint_names[joint], kind, "-", "margins.joint_ends")
+            for joint in joints
+        )
+        self.lower = np.full(len(joints), share)
+        self.upper = 1.0 - self.lower
+        self.violation_scale = np.minimum(self._width, 1.0)
+
+    def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
+        """Tell in which postures, (K, n), it holds in the turn that is nearest to the middle of the range, (K,)."""
+        middle = self._begin + 0.5 * self._width
+        turned = q.copy()
+        own = in_turn_of(q[:, self._joints], middle, self._revolute)
+        turned[:, self._joints] = own
+        return super().holds_at_rest(turned, slack)
+
+    def values(self, motion: JointStates) -> np.ndarray:
+        return np.asarray((motion.q[:, self._joints] - self._begin) / self._width)
+
+    def partials(self, motion: JointStates) -> Partials:
+        shape = (len(motion.q), *self._rows.shape)
+        return Partials(q=np.broadcast_to(self._rows, shape))
+
+
+def build_singularity(robot: Robot, task: Task) -> SingularityLimit | None:
+    """Build the limit of a task that keeps away from singular postures."""
+    figure = task.margins.singularity
+    return None if figure is None else SingularityLimit(robot, task, figure)
+
+
+def build_joint_ends(robot: Robot, task: Task) -> JointEndLimit | None:
+    """Build the limit of a task that keeps away from the ends of joint ranges."""
+    share = task.margins.joint_ends
+    if share is None:
+        return None
+    limit = JointEndLimit(robot, share)
+    return limit if limit.labels else None

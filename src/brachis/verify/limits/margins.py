@@ -1,0 +1,102 @@
+"""Margins of a motion by the URDF's own chain: from singular postures of the arm, and from the ends of joint ranges.
+
+The columns of the Jacobian at the tool's origin p, of joints through o along z, are z x (p - o) and z where they turn,
+z and 0 where they slide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.robot.task_map import JointSpace, RowsAndYaw
+from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
+from brachis.verify.mechanics import joint_placements, tool_placements
+from brachis.verify.motion import Given, MotionStates
+from brachis.verify.report import Margin
+
+
+def find_margins(given: Given) -> tuple[Margin, ...]:
+    """Find the smallest singular value of the arm's Jacobian, and the smallest distance from the end of a range."""
+    states = given.states
+    margins: list[Margin] = []
+    if not np.isfinite(states.q).all():
+        return ()
+    if not isinstance(given.task_map, JointSpace):
+        singular = _singular_values(given, states)
+        k = int(np.argmin(singular))
+        time = float(states.t[k])
+        name = "smallest singular value"
+        margins.append(Margin(name, float(singular[k]), "-", "arm", time))
+    used, names = _parts_of_ranges(given, states)
+    if names:
+        place, joint = np.unravel_index(int(np.argmax(used)), used.shape)
+        left = 50.0 * (1.0 - float(used[place, joint]))
+        time = float(states.t[place])
+        name = "smallest distance from the end of a range"
+        margins.append(Margin(name, left, "%", names[joint], time))
+    return tuple(margins)
+
+
+def _singular_values(given: Given, states: MotionStates) -> np.ndarray:
+    """Least singular values, (K,), of the Jacobian of the rows that the task prescribes, by the arm's own joints."""
+    rotations, origins = joint_placements(given.robot, states.q)
+    tool = tool_placements(given.robot, states.q)[0]
+    columns = []
+    for number, body in enumerate(given.robot.urdf_dynamics.bodies, 1):
+        axis = rotations[:, number] @ body.axis
+        arm = np.cross(axis, tool - origins[:, number])
+        parts = (axis, 0.0 * axis) if body.sliding else (arm, axis)
+        columns.append(np.concatenate(parts, axis=1))
+    every = np.stack(columns, axis=2)
+    task_map = given.task_map
+    rows = list(task_map.axes)
+    if isinstance(task_map, RowsAndYaw):
+        rows.append(3 + task_map.world_axis)
+    elif task_map.m > len(rows):
+        rows += [3, 4, 5]
+    return np.linalg.svd(every[:, rows], compute_uv=False)[:, -1]
+
+
+def _parts_of_ranges(
+    given: Given, states: MotionStates
+) -> tuple[np.ndarray, list[str]]:
+    """Distances from the middle of joint ranges, (K, c), 1 at their ends, and the names of these joints."""
+    limits = given.robot.limits
+    count = len(given.robot.urdf_joints)
+    ends = np.array([limits.position_lower, limits.position_upper])[:, :count]
+    joints = np.flatnonzero(np.isfinite(ends).all(axis=0))
+    lower, upper = ends[:, joints]
+    away = np.abs(states.q[:, joints] - 0.5 * (lower + upper))
+    names = [given.robot.joint_names[joint] for joint in joints]
+    return away / (0.5 * (upper - lower)), names
+
+
+def _worst_singularity(given: Given) -> Worst | None:
+    """Find the largest ratio of the singular value that is wanted to the least one."""
+    wanted = given.task.margins.singularity
+    if wanted is None:
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        return 2.0 - _singular_values(given, states)[:, None] / wanted
+
+    return worst_between(given, ratios, ("arm",))
+
+
+def _worst_joint_end(given: Given) -> Worst | None:
+    """Find the largest ratio of how far a joint is from the middle of its range to what is wanted."""
+    share = given.task.margins.joint_ends
+    names = _parts_of_ranges(given, given.states)[1]
+    if share is None or not names:
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        return _parts_of_ranges(given, states)[0] / (1.0 - 2.0 * share)
+
+    return worst_between(given, ratios, names)
+
+
+MARGIN_CHECKS: dict[str, LimitCheck] = {
+    "singularity": _worst_singularity,
+    "joint_ends": _worst_joint_end,
+}
