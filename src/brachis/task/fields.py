@@ -184,6 +184,21 @@ def plain(
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
+def merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Merge mappings key by key; everything else of `changes` takes the place of what there is.
+
+    A start of the path is replaced as a whole, since its orientation may be in another convention.
+    """
+    both = {
+        key: merge(content[key], value)
+        for key, value in changes.items()
+        if isinstance(value, Mapping)
+        and isinstance(content.get(key), Mapping)
+        and key != "path_start"
+    }
+    return {**content, **changes, **both}
+
+
 def refuse(
     problem: str,
     *,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
-from brachis.task.fields import Model, plain
+from brachis.task.fields import Model, merge, plain
 from brachis.task.limit_kinds import Array, LimitKeywords
 from brachis.task.limit_models import LimitSpec, ToolLimits
 from brachis.task.load import Source, load_task
@@ -152,10 +152,10 @@ def task_with(
     if source is not None:
         content = load_task(source).model_dump(exclude_unset=True)
     for key, value in keywords.items():
+        change = {key: _in_full(key, value)}
         if key in _SECTION_OF:
-            content = _merge(content, {_SECTION_OF[key]: {key: value}})
-        else:
-            content = _merge(content, {key: _in_full(key, value)})
+            change = {_SECTION_OF[key]: change}
+        content = merge(content, change)
     return load_task(content)
 
 
@@ -217,18 +217,3 @@ def _in_full(key: str, value: object) -> object:
     if isinstance(value, Mapping) and set(value) == {"joints"}:
         return value
     return {"joints": plain(value)}
-
-
-def _merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge mappings key by key; everything else of `changes` takes the place of what there is.
-
-    A start of the path is replaced as a whole, since its orientation may be in another convention.
-    """
-    both = {
-        key: _merge(content[key], value)
-        for key, value in changes.items()
-        if isinstance(value, Mapping)
-        and isinstance(content.get(key), Mapping)
-        and key != "path_start"
-    }
-    return {**content, **changes, **both}

@@ -19,6 +19,7 @@ from brachis.task.fields import (
     NonEmpty,
     Number,
     Positive,
+    merge,
 )
 from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, validate
@@ -187,11 +188,8 @@ def with_limits_of_file(
         str(file),
         {**robot, "limits": own},
     )
-    for kind, value in own.items():
-        both = isinstance(value, Mapping) and isinstance(merged.get(kind), Mapping)
-        merged[kind] = {**merged[kind], **value} if both else value
     rest = {key: value for key, value in robot.items() if key != "limits_file"}
-    return {**content, "robot": {**rest, "limits": merged}}
+    return {**content, "robot": {**rest, "limits": merge(merged, own)}}
 
 
 def _by_joint(
