@@ -260,7 +260,7 @@ def finish(
     verified: bool,
     show: Callable[[], None] | None,
     result: Result | None,
-    complaint: str,
+    complaint: str = "it is marked unverified",
 ) -> int:
     """Write a motion's files, print the answer and what was not completed, and return the exit code.
 
@@ -281,8 +281,8 @@ def finish(
         Prints the answer for a person; None: it is printed as JSON.
     result : Result or None
         Result of a search.
-    complaint : str
-        Message for a motion that is not verified.
+    complaint : str, optional
+        What follows from a motion that is not verified.
     """
     failures: list[InputError] = []
     if out is not None:

@@ -69,8 +69,7 @@ def _prepare(command: Callable[..., None]) -> Callable[..., None]:
 
 
 for _name, _command in _COMMANDS.items():
-    _class = starting.VectorCommand if _name == "compose" else None
-    app.command(_name, cls=_class)(_prepare(_command))
+    app.command(_name, cls=starting.VectorCommand)(_prepare(_command))
 
 
 def main() -> None:

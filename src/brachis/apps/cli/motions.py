@@ -53,9 +53,8 @@ def verify(
     from brachis.robot.from_task import robot_from_settings
 
     _, trajectory = _load(result)
-    robot = None
-    if urdf is not None:
-        robot = robot_from_settings(trajectory.task.robot, urdf=urdf)
+    settings = trajectory.task.robot
+    robot = robot_from_settings(settings, urdf=urdf) if urdf else None
     verification = brachis.verify_trajectory(trajectory, robot=robot)
     if json:
         print_json(verification.to_dict())
@@ -164,7 +163,7 @@ def report(
 ) -> None:
     """Write a report of a saved motion as one HTML page."""
     result, trajectory = _load(result)
-    out = result.with_suffix(".html") if out is None else out
+    out = out or result.with_suffix(".html")
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
     page = brachis.report.make_report(trajectory, title=title, degrees=degrees)

@@ -95,7 +95,6 @@ def plan(
         verified=result.verified,
         show=None if json else lambda: _print_plan(result, data, degrees=degrees),
         result=result,
-        complaint="it is marked unverified",
     )
     if view:
         shown = data["candidates"]

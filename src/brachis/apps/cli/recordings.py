@@ -180,7 +180,6 @@ def compare(
         verified=found.result.verified,
         show=None if json else lambda: _print_comparison(found),
         result=found.result,
-        complaint="it is marked unverified",
     )
     raise typer.Exit(code)
 
