@@ -40,7 +40,7 @@ _NOTHING = 1e-24
 """Stands for zero where it is divided by."""
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
-_SMALL = 5e-5
+_SMALL = 2e-5
 """Violation of a limit on postures that is left."""
 _SPARE = 1e-3
 """Violation that they stay away from, but for the ends."""

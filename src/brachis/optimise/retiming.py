@@ -33,7 +33,7 @@ _STATIONS_AN_INTERVAL = 3.5
 """Stations of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
-_ENOUGH = 1e-4
+_ENOUGH = 5e-5
 """Violation of them that is small enough."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
