@@ -253,6 +253,18 @@ def test_a_file_of_moveit_is_read(loaded, tmp_path):
     )
     assert own.robot.limits.scale.velocity == 1.0
     assert own.robot.limits.velocity == {"j1": 1.0, "j2": None}
+    beside = brachis.LimitSpec(velocity={"j1": 1.0})
+    task = {"urdf": "unread.urdf", "limits_file": str(tmp_path / "joint_limits.yaml")}
+    given = load_task(
+        {
+            "brachis": 1,
+            "robot": {**task, "limits": beside},
+            "start": {"joints": [0.5, -2.0, 2.0]},
+            "task_space": ["x", "y"],
+            "path": [{"line": {"by": [0.1, 0.0]}}],
+        }
+    )
+    assert given.robot.limits.scale.velocity == 0.5
     robot = Robot.from_urdf(
         ROOT / "robots/scara3/robot.urdf",
         limits=read_limits(tmp_path / "joint_limits.yaml"),

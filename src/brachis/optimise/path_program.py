@@ -233,7 +233,8 @@ class PathPhase:
             The largest violation there was.
         """
         curves = self.curves(x)
-        motion = Moments.at_rest(self.phase.joint_map.postures(curves))
+        q = self.phase.joint_map.postures(curves)
+        motion = Moments(q, 0.0 * q, 0.0 * q, 0.0 * q, curves[:, 0])
         worst = 0.0
         for columns, limit in self._posture_limits():
             violation = limit.violation(limit.values(motion)).max(axis=0) - limit.spare

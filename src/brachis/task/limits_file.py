@@ -236,8 +236,12 @@ def _by_joint(
 
 def _differences(limits: LimitSpec) -> dict[str, Any]:
     """Return what differs from the defaults."""
-    values = ((each, getattr(limits, each.name)) for each in fields(limits))
-    return {each.name: value for each, value in values if value != each.default}
+    usual = LimitSpec()
+    names = [each.name for each in fields(limits)]
+    values = {name: getattr(limits, name) for name in names}
+    return {
+        name: value for name, value in values.items() if value != getattr(usual, name)
+    }
 
 
 def _check_joints(
