@@ -32,6 +32,7 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.limits import HasLatticeWeights, Moments
 from brachis.path import Path
+from brachis.problem.feasibility import in_figures
 from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
 from brachis.robot.joints import TURN
@@ -367,7 +368,7 @@ class Lattice(ABC):
         return choose(layer[held]) if held.any() else self._blame(layer.q[:, None])
 
     def _blame(self, q: np.ndarray) -> str:
-        """Name the limit that is exceeded most in the best posture, or on the best way, (K, L, n), and its subject."""
+        """Say which limit is exceeded most in the best posture, or on the best way, (K, L, n), and by how much."""
         if not len(q):
             return ""
         still = Moments.at_rest(q.reshape(-1, q.shape[-1]))
@@ -376,13 +377,20 @@ class Lattice(ABC):
         for limit in self.problem.limits:
             if limit.at_rest != "posture":
                 continue
-            beyond = limit.violation(limit.values(still))
-            beyond = beyond.reshape(*q.shape[:2], -1).max(axis=1)
-            best = beyond[np.argmin(beyond.max(axis=1))]
-            if best.max() > worst:
-                worst = best.max()
-                subject = limit.labels[int(np.argmax(best))].subject
-                cause = f"the {limit.name} limit of {subject} {limit.refusal}"
+            shape = (*q.shape[:2], len(limit.labels))
+            values = limit.values(still).reshape(shape)
+            beyond = limit.violation(values)
+            best = int(np.argmin(beyond.max(axis=(1, 2))))
+            place, column = np.unravel_index(np.argmax(beyond[best]), shape[1:])
+            if beyond[best, place, column] > worst:
+                worst = beyond[best, place, column]
+                label = limit.labels[column]
+                value = float(values[best, place, column])
+                found, allowed = in_figures(limit, int(column), value)
+                cause = (
+                    f"the {limit.name} limit of {label.subject} {limit.refusal} "
+                    f"({found} {label.unit} at best, allowed: {allowed} {label.unit})"
+                )
         return cause
 
     def _choose_some(self, layer: Layer, most: int, cost: np.ndarray) -> np.ndarray:
