@@ -1,4 +1,4 @@
-"""Random tasks whose tool may leave the path within ranges: never slower than without, and within the ranges.
+"""Random tasks whose tool may leave the path within ranges: how much faster they are, and whether they keep to these.
 
 Usage: python benchmarks/tolerances.py [--seed 0] [--count 20] [--save]
 
@@ -80,12 +80,15 @@ def plan_both(task: Task, number: int) -> tuple[str, ...]:
         try:
             results.append(brachis.plan(load_task(task, changes=changes), strict=False))
         except BrachisError as error:
-            return str(ranges), f"{type(error).__name__}: {str(error)[:150]}"
+            message = f"{type(error).__name__}: {str(error)[:150]}"
+            return str(ranges), message, "", "", "", ""
         times.append(f"{time.perf_counter() - began:.1f} s")
     plain, ranged = results
     gain = 100.0 * (1.0 - ranged.t_end / plain.t_end)
     share = largest_share(ranged.task, ranged.trajectory)
     verdict = "" if plain.verified and ranged.verified else " NOT verified"
+    verdict += " SLOWER" if gain < 0.0 else ""
+    verdict += " OUTSIDE" if share > 1.0 + 2e-4 else ""
     return (
         str(ranges),
         f"{plain.t_end:.4f} s",
@@ -117,7 +120,15 @@ def main() -> None:
                 rows.append(row)
                 print(" | ".join(row), flush=True)
                 if len(rows) == given.count:
-                    columns = ("task", "ranges", "without", "with", "gain", "share", "")
+                    columns = (
+                        "task",
+                        "ranges",
+                        "without",
+                        "with",
+                        "gain",
+                        "share",
+                        "time",
+                    )
                     note = "share: largest part of a range that is used."
                     save("Random tolerances", columns, rows, note)
                     return

@@ -56,8 +56,9 @@ def test_virtual_joints_have_the_ranges_of_the_task():
         "tool_z",
     )
     # A cone is as wide all around; a box in the world's axes fits into its own sphere, and into the one that is given.
-    reach = min(0.004, np.linalg.norm([0.002, 0.003, 0.002]))
-    expected = [np.radians(40), np.radians(15), np.radians(15), *[reach] * 3]
+    reach = 1.01 * min(0.004, np.linalg.norm([0.002, 0.003, 0.002]))
+    tilt = 1.01 * np.radians(15)
+    expected = [np.radians(40), tilt, tilt, reach, reach, reach]
     np.testing.assert_allclose(robot.limits.position_upper[-6:], expected)
     np.testing.assert_allclose(robot.limits.position_lower[-6], np.radians(-30))
 
@@ -117,6 +118,13 @@ def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow
         ({"orientation": {"lead": 100}}, "pose", "within 80 of zero"),
         ({"position": {"x": 0.1, "axes": "world"}}, "pose", "all three lengths"),
         ({"tilt": 15}, "pose", "tolerances.orientation.tilt"),
+        (
+            {"position": {"sphere": 0.1, "y": 0.1, "axes": "world"}},
+            "pose",
+            "all three lengths",
+        ),
+        ({"position": {"sphere": 0.1, "x": [0.2, 0.3]}}, "pose", "outside sphere"),
+        ({"orientation": {"tilt": 15, "lead": [20, 30]}}, "pose", "outside tilt"),
     ],
 )
 def test_tolerances_that_make_no_sense_are_refused(tolerances, space, match):

@@ -77,5 +77,5 @@ def test_saved_motions_come_back(motion, tmp_path):
 
 @pytest.mark.parametrize("motion", ["pose_free_roll"], indirect=True)
 def test_a_tool_that_rolls_freely_is_for_that_task_space_alone(motion):
-    with pytest.raises(brachis.BrachisError, match="leave the path in other ways"):
+    with pytest.raises(brachis.BrachisError, match="leaves the path in other ways"):
         brachis.plan(motion.robot, {**motion.task.to_dict(), "task_space": "pose"})

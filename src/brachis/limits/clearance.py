@@ -41,7 +41,7 @@ class Clearance(Limit):
     lower : (P,) ndarray, optional
         Bounds of the values, where they are not the clearance.
     spare : float, optional
-        By how much they are above it, as a violation.
+        By how much these exceed the clearance, as a violation.
     """
 
     kind = "clearance"

@@ -33,7 +33,7 @@ class SingularityLimit(Limit):
         self._count = len(robot.urdf_joints)
         self._figure = figure
         key = "margins.singularity"
-        self.labels = (Label("arm", "least singular value", "-", key),)
+        self.labels = (Label("arm", "singularity", "-", key),)
         self.lower = np.ones(1)
         self.upper = np.full(1, np.inf)
         self.bounds = (Bound(0, figure, figure, 1.0 / figure, "lower"),)
@@ -81,7 +81,7 @@ class JointEndLimit(Limit):
         self._width = width[joints]
         self._revolute = robot.revolute[joints]
         self._rows = np.eye(robot.n)[joints] / self._width[:, None]
-        kind = "position in its range"
+        kind = "range margin"
         self.labels = tuple(
             Label(robot.joint_names[joint], kind, "-", "margins.joint_ends")
             for joint in joints

@@ -131,6 +131,11 @@ class Label:
     share: str = ""
 
     @property
+    def after(self) -> str:
+        """The unit, as it stands after a figure."""
+        return "" if self.unit == "-" else f" {self.unit}"
+
+    @property
     def axis(self) -> str:
         """Title of an axis over which ratios are drawn."""
         return self.share or f"{self.kind} / limit"

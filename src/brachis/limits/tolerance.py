@@ -21,8 +21,8 @@ class _Tolerance(Limit):
     Parameters
     ----------
     robot : Robot
-    ways : str
-        Ways of the virtual joints on which it depends, for example ``"xyz"``.
+    ways : tuple of str
+        Of the virtual joints on which it depends.
     """
 
     role = Role.PROCESS

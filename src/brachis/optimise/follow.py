@@ -34,7 +34,7 @@ _SLOWER_BY_LOSS = 1.6
 _MESHES = 5
 """Choices of knots that are tried, no more."""
 _BETTER = 0.5
-"""Part of a violation of limits on postures that is left by a finer mesh worth its time."""
+"""A finer mesh is tried as long as the last one left less than this part of the violation of limits on postures."""
 _MOST_INTERVALS = 40_000
 """Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
 _LOOKS = (4, 10)
@@ -111,7 +111,7 @@ def follow(
         if laid.slower < tolerance and not _ENOUGH < laid.outside < _BETTER * outside:
             break
         outside = laid.outside
-        wanted = _AIM * tolerance / laid.slower
+        wanted = _AIM * tolerance / max(laid.slower, tolerance)
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
         return None
@@ -206,9 +206,11 @@ class _Laid:
     outside: float = np.inf
 
     def is_better_than(self, other: _Laid) -> bool:
-        """Tell whether they keep limits on postures that the others exceed, or else are faster."""
-        beyond = self.outside > _ENOUGH, other.outside > _ENOUGH
-        return self.needed < other.needed if beyond[0] == beyond[1] else beyond[1]
+        """Tell whether they exceed limits on postures less, or where both keep them, are faster."""
+        keeps_to = max(self.outside, _ENOUGH), max(other.outside, _ENOUGH)
+        if keeps_to[0] == keeps_to[1]:
+            return self.needed < other.needed
+        return keeps_to[0] < keeps_to[1]
 
     @property
     def needed(self) -> float:
@@ -249,7 +251,8 @@ def _hold_limits(
         }
         violation = max((each.max() for each in beyond.values()), default=0.0)
         outside = [
-            own.violation(own.values(state)).max() - own.spare for own in of_postures
+            limit.violation(limit.values(state)).max() - limit.spare
+            for limit in of_postures
         ]
         laid = _Laid(motion, float(violation), outside=max(outside, default=0.0))
         idle = 0 if laid.needed < best.needed * (1.0 - _ENOUGH) else idle + 1

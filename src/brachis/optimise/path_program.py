@@ -5,7 +5,7 @@ With X = sdot^2 linear in s between the stations, u = d2s/dt2 is constant there,
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
-There limits hold, and at both ends.
+Limits hold at these places, half-way between the stations, and at both ends.
 
 What it finds is a joint path: its timing is computed anew, on a finer grid.
 """
@@ -41,15 +41,30 @@ _NOTHING = 1e-24
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
 _SMALL = 2e-5
-"""Violation of a limit on postures that is left."""
+"""Violation up to which a limit on postures is not narrowed."""
 _SPARE = 1e-3
-"""Violation that they stay away from, but for the ends."""
+"""By how much limits on postures are narrowed at first, as a violation: splines leave a joint path by a little."""
 _RAMP = 5.0
-"""Places from an end at which they do."""
+"""Places over which the narrowing grows from nothing, beside a given end posture."""
 _MORE = 1.2
-"""Factor on larger ones, by which limits are narrowed."""
+"""Factor on a violation by which limits are narrowed."""
 _STATIONS_A_PIECE = 4
 """Stations in every piece of a path, at most as far apart as others."""
+
+
+def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
+    """Return the largest violation of a limit on postures along curves, (S, c)."""
+    motion = _moments_along(phase, curves)
+    of_postures = [limit for limit in phase.limits if is_of_postures(limit)]
+    found = [limit.violation(limit.values(motion)).max() for limit in of_postures]
+    return float(max(found, default=0.0))
+
+
+def _moments_along(phase: Phase, curves: np.ndarray) -> Moments:
+    """Stand still in postures along curves, (S, c)."""
+    q = phase.joint_map.postures(curves)
+    still = np.zeros_like(q)
+    return Moments(q, still, still, still, curves[:, 0])
 
 
 class PathPhase:
@@ -225,16 +240,14 @@ class PathPhase:
         return self._last[1]
 
     def narrow(self, x: np.ndarray) -> float:
-        """Narrow limits on postures where they do not hold between the places at which the program holds them.
+        """Narrow, along the whole path, the limits on postures that are exceeded between the places.
 
         Returns
         -------
         float
             The largest violation there was.
         """
-        curves = self.curves(x)
-        q = self.phase.joint_map.postures(curves)
-        motion = Moments(q, 0.0 * q, 0.0 * q, 0.0 * q, curves[:, 0])
+        motion = _moments_along(self.phase, self.curves(x))
         worst = 0.0
         for columns, limit in self._posture_limits():
             violation = limit.violation(limit.values(motion)).max(axis=0) - limit.spare

@@ -14,7 +14,11 @@ from brachis.optimise.backends import SolverReport, SolveStatus
 from brachis.optimise.follow import Followed, begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.path_program import PathPhase, PathProgram
+from brachis.optimise.path_program import (
+    PathPhase,
+    PathProgram,
+    violation_of_postures,
+)
 from brachis.optimise.phase_timing import PLACES, PhaseTiming
 from brachis.optimise.program import Program
 from brachis.timing import is_left_out
@@ -176,9 +180,11 @@ class BetterPaths:
         return least_time(self.timings)
 
     def is_better_than(self, other: BetterPaths) -> bool:
-        """Tell whether they keep limits on postures that the others exceed, or else are faster."""
-        beyond = self.violation > _ENOUGH, other.violation > _ENOUGH
-        return self.t_end < other.t_end if beyond[0] == beyond[1] else beyond[1]
+        """Tell whether they exceed limits on postures less, or where both keep them, are faster."""
+        keeps_to = max(self.violation, _ENOUGH), max(other.violation, _ENOUGH)
+        if keeps_to[0] == keeps_to[1]:
+            return self.t_end < other.t_end
+        return keeps_to[0] < keeps_to[1]
 
 
 def improve_joint_paths(
@@ -217,7 +223,8 @@ def improve_joint_paths(
     )
     pairs = zip(program.phases, curves, strict=True)
     timings = [PhaseTiming.through(*pair, effort.places) for pair in pairs]
-    best = BetterPaths(tuple(curves), tuple(timings))
+    beyond = max(map(violation_of_postures, program.phases, curves))
+    best = BetterPaths(tuple(curves), tuple(timings), (), beyond)
     r = program.phases[0].joint_map.r
     if not r:
         return best

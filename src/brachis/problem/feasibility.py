@@ -178,8 +178,8 @@ def _check_at_rest(
         raise StartError(
             f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
             where=f"{name}.joints",
-            found=f"{found} {label.unit} at rest{more}",
-            allowed=f"{allowed} {label.unit}",
+            found=f"{found}{label.after} at rest{more}",
+            allowed=f"{allowed}{label.after}",
             hint=hint,
         ).with_remedies(*remedies)
 

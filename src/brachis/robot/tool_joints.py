@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from brachis.task import Tolerances
+from brachis.task.tolerances import OrientationTolerance, PositionTolerance
 
 FREE_ROLL = "pose_free_roll"
 """The task space of poses whose roll about the tool axis is free."""
@@ -29,6 +30,11 @@ _DIRECTIONS = {
 }
 """Axes of the virtual joints, in the order of the chain."""
 _TURNING = ("roll", "lead", "side")
+_WIDER = 1.01
+"""Factor on ranges beside which a cone, sphere or box is the limit."""
+_Range = tuple[float, float, str]
+"""Ends, rad or m, and the key of the task that sets them."""
+_FREE: _Range = (-math.inf, math.inf, "task_space")
 
 
 @dataclass(frozen=True)
@@ -41,11 +47,14 @@ class ToolJoint:
         How it moves the tool.
     lower, upper : float
         Its range, rad or m; infinite where it is free.
+    key : str
+        Key of the task that sets the range.
     """
 
     way: str
     lower: float
     upper: float
+    key: str
 
     @property
     def name(self) -> str:
@@ -67,46 +76,60 @@ class ToolJoint:
         """Whether it has a range."""
         return math.isfinite(self.upper)
 
-    @property
-    def key(self) -> str:
-        """Key of the task that sets its range."""
-        part = "orientation" if self.turns else "position"
-        return f"tolerances.{part}.{self.way}"
-
 
 def tool_joints_of(
     space: str | Sequence[str], tolerances: Tolerances | None
 ) -> tuple[ToolJoint, ...]:
     """List the virtual joints that a task space and its tolerances need, in the order of the chain.
 
-    A cone is as wide in lead and side, a sphere, or a box in the world's axes, as large along all axes.
+    A cone is as wide in lead and side, a sphere, or a box in the world's axes, as large along all axes. Ranges that are
+    not asked for are a little wider, so that the cone, sphere or box itself is the limit.
     """
     given = tolerances or Tolerances()
-    turn = given.orientation
-    shift = given.position
-    ranges: dict[str, tuple[float, float]] = {}
-    if turn.roll == "free" or space == FREE_ROLL:
-        ranges["roll"] = (-math.inf, math.inf)
-    asked = {way: getattr(turn, way) for way in _TURNING}
-    for way, ends in asked.items():
-        if ends not in (None, "free"):
-            ranges[way] = math.radians(ends[0]), math.radians(ends[1])
-    if turn.tilt is not None:
-        for way in ("lead", "side"):
-            ranges[way] = _within(ranges.get(way), math.radians(turn.tilt))
-    box = {way: getattr(shift, way) for way in "xyz"}
-    if shift.axes == "world":
-        sides = [max(map(abs, ends)) for ends in box.values() if ends is not None]
-        reach = math.hypot(*sides) if sides else math.inf
-        box = dict.fromkeys(box, (-reach, reach) if sides else None)
-    ranges |= {way: ends for way, ends in box.items() if ends is not None}
-    if shift.sphere is not None:
-        for way in box:
-            ranges[way] = _within(ranges.get(way), shift.sphere)
+    ranges = _angles(given.orientation) | _lengths(given.position)
+    if space == FREE_ROLL:
+        ranges["roll"] = _FREE
     return tuple(ToolJoint(way, *ranges[way]) for way in _DIRECTIONS if way in ranges)
 
 
-def _within(ends: tuple[float, float] | None, reach: float) -> tuple[float, float]:
-    """Cut a range down to both sides of zero."""
-    low, high = ends or (-reach, reach)
-    return max(low, -reach), min(high, reach)
+def _angles(given: OrientationTolerance) -> dict[str, _Range]:
+    """Return the ranges of the joints that turn."""
+    ranges: dict[str, _Range] = {}
+    for way in _TURNING:
+        ends = getattr(given, way)
+        if ends == "free":
+            ranges[way] = _FREE
+        elif ends is not None:
+            low, high = map(math.radians, ends)
+            ranges[way] = (low, high, f"tolerances.orientation.{way}")
+    if given.tilt is not None:
+        key = "tolerances.orientation.tilt"
+        for way in ("lead", "side"):
+            ranges[way] = _within(ranges.get(way), math.radians(given.tilt), key)
+    return ranges
+
+
+def _lengths(given: PositionTolerance) -> dict[str, _Range]:
+    """Return the ranges of the joints that slide."""
+    box = {way: getattr(given, way) for way in "xyz"}
+    ranges: dict[str, _Range] = {
+        way: (*ends, f"tolerances.position.{way}")
+        for way, ends in box.items()
+        if ends is not None
+    }
+    if given.axes == "world":
+        reach = math.hypot(*(max(map(abs, ends)) for ends in box.values()))
+        for way, (*_, key) in ranges.items():
+            ranges[way] = _within(None, reach, key)
+    if given.sphere is not None:
+        for way in box:
+            key = "tolerances.position.sphere"
+            ranges[way] = _within(ranges.get(way), given.sphere, key)
+    return ranges
+
+
+def _within(given: _Range | None, reach: float, key: str) -> _Range:
+    """Cut a range down to a little more than both sides of zero; without one, `key` is what sets it."""
+    wide = _WIDER * reach
+    low, high, own_key = given or (-wide, wide, key)
+    return max(low, -wide), min(high, wide), own_key

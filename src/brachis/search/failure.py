@@ -257,7 +257,7 @@ def _check_at_rest(
             label = limit.labels[column]
             remedies = load_remedies(robot, limit, column, 1.0 + worst)
             needed, bound = in_figures(limit, column, float(values[best, column]))
-            lack = f" ({label.subject}: {needed} {label.unit} at best, allowed: {bound} {label.unit})"
+            lack = f" ({label.subject}: {needed}{label.after} at best, allowed: {bound}{label.after})"
     return allowed, lack, remedies
 
 

@@ -375,7 +375,7 @@ class Lattice(ABC):
         worst = 0.0
         cause = ""
         for limit in self.problem.limits:
-            if limit.at_rest != "posture":
+            if limit.at_rest != "posture" or limit.holds_at_rest(still.q, _SLACK).all():
                 continue
             shape = (*q.shape[:2], len(limit.labels))
             values = limit.values(still).reshape(shape)
@@ -389,7 +389,7 @@ class Lattice(ABC):
                 found, allowed = in_figures(limit, int(column), value)
                 cause = (
                     f"the {limit.name} limit of {label.subject} {limit.refusal} "
-                    f"({found} {label.unit} at best, allowed: {allowed} {label.unit})"
+                    f"({found}{label.after} at best, allowed: {allowed}{label.after})"
                 )
         return cause
 

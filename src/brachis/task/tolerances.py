@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
 from pydantic import (
@@ -25,7 +26,7 @@ _FARTHEST = 10.0
 
 
 def _range_within(largest: float) -> AfterValidator:
-    """Return what reads a number as both sides of zero, and refuses ranges that are empty or end farther from zero."""
+    """Return what reads a number a as [-a, a], and refuses ranges that are empty or end farther from zero."""
 
     def read(given: _Given) -> _Given:
         if given is None or given == "free":
@@ -53,6 +54,20 @@ _Distance = Annotated[_Ends, _range_within(_FARTHEST)]
 AXES = ("x", "y", "z")
 
 
+def _check_within(given: Model, largest: str, ranges: Iterable[str]) -> None:
+    """Refuse ranges that lie outside the cone or sphere beside them."""
+    reach = getattr(given, largest)
+    for key in ranges:
+        ends = getattr(given, key)
+        if reach is not None and ends is not None and min(-ends[0], ends[1]) <= -reach:
+            raise refuse(
+                f"the range lies outside {largest}: {reach:g}",
+                key=key,
+                found=ends,
+                allowed=f"a range of which a part is within {reach:g} of zero",
+            )
+
+
 class OrientationTolerance(Model):
     """How far the tool may turn away from the orientation of the path, about the axes of the tool frame."""
 
@@ -60,11 +75,16 @@ class OrientationTolerance(Model):
     """Largest angle between the tool's z axis and that of the path, degrees: a cone. Null: as lead and side say."""
     lead: _Lean = None
     """Angle by which the z axis leans towards the x axis of the path's orientation, degrees: a number for both sides,
-    or [low, high]. Where the x axis points along the path, it is the lead of a torch, negative its lag."""
+    or [low, high]. Where x points along the path and z out of the torch, it is the torch's lead, negative its lag."""
     side: _Lean = None
     """Angle by which the z axis leans towards the y axis of the path's orientation, degrees."""
     roll: _Roll = None
     """Angle by which the tool turns about its own z axis, degrees: a number, [low, high], or free."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        _check_within(self, "tilt", ("lead", "side"))
+        return self
 
 
 class PositionTolerance(Model):
@@ -73,7 +93,8 @@ class PositionTolerance(Model):
     sphere: Annotated[Positive, Field(le=_FARTHEST)] | None = None
     """Largest distance, m."""
     x: _Distance = None
-    """Displacement along x, m: a number for both sides, or [low, high]."""
+    """Displacement along x, m: a number for both sides, or [low, high]. With task_space: position the path has no
+    orientation, and the axes are the tool's own."""
     y: _Distance = None
     """Displacement along y, m."""
     z: _Distance = None
@@ -82,15 +103,16 @@ class PositionTolerance(Model):
     """Axes of x, y and z: those of the path's orientation, or those of the world."""
 
     @model_validator(mode="after")
-    def _is_complete(self) -> Self:
+    def _fits(self) -> Self:
         given = [axis for axis in AXES if getattr(self, axis) is not None]
-        if self.axes == "world" and self.sphere is None and len(given) < len(AXES):
+        if self.axes == "world" and len(given) < len(AXES):
             raise refuse(
-                "a box in the world's axes needs all three lengths",
+                "a box along the world's axes needs all three lengths",
                 key="axes",
                 found=f"world, with {', '.join(given) or 'none'}",
                 allowed="x, y and z with it, or axes: tool",
             )
+        _check_within(self, "sphere", given)
         return self
 
 
@@ -107,6 +129,7 @@ class Margins(Model):
     """Margins that the motion keeps; their smallest values are reported in any case."""
 
     singularity: Positive | None = None
-    """Least singular value of the Jacobian of what the path prescribes (m and rad, per rad and m). Null: none."""
+    """Least singular value of the Jacobian of the task space's rows by the arm's own joints (m and rad, per rad and m);
+    tolerances and a free roll do not count. Null: none."""
     joint_ends: Annotated[float, Field(gt=0.0, lt=0.5)] | None = None
     """Part of each joint's range that is kept free at both ends, such as 0.05. Null: none."""

@@ -93,7 +93,10 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     """
     if rows == JOINTS:
         return JointSpace(robot)
-    if rows == FREE_ROLL and not robot.tool_joints:
+    if (
+        rows == FREE_ROLL
+        and tool_joints_of(FREE_ROLL, None)[0] not in robot.tool_joints
+    ):
         raise InputError(
             "the robot's tool does not roll freely",
             where="task_space",
@@ -166,10 +169,11 @@ def bind(
     joints = tool_joints_of(space, tolerances)
     if robot.tool_joints and robot.tool_joints != joints:
         raise InputError(
-            "the robot's tool may leave the path in other ways",
-            where="task_space",
-            found=space,
-            hint="Use the robot as it was before it was bound to a task",
+            "the robot is bound to another task space or other tolerances: its tool leaves the path in other ways",
+            where="robot",
+            found=", ".join(joint.name for joint in robot.tool_joints),
+            allowed=", ".join(joint.name for joint in joints) or "no virtual joints",
+            hint="Use the robot as it was before it was bound",
         )
     if joints and not robot.tool_joints:
         robot = with_tool_joints(robot, joints)

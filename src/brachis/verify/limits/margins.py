@@ -1,7 +1,7 @@
 """Margins of a motion by the URDF's own chain: from singular postures of the arm, and from the ends of joint ranges.
 
-The columns of the Jacobian at the tool's origin p, of joints through o along z, are z x (p - o) and z where they turn,
-z and 0 where they slide.
+The columns of the Jacobian at the point p that follows the path are, of joints through o along z, z x (p - o) and z
+where they turn, z and 0 where they slide.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _parts_of_ranges(
 
 
 def _worst_singularity(given: Given) -> Worst | None:
-    """Find the largest ratio of the singular value that is wanted to the least one."""
+    """Find the largest of 2 - value / wanted: 1 at the margin, 2 in a singular posture."""
     wanted = given.task.margins.singularity
     if wanted is None:
         return None
