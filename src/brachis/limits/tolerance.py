@@ -39,6 +39,7 @@ class _Size(_Tolerance):
     """A size, zero or more, over the largest one."""
 
     def _describe(self, label: Label, figure: float) -> None:
+        """Set label and bounds; `figure` is the largest size, in the unit of the label."""
         self.labels = (label,)
         self.lower = np.full(1, -np.inf)
         self.upper = np.ones(1)
@@ -52,7 +53,7 @@ class TiltLimit(_Size):
     ----------
     robot : Robot
     figure : float
-        Degrees.
+        Largest tilt, degrees.
     """
 
     kind = "tool_tilt"
@@ -89,7 +90,7 @@ class DistanceLimit(_Size):
     ----------
     robot : Robot
     figure : float
-        m.
+        Largest distance, m.
     """
 
     kind = "tool_distance"

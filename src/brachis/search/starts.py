@@ -432,8 +432,8 @@ def _refuse_beyond(
         phase="path",
         s_interval=(float(where[0]), float(where[-1])),
         where="path",
-        found=f"{found} {label.unit} at s = {s[station]:.3g}",
-        needed=f"{allowed} {label.unit}",
+        found=f"{found}{label.after} at s = {s[station]:.3g}",
+        needed=f"{allowed}{label.after}",
         hint="Move the path",
         remedies=remedies,
     )
