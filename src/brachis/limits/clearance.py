@@ -17,8 +17,6 @@ from brachis.task import Task
 
 _FAR = 0.1
 """Distance from which on it is not computed, beyond the clearance, m."""
-_SPARE = 2e-4
-"""Distance that joint paths keep beside the clearance, m: splines leave them by so much at most."""
 _NEARBY = 2.0
 """Pairs are left out that stay so many times `_FAR` apart where the motion begins."""
 _STRIDE = 0.05
@@ -38,36 +36,25 @@ class Clearance(Limit):
         Its pairs are the values.
     clearance : float
         m.
-    lower : (P,) ndarray, optional
-        Bounds of the values, where they are not the clearance.
-    spare : float, optional
-        By how much these exceed the clearance, as a violation.
     """
 
     kind = "clearance"
     role = Role.SCENE
     at_rest = "posture"
+    spare = 2e-4 / UNIT
     refusal = "is not kept"
 
-    def __init__(
-        self,
-        chain: Chain,
-        scene: Scene,
-        clearance: float,
-        lower: np.ndarray | None = None,
-        spare: float = 0.0,
-    ) -> None:
+    def __init__(self, chain: Chain, scene: Scene, clearance: float) -> None:
         count = len(scene.pairs)
         self._chain = chain
         self._scene = scene
         self._clearance = clearance
-        self.spare = spare
         self._last: tuple[bytes, ClosePairs] | None = None
         self.labels = tuple(
             Label(scene.names(pair), "clearance", "m", "collisions.clearance")
             for pair in range(count)
         )
-        self.lower = np.full(count, clearance / UNIT) if lower is None else lower
+        self.lower = np.full(count, clearance / UNIT)
         self.upper = np.full(count, np.inf)
         self.bounds = tuple(
             Bound(pair, self._clearance, self._clearance or UNIT, 1.0 / UNIT, "lower")
@@ -75,17 +62,14 @@ class Clearance(Limit):
         )
 
     def restrict_to(self, q: np.ndarray) -> Clearance | None:
-        """Keep the pairs that come close in postures, (K, n), and a little more than the clearance between them."""
+        """Keep the pairs that come close in postures, (K, n)."""
         q = q[np.isfinite(q).all(axis=1)]
         within = self._clearance + _NEARBY * _FAR
         close = self._scene.find_close(self._chain.place(q), within)
         kept = np.unique(close.pair)
         if not len(kept):
             return None
-        spare = _SPARE / UNIT
-        lower = self.lower[kept] + (spare - self.spare)
-        scene = self._scene.with_pairs(kept)
-        return Clearance(self._chain, scene, self._clearance, lower, spare)
+        return Clearance(self._chain, self._scene.with_pairs(kept), self._clearance)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
         """Tell in which postures, (K, n), no pair is too close, (K,)."""

@@ -32,6 +32,7 @@ from brachis.limits.protocol import (
     Label,
     Limit,
     Partials,
+    spare_in,
 )
 from brachis.robot import Robot, dynamics
 from brachis.task import LIMIT_KINDS, Task
@@ -174,7 +175,9 @@ class PositionLimit(_DerivativeLimit):
         self._scale = 1.0 / measure
         self.lower = (low - self._middle) * self._scale
         self.upper = (high - self._middle) * self._scale
-        self.violation_scale = measure / position_measure(low, high)
+        within = position_measure(low, high)
+        self.violation_scale = measure / within
+        self.spare = spare_in(within)
         width = np.where(np.isfinite(half), 2.0 * half, 1.0)
         self._set_bounds(np.array([width, width]), np.zeros(len(low), dtype=bool))
 

@@ -25,6 +25,11 @@ import numpy as np
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
 
+_LEFT_BY = 3e-5
+"""Distance by which splines leave a joint path, about, rad or m."""
+_MOST_SPARE = 0.1
+"""Largest violation that is spared."""
+
 
 class Guarantee(Enum):
     """Where a limit holds; each value is the sentence that a user reads."""
@@ -228,8 +233,8 @@ class Description:
         Highest time derivative of q in the values: 2, or 3 for the jerk. The splines' degree must be at least as high.
     violation_scale : (c,) ndarray or float
         Violation of a value that is beyond its bound by 1 (see the module).
-    spare : float
-        Violation that does no harm, because bounds are narrower by so much than the user wants them.
+    spare : (c,) ndarray or float
+        By how much joint paths keep inside the bounds, as a violation: splines leave a joint path by a little.
     refusal : str
         What a message says of an arm at rest beyond the limit, after "the ... limit".
     """
@@ -245,7 +250,7 @@ class Description:
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     violation_scale: np.ndarray | float = 1.0
-    spare: float = 0.0
+    spare: np.ndarray | float = 1e-3
     refusal: str = "is exceeded at rest"
 
     @property
@@ -268,6 +273,11 @@ class Description:
             for column, level in enumerate(getattr(self, side).tolist())
             if np.isfinite(level)
         )
+
+
+def spare_in(measure: np.ndarray | float) -> np.ndarray | float:
+    """Return the spare violation of positions, whose violations are counted in a measure, rad or m."""
+    return np.minimum(_LEFT_BY / measure, _MOST_SPARE)
 
 
 class Limit(Description, ABC):

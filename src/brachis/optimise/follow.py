@@ -52,6 +52,39 @@ _MORE = 1.5
 
 
 @dataclass(frozen=True)
+class Laid:
+    """Splines over some knots.
+
+    Attributes
+    ----------
+    motion : Motion
+    violation : float
+        Largest violation of a limit; infinite if it is not known.
+    slower : float
+        Part of the time by which these knots make the motion slower, at least; infinite where limits cannot hold.
+    outside : float
+        Largest violation of a limit on postures, which a longer time does not relieve; infinite if it is not known.
+    """
+
+    motion: Motion
+    violation: float = np.inf
+    slower: float = np.inf
+    outside: float = np.inf
+
+    def is_better_than(self, other: Laid) -> bool:
+        """Tell whether they exceed limits on postures less, or where both keep them, are faster."""
+        keeps_to = max(self.outside, _ENOUGH), max(other.outside, _ENOUGH)
+        if keeps_to[0] == keeps_to[1]:
+            return self.needed < other.needed
+        return keeps_to[0] < keeps_to[1]
+
+    @property
+    def needed(self) -> float:
+        """Time in which the limits would hold, about, s."""
+        return self.motion.t_end * (1.0 + self.violation)
+
+
+@dataclass(frozen=True)
 class Followed:
     """A motion along a timing.
 
@@ -60,18 +93,13 @@ class Followed:
     phase : Phase
         Over the knots that the timing needs.
     x : (v,) ndarray
-    violation : float
-        Largest violation of a limit that was seen, as a part of it.
+    laid : Laid
+        The splines.
     """
 
     phase: Phase
     x: np.ndarray
-    violation: float
-
-    @property
-    def needed(self) -> float:
-        """Time in which the limits would hold, about, s."""
-        return self.phase.motion(self.x).t_end * (1.0 + self.violation)
+    laid: Laid
 
 
 def follow(
@@ -115,7 +143,7 @@ def follow(
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
         return None
-    return Followed(*_as_phase(phase, best.motion, points), best.violation)
+    return Followed(*_as_phase(phase, best.motion, points), best)
 
 
 def begin(
@@ -185,47 +213,16 @@ def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndar
     return finer, finer.variables_from(motion)
 
 
-@dataclass(frozen=True)
-class _Laid:
-    """Splines over some knots.
-
-    Attributes
-    ----------
-    motion : Motion
-    violation : float
-        Largest violation of a limit; infinite if it is not known.
-    slower : float
-        Part of the time by which these knots make the motion slower, at least; infinite where limits cannot hold.
-    outside : float
-        Largest violation of a limit on postures, which a longer time does not relieve; infinite if it is not known.
-    """
-
-    motion: Motion
-    violation: float = np.inf
-    slower: float = np.inf
-    outside: float = np.inf
-
-    def is_better_than(self, other: _Laid) -> bool:
-        """Tell whether they exceed limits on postures less, or where both keep them, are faster."""
-        keeps_to = max(self.outside, _ENOUGH), max(other.outside, _ENOUGH)
-        if keeps_to[0] == keeps_to[1]:
-            return self.needed < other.needed
-        return keeps_to[0] < keeps_to[1]
-
-    @property
-    def needed(self) -> float:
-        """Time in which the limits would hold, about, s."""
-        return self.motion.t_end * (1.0 + self.violation)
-
-
 def _hold_limits(
     phase: Phase,
     own: PhaseTiming,
     fastest: Timing,
     breaks: np.ndarray,
     allowed: float,
-) -> _Laid:
+) -> Laid:
     """Lay splines until the limits hold, or until they are slower by more than a part `allowed` of the time."""
+    from scipy.interpolate import interp1d
+
     most_acceleration = largest_acceleration(fastest)
     limits = [
         limit
@@ -234,27 +231,27 @@ def _hold_limits(
     ]
     timing = fastest
     of_postures = [limit for limit in phase.limits if is_of_postures(limit)]
-    best = _Laid(_lay_splines(phase, own, timing, breaks))
+    best = Laid(_lay_splines(phase, own, timing, breaks))
     motion = best.motion
     idle = 0
     looks, closer = _LOOKS
     narrower: dict[Limit, np.ndarray] = {}
+    known = None
     for _ in range(_ROUNDS):
         t_norm = np.union1d(spread(breaks, looks), timing.times / timing.t_end)
         t = t_norm * motion.t_end
+        near = None if known is None else known(t_norm)
         try:
-            state = phase.joint_map.state(*motion.at(t), t=t)
+            state = phase.joint_map.state(*motion.at(t), t=t, near=near)
         except UnreachableError:
             return best
+        known = interp1d(t_norm, state.q, axis=0)
         beyond = {
             limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
         }
         violation = max((each.max() for each in beyond.values()), default=0.0)
-        outside = [
-            limit.violation(limit.values(state)).max() - limit.spare
-            for limit in of_postures
-        ]
-        laid = _Laid(motion, float(violation), outside=max(outside, default=0.0))
+        outside = [limit.violation(limit.values(state)).max() for limit in of_postures]
+        laid = Laid(motion, float(violation), outside=max(outside, default=0.0))
         idle = 0 if laid.needed < best.needed * (1.0 - _ENOUGH) else idle + 1
         if laid.needed < best.needed:
             best = laid

@@ -204,9 +204,6 @@ def with_last(
 _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
-
-_ROUGH_ITERATIONS = 40
-"""Iterations of a rough solve, no more."""
 _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
 
@@ -256,7 +253,7 @@ class SolverSession:
             iterations = _ITERATIONS * max(joint_map.r, 1)
         options = SolverOptions(settings.tolerance, iterations, settings.time_limit)
         if isinstance(joint_map, ChartMap):
-            options = dataclasses.replace(options, progress=1e-5, patience=10)
+            options = dataclasses.replace(options, progress=1e-4, patience=5)
         if has_time_law and joint_map.r:
             options = dataclasses.replace(options, progress=_PROGRESS, patience=5)
 
@@ -266,11 +263,11 @@ class SolverSession:
 
         return cls(backend, options, deadline, progress)
 
-    def roughly(self) -> SolverSession:
-        """Return the session for answers that nearly hold the limits, and hardly get any faster."""
-        iterations = min(_ROUGH_ITERATIONS, self.options.max_iterations)
-        rough = SolverOptions(3e-4, iterations, np.inf, progress=1e-3, patience=3)
-        return dataclasses.replace(self, options=rough, acceptable=1e-2)
+    def over_path(self, options: SolverOptions) -> SolverSession:
+        """Return the session for programs over the path, under other options; of these the task may only allow less."""
+        most = min(options.max_iterations, self.options.max_iterations)
+        own = dataclasses.replace(options, max_iterations=most)
+        return dataclasses.replace(self, options=own, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,)."""

@@ -1,11 +1,11 @@
 """The NLP over the path: how fast stations of the path are passed, and redundant curves as splines of s.
 
 Places of the path do not move, as they do over time: corners that are passed within milliseconds have their stations.
-With X = sdot^2 linear in s between the stations, u = d2s/dt2 is constant there, as in the phase plane, and half-way
+With X = sdot^2 linear in s between the stations, u = d2s/dt2 is constant there, as in the phase plane, and
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
-Limits hold at these places, half-way between the stations, and at both ends.
+Limits hold at two places between one station and the next, and at both ends.
 
 What it finds is a joint path: its timing is computed anew, on a finer grid.
 """
@@ -40,11 +40,14 @@ _NOTHING = 1e-24
 """Stands for zero where it is divided by."""
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
+_AHEAD = (0.5 + np.sqrt(1.0 / 12.0), 0.5 - np.sqrt(1.0 / 12.0))
+"""Parts of an interval between stations that are ahead where limits hold: the points of Gauss.
+
+Half-way alone, torques may swing beyond their limits on both sides.
+"""
 _SMALL = 2e-5
 """Violation up to which a limit on postures is not narrowed."""
-_SPARE = 1e-3
-"""By how much limits on postures are narrowed at first, as a violation: splines leave a joint path by a little."""
-_RAMP = 5.0
+_RAMP = 2.0
 """Places over which the narrowing grows from nothing, beside a given end posture."""
 _MORE = 1.2
 """Factor on a violation by which limits are narrowed."""
@@ -109,10 +112,10 @@ class PathPhase:
         self._s = _with_pieces(s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
         # Where limits hold: the interval between stations, and the part of it that is ahead.
-        self._number = np.pad(np.arange(len(self._steps)), 1, mode="edge")
-        self._ahead = np.pad(
-            np.full(len(self._steps), 0.5), 1, constant_values=(1.0, 0.0)
-        )[:, None]
+        inner = np.tile(_AHEAD, len(self._steps))
+        number = np.repeat(np.arange(len(self._steps)), len(_AHEAD))
+        self._number = np.pad(number, 1, mode="edge")
+        self._ahead = np.pad(inner, 1, constant_values=(1.0, 0.0))[:, None]
         places = (
             self._s[self._number + 1] - self._ahead[:, 0] * self._steps[self._number]
         )
@@ -145,7 +148,7 @@ class PathPhase:
         self._bounds = np.repeat(lower_and_upper[:, None], len(places), axis=1)
         # Splines over time leave a joint path by a little.
         for values, limit in self._posture_limits():
-            self._narrow(values, max(_SPARE - limit.spare, 0.0) / limit.violation_scale)
+            self._narrow(values, limit.spare / limit.violation_scale)
         self._set_pattern(columns)
         self._last: tuple[bytes, Evaluation] | None = None
 
@@ -250,7 +253,7 @@ class PathPhase:
         motion = _moments_along(self.phase, self.curves(x))
         worst = 0.0
         for columns, limit in self._posture_limits():
-            violation = limit.violation(limit.values(motion)).max(axis=0) - limit.spare
+            violation = limit.violation(limit.values(motion)).max(axis=0)
             worst = max(worst, float(violation.max()))
             more = np.where(violation > _SMALL, _MORE * violation, 0.0)
             self._narrow(columns, more / limit.violation_scale)

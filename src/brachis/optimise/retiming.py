@@ -10,7 +10,7 @@ import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.limits.safeguards import HELD_BACK, MARGIN, MARGINS
-from brachis.optimise.backends import SolverReport, SolveStatus
+from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.follow import Followed, begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
@@ -29,12 +29,12 @@ _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
-_WORTH = 1.5
+_WORTH = 3.0
 """Tolerances by which a timing of the splines' own joint path is faster if it is worth to be followed."""
 _MOST_INTERVALS = 256
 """Intervals of all redundant curves together: with four curves of 128 a solve takes half a minute, and gains 0.2 %."""
-_STATIONS_AN_INTERVAL = 3.5
-"""Stations of the path at which limits hold, for every interval."""
+_STATIONS_AN_INTERVAL = 1.75
+"""Stations of the path for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
 _ENOUGH = 5e-5
@@ -52,22 +52,27 @@ class PathEffort:
     intervals : tuple of int
         Of the redundant curves over the path, one after the other.
     stations : int
-        At which limits hold, at least.
+        Of the path, at least.
     places : int
         At which answers are timed.
     margin : float
         Least branch margin.
+    options : SolverOptions
+        Of every solve. Limits may be exceeded by a little: the timing is computed anew.
     """
 
     intervals: tuple[int, ...]
     stations: int
     places: int
     margin: float
+    options: SolverOptions
 
 
-ROUGH = PathEffort((16,), 56, 800, MARGINS[1])
+ROUGH = PathEffort((16,), 28, 800, MARGINS[1], SolverOptions(3e-4, 40, np.inf, 1e-3, 3))
 """To rank joint paths, clear of branch boundaries."""
-FINE = PathEffort((32, 64, 128, 256), 120, PLACES, MARGIN)
+FINE = PathEffort(
+    (32, 64, 128, 256), 60, PLACES, MARGIN, SolverOptions(1e-5, 100, np.inf, 2e-4, 4)
+)
 """For a plan, from the answer of a rough search."""
 
 
@@ -217,6 +222,7 @@ def improve_joint_paths(
     UnreachableError
         Curves leave the joint map.
     """
+    solve = solve.over_path(effort.options)
     program = program.with_phases(
         phase.with_limits([own for own in phase.limits if not is_left_out(own)])
         for phase in program.phases
@@ -318,7 +324,7 @@ def lay_splines(
         found.append(_follow_again(followed, tolerance, points))
     finer = program.with_phases([own.phase for own in found])
     x = np.concatenate([own.x for own in found])
-    violation = max(own.violation for own in found)
+    violation = max(own.laid.violation for own in found)
     seconds = time.perf_counter() - began
     return finer, _report(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)
 
@@ -328,7 +334,9 @@ def _follow_again(first: Followed, tolerance: float, points: int) -> Followed:
     if not first.phase.joint_map.r:
         return first
     own = PhaseTiming.of(first.phase, first.x)
-    if own is None or own.t_end > first.needed * (1.0 - _WORTH * tolerance):
+    if own is None or own.t_end > first.laid.needed * (1.0 - _WORTH * tolerance):
         return first
     again = follow(first.phase, own, tolerance, points)
-    return first if again is None or again.needed > first.needed else again
+    if again is None or not again.laid.is_better_than(first.laid):
+        return first
+    return again

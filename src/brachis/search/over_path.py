@@ -102,7 +102,23 @@ def improve_guess(
         better = BetterGuess(_along(moved, found), own, found)
         if gain < tolerances.GAIN:
             break
-    return better
+    return _centre(better) if is_free and better.start.is_improved else better
+
+
+def _centre(better: BetterGuess) -> BetterGuess:
+    """Lay the same chart around the better joint path: the search for a posture then begins beside it."""
+    start = better.start
+    chart = start.joint_map
+    assert isinstance(chart, ChartMap)
+    s = start.joint_path[:, 0]
+    q = chart.postures(start.joint_path)
+    if not np.isfinite(q).all():
+        return better
+    centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
+    start = dataclasses.replace(start, joint_map=centred)
+    grids = [phase.grid for phase in better.program.phases]
+    program = program_over(start.problem, start.maps_by_leg(), grids)
+    return dataclasses.replace(better, start=start, program=program)
 
 
 def _along(start: InitialGuess, found: BetterPaths) -> InitialGuess:

@@ -371,8 +371,8 @@ class Search:
         if candidate.trajectory is None:
             return
         if not candidate.keeps_knots:
-            # Better knots shorten a motion: others may gain half a per cent more by them than any one so far.
-            gain = 0.995 * candidate.t_end / candidate.coarse
+            # Better knots shorten a motion: others may gain a little more by them than any one so far.
+            gain = 0.998 * candidate.t_end / candidate.coarse
             self._gain = min(self._gain, gain)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
             self.best = candidate

@@ -72,7 +72,7 @@ def solve_over_path(
     reports: tuple[SolverReport, ...] = ()
     if not start.is_improved:
         try:
-            better = improve_guess(start, program, session.roughly(), retiming.ROUGH)
+            better = improve_guess(start, program, session, retiming.ROUGH)
         except UnreachableError:
             return None
         start, program = better.start, better.program
