@@ -57,6 +57,16 @@ endsolid t
 """
 
 
+CELL = """<robot name="cell">
+<link name="world"/>
+<link name="table"><collision><origin xyz="0 0 -0.05"/><geometry><box size="1 0.6 0.1"/></geometry></collision></link>
+<link name="post"><collision><geometry><cylinder radius="0.05" length="1.2"/></geometry></collision></link>
+<joint name="a" type="fixed"><parent link="world"/><child link="table"/><origin xyz="0.5 0 0.4"/></joint>
+<joint name="b" type="fixed"><parent link="table"/><child link="post"/><origin xyz="0 0.25 0.6" rpy="0 1.5707963 0"/></joint>
+</robot>
+"""
+
+
 def found(task):
     return scene_of(robot_for(None, task.robot), task)
 
@@ -223,3 +233,39 @@ def test_the_viewer_draws_the_bodies_where_they_are():
     np.testing.assert_allclose(
         np.ptp(meshes[7][0].bounds, axis=0), [0.2, 0.2, 0.4], atol=2e-3
     )
+
+
+def test_a_cell_is_read_from_a_urdf(tmp_path):
+    (tmp_path / "cell.urdf").write_text(CELL)
+    cell = {"name": "cell", "urdf": "cell.urdf", "position": [0.1, 0.0, 0.0]}
+    (tmp_path / "task.yaml").write_text(yaml.safe_dump({**TASK, "scene": [cell]}))
+    task = brachis.load_task(tmp_path / "task.yaml")
+    scene = scene_of(robot_for(None, task.robot), task)
+    placed = {
+        solid.name: placement
+        for solid, placement in zip(scene.solids, scene.placements, strict=True)
+    }
+    np.testing.assert_allclose(placed["cell: table"][:3, 3], [0.6, 0.0, 0.35])
+    np.testing.assert_allclose(placed["cell: post"][:3, 3], [0.6, 0.25, 1.0])
+    np.testing.assert_allclose(placed["cell: post"][:3, 2], [1.0, 0.0, 0.0], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            CELL.replace('"b" type="fixed"', '"b" type="revolute"'),
+            "joint 'b' of type revolute",
+        ),
+        (CELL.replace("radius", "thickness"), "<cylinder> is wrong"),
+        ("robot: 1", "not a URDF"),
+        (None, "cell.urdf"),
+    ],
+)
+def test_a_urdf_that_is_no_cell_is_refused(tmp_path, text, message):
+    if text is not None:
+        (tmp_path / "cell.urdf").write_text(text)
+    cell = {"name": "cell", "urdf": str(tmp_path / "cell.urdf")}
+    task = brachis.load_task({**TASK, "scene": [cell]})
+    with pytest.raises(brachis.BrachisError, match=message):
+        scene_of(robot_for(None, task.robot), task)

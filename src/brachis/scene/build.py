@@ -16,7 +16,7 @@ from brachis.robot.urdf_bodies import placement_matrix
 from brachis.robot.urdf_elements import UrdfTree, end_of, read_tree
 from brachis.scene.chain import Chain
 from brachis.scene.scene import Scene
-from brachis.scene.solids import Solid, build_capsules, build_solid, read_solids
+from brachis.scene.solids import Solid, build_capsules, build_solids, read_solids
 from brachis.task import Task
 
 _POSTURES = 100
@@ -31,9 +31,9 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     Raises
     ------
     TaskError
-        A name is unknown; the robot has no collision geometry; a mesh cannot be read.
+        A name is unknown; the robot has no collision geometry; a mesh, or a URDF of the scene, cannot be read.
     UrdfError
-        The URDF's collision geometry cannot be read.
+        The collision geometry of a URDF cannot be read.
     """
     settings = task.collisions
     if task.collision_mode == "off":
@@ -52,7 +52,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
             allowed="a URDF with <collision> elements",
             hint="Add them, or set collisions.capsules: auto, or collisions.mode: off",
         )
-    solids = (*own, *(build_solid(body) for body in task.scene))
+    solids = (*own, *itertools.chain(*map(build_solids, task.scene)))
     joints = np.zeros(len(solids), dtype=int)
     placements = np.array([solid.placement for solid in solids])
     for number, solid in enumerate(solids):

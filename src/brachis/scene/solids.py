@@ -14,10 +14,16 @@ import coal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from brachis.common.files import mesh_file
+from brachis.common.files import mesh_file, read_text
 from brachis.errors import InputError, TaskError, UrdfError
 from brachis.robot.urdf_bodies import origin_of, placement_matrix
-from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of
+from brachis.robot.urdf_elements import (
+    Element,
+    UrdfTree,
+    end_of,
+    numbers_of,
+    read_tree,
+)
 from brachis.task.scene import SceneBody
 
 _HULL = (True, "Qt")
@@ -54,14 +60,41 @@ class Solid:
         return float(shape.aabb_radius + shape.getSweptSphereRadius())
 
 
-def build_solid(body: SceneBody) -> Solid:
-    """Make the solid of a scene's body.
+def build_solids(body: SceneBody) -> Iterator[Solid]:
+    """Make the solids of a scene's body: one, or those of its URDF.
 
     Raises
     ------
     TaskError
-        A mesh cannot be read.
+        A mesh or a URDF cannot be read.
+    UrdfError
+        A shape of a URDF cannot be read.
     """
+    if body.urdf is None:
+        yield _build_solid(body)
+        return
+    where = f"scene: {body.name}"
+    path = Path(body.urdf)
+    text = read_text(path, where=f"{where}.urdf", folder=Path.cwd())
+    tree = read_tree(text, str(path))
+    placed = {tree.downward[0]: placement_matrix(body.placement)}
+    for link in tree.downward[1:]:
+        joint = tree.joints[tree.above[link]]
+        if joint.get("type") != "fixed":
+            raise TaskError(
+                "a cell of a scene stands still",
+                where=where,
+                found=f"joint {joint.get('name')!r} of type {joint.get('type')}",
+                allowed="fixed joints",
+            )
+        placed[link] = placed[end_of(joint, "parent")] @ origin_of(joint, "origin")
+    for solid in read_solids(tree, path.absolute().parent, {}):
+        placement = placed[str(solid.link)] @ solid.placement
+        name = f"{body.name}: {solid.name}"
+        yield Solid(name, body.link, solid.geometry, placement)
+
+
+def _build_solid(body: SceneBody) -> Solid:
     shape = getattr(body, body.shape)
     if body.half_space is not None:
         normal = np.array(body.half_space.normal)

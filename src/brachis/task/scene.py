@@ -21,7 +21,7 @@ from brachis.task.fields import (
 from brachis.task.orientation import Vector3
 from brachis.task.settings import Placement
 
-SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh")
+SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh", "urdf")
 """Keys of which a body has exactly one."""
 
 
@@ -67,6 +67,8 @@ class SceneBody(Model):
     """All that is behind a plane: {normal: [x, y, z], offset: m}."""
     mesh: Name | None = None
     """Mesh file, relative to the task file; its convex hull is used."""
+    urdf: Name | None = None
+    """URDF file of a cell without moving joints, relative to the task file; its collision geometry is used."""
     scale: Positive = 1.0
     """Factor from the mesh's unit to m."""
     link: Name | None = None

@@ -24,7 +24,7 @@ class SceneFile(Model):
     brachis_scene: Literal[1]
     """Version of the format."""
     bodies: Annotated[tuple[SceneBody, ...], BeforeValidator(bodies_by_name)]
-    """Bodies as in scene; mesh files are relative to this file."""
+    """Bodies as in scene; files are relative to this file."""
 
 
 def with_scene_of_file(
@@ -75,9 +75,13 @@ def with_absolute_files(task: Task, folder: Path) -> Task:
 
 def _with_paths(bodies: tuple[SceneBody, ...], folder: Path) -> tuple[SceneBody, ...]:
     return tuple(
-        body
-        if body.mesh is None
-        else body.model_copy(update={"mesh": _absolute(body.mesh, folder)})
+        body.model_copy(
+            update={
+                key: _absolute(file, folder)
+                for key in ("mesh", "urdf")
+                if (file := getattr(body, key)) is not None
+            }
+        )
         for body in bodies
     )
 
