@@ -5,7 +5,7 @@ With X = sdot^2 linear in s between the stations, u = d2s/dt2 is constant there,
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
-Limits hold at two places between one station and the next, and at both ends.
+Limits hold half-way between the stations, or at two places there, and at both ends.
 
 What it finds is a joint path: its timing is computed anew, on a finer grid.
 """
@@ -40,11 +40,13 @@ _NOTHING = 1e-24
 """Stands for zero where it is divided by."""
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
-_AHEAD = (0.5 + np.sqrt(1.0 / 12.0), 0.5 - np.sqrt(1.0 / 12.0))
-"""Parts of an interval between stations that are ahead where limits hold: the points of Gauss.
-
-Half-way alone, torques may swing beyond their limits on both sides.
-"""
+HALF_WAY: tuple[float, ...] = (0.5,)
+"""Parts of an interval between stations that are ahead where limits hold: one place."""
+POINTS_OF_GAUSS: tuple[float, ...] = (
+    0.5 + np.sqrt(1.0 / 12.0),
+    0.5 - np.sqrt(1.0 / 12.0),
+)
+"""Two places, where torques otherwise swing beyond their limits on both sides of one."""
 _SMALL = 2e-5
 """Violation up to which a limit on postures is not narrowed."""
 _RAMP = 2.0
@@ -81,6 +83,8 @@ class PathPhase:
         From which the solve begins.
     intervals, stations : int
         Of the splines, and between the stations; both are as long in time.
+    ahead : tuple of float
+        Where limits hold between the stations: `HALF_WAY` or `POINTS_OF_GAUSS`.
 
     Attributes
     ----------
@@ -96,7 +100,12 @@ class PathPhase:
     """
 
     def __init__(
-        self, phase: Phase, own: PhaseTiming, intervals: int, stations: int
+        self,
+        phase: Phase,
+        own: PhaseTiming,
+        intervals: int,
+        stations: int,
+        ahead: tuple[float, ...],
     ) -> None:
         timing = own.timing
         assert timing is not None and phase.joint_map.path is not None
@@ -112,8 +121,8 @@ class PathPhase:
         self._s = _with_pieces(s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
         # Where limits hold: the interval between stations, and the part of it that is ahead.
-        inner = np.tile(_AHEAD, len(self._steps))
-        number = np.repeat(np.arange(len(self._steps)), len(_AHEAD))
+        inner = np.tile(ahead, len(self._steps))
+        number = np.repeat(np.arange(len(self._steps)), len(ahead))
         self._number = np.pad(number, 1, mode="edge")
         self._ahead = np.pad(inner, 1, constant_values=(1.0, 0.0))[:, None]
         places = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from brachis.optimise.follow import Followed, begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.path_program import (
+    HALF_WAY,
+    POINTS_OF_GAUSS,
     PathPhase,
     PathProgram,
     violation_of_postures,
@@ -33,12 +36,14 @@ _WORTH = 3.0
 """Tolerances by which a timing of the splines' own joint path is faster if it is worth to be followed."""
 _MOST_INTERVALS = 256
 """Intervals of all redundant curves together: with four curves of 128 a solve takes half a minute, and gains 0.2 %."""
-_STATIONS_AN_INTERVAL = 1.75
-"""Stations of the path for every interval."""
+_PLACES_AN_INTERVAL = 3.5
+"""Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
 _ENOUGH = 5e-5
 """Violation of them that is small enough."""
+_FALLS = 2.0
+"""Factor by which levels gain less, about, one after the other."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -52,7 +57,7 @@ class PathEffort:
     intervals : tuple of int
         Of the redundant curves over the path, one after the other.
     stations : int
-        Of the path, at least.
+        Of the path at which limits hold, at least.
     places : int
         At which answers are timed.
     margin : float
@@ -68,10 +73,10 @@ class PathEffort:
     options: SolverOptions
 
 
-ROUGH = PathEffort((16,), 28, 800, MARGINS[1], SolverOptions(3e-4, 40, np.inf, 1e-3, 3))
+ROUGH = PathEffort((16,), 56, 800, MARGINS[1], SolverOptions(3e-4, 40, np.inf, 1e-3, 3))
 """To rank joint paths, clear of branch boundaries."""
 FINE = PathEffort(
-    (32, 64, 128, 256), 60, PLACES, MARGIN, SolverOptions(1e-5, 100, np.inf, 2e-4, 4)
+    (32, 64, 128, 256), 120, PLACES, MARGIN, SolverOptions(1e-5, 100, np.inf, 2e-4, 4)
 )
 """For a plan, from the answer of a rough search."""
 
@@ -234,28 +239,35 @@ def improve_joint_paths(
     r = program.phases[0].joint_map.r
     if not r:
         return best
+    ahead = HALF_WAY
     for count in effort.intervals:
         before = best.t_end
         is_too_large = count * r > _MOST_INTERVALS
         if is_too_large or not np.isfinite(before) or solve.deadline.passed:
             break
-        best = _better(program.with_margin(effort.margin), best, solve, count, effort)
-        if not best.is_credible or best.t_end > before * (1.0 - tolerance):
+        again = partial(_better, program.with_margin(effort.margin), solve, count)
+        best = again(best, effort, ahead)
+        if not best.is_credible and ahead is HALF_WAY:
+            ahead = POINTS_OF_GAUSS
+            best = again(best, effort, ahead)
+        if not best.is_credible or best.t_end > before * (1.0 - _FALLS * tolerance):
             break
     return best
 
 
 def _better(
     program: Program,
-    best: BetterPaths,
     solve: SolverSession,
     intervals: int,
+    best: BetterPaths,
     effort: PathEffort,
+    ahead: tuple[float, ...],
 ) -> BetterPaths:
     """Solve over the path from the best joint paths, and keep what is faster."""
-    stations = max(effort.stations, int(_STATIONS_AN_INTERVAL * intervals))
+    places = max(effort.stations, int(_PLACES_AN_INTERVAL * intervals))
+    stations = places // len(ahead)
     pairs = zip(program.phases, best.timings, strict=True)
-    phases = [PathPhase(phase, own, intervals, stations) for phase, own in pairs]
+    phases = [PathPhase(*pair, intervals, stations, ahead) for pair in pairs]
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)
     reports = (*best.reports, report)
