@@ -1,11 +1,14 @@
 """Random scenes around known motions: how many end in a verified plan that keeps clear, and how fast.
 
-Usage: python benchmarks/scenes.py [--robot NAME] [--seed 0] [--count 10] [--save]
+Usage: python benchmarks/scenes.py [--blocked] [--robot NAME] [--seed 0] [--count 10] [--save]
 
 A scene begins as a task of `mixed_cases`, with a joint path that is known to do it. The task is planned without
 obstacles. One obstacle then stands where a link of the plan passes, and keeps clear of the known joint path; up to
 seven more stand anywhere, and keep clear of it too. So the plan without obstacles collides, and a motion is known that
 does not. The known motion is timed by the phase plane: no plan should take longer.
+
+With --blocked an obstacle stands on the path itself, as large as the way from the tool frame to the last body of the
+arm: no posture there is free. The refusal should name this obstacle, and a place where it is.
 
 An independent check looks at 2,000 instants of every plan, with Pinocchio's own kinematics and distances.
 """
@@ -81,15 +84,27 @@ def draw(
     planned: np.ndarray,
     *,
     tall: bool,
+    on_path: bool = True,
 ) -> list[dict[str, object]] | None:
-    """Draw the obstacles of a scene; None where the plan is everywhere too near to the known motion."""
+    """Draw the obstacles of a scene; None where the plan is everywhere too near to the known motion.
+
+    Parameters
+    ----------
+    rng, task
+    known, planned : (K, n) ndarray
+        Postures that stay free, and those of the plan.
+    tall : bool
+        Whether obstacles are tall.
+    on_path : bool, optional
+        Whether the first one stands where the plan passes.
+    """
     robot = robot_for(None, task.robot)
     clearance = task.collisions.clearance + SPARE
     bodies: list[dict[str, object]] = []
     wanted = int(rng.integers(1, 9))
     reach = 1.5 * np.abs(robot.tool_placements(known)[0]).max()
     for attempt in range(200):
-        if not bodies:
+        if not bodies and on_path:
             posture = planned[rng.integers(len(planned))]
             data = next(iter(robot.place_joints(posture[None])))
             joint = int(rng.integers(2, robot.n + 1))
@@ -107,7 +122,7 @@ def draw(
         body = obstacle(rng, centre, radius, tall=tall)
         if distance_to(task, known, body)[0] < task.collisions.clearance:
             continue
-        if not bodies and distance_to(task, planned, body)[0] > -0.01:
+        if not bodies and on_path and distance_to(task, planned, body)[0] > -0.01:
             continue
         bodies.append(body)
         if len(bodies) == wanted:
@@ -190,21 +205,89 @@ def plan_scene(
     return name, verdict, *times, distance, seconds
 
 
+def block(
+    rng: np.random.Generator, task: Task, known: np.ndarray, *, tall: bool
+) -> tuple[list[dict[str, object]], tuple[float, float]] | None:
+    """Put an obstacle on the path, clear of its ends, and more that are not in the way.
+
+    Returns the bodies, and the part of the path where the first one leaves no posture; None where none fits.
+    """
+    robot = robot_for(None, task.robot)
+    positions = robot.tool_placements(known)[0]
+    clearance = task.collisions.clearance
+    s = np.linspace(0.0, 1.0, len(known))
+    for number in rng.permutation(np.flatnonzero((s > 0.2) & (s < 0.8))).tolist():
+        centre = positions[number].copy()
+        if tall:
+            centre[2] = 0.0
+        point = obstacle(rng, centre, 1e-3, tall=True) if tall else {"sphere": 1e-3}
+        point["position"] = centre.tolist()
+        to_arm = distance_to(task, known[number : number + 1], point)[0] + 1e-3
+        radius = max(to_arm + 0.03, SIZES[0])
+        body = {**point, "name": "blocker"}
+        if tall:
+            body["cylinder"] = {"radius": radius, "length": 4.0}
+        else:
+            body["sphere"] = radius
+        ends = [distance_to(task, known[[end]], body)[0] for end in (0, -1)]
+        if min(ends) < clearance + SPARE:
+            continue
+        away = np.linalg.norm(
+            (positions - positions[number])[:, : 2 if tall else 3], axis=1
+        )
+        blocked = s[away < 2.0 * radius + clearance]
+        others = draw(rng, task, known, known, tall=tall, on_path=False)
+        return [body, *(others or [])], (float(blocked[0]), float(blocked[-1]))
+    return None
+
+
+def plan_blocked(
+    robot: str, seed: int, number: int, folder: Path
+) -> tuple[str, ...] | None:
+    """Plan a scene that has no solution; None where none could be made."""
+    made = mixed_cases.case(robot, seed, number, folder)
+    task = load_task(made.task, changes=AUTO)
+    rng = np.random.default_rng([seed, number, ROBOTS.index(robot), 1])
+    bare = robot_for(None, task.robot)
+    found = block(rng, task, made.joint_path[:, : bare.n], tall=robot in PLANAR)
+    if found is None:
+        return None
+    bodies, (first, last) = found
+    task = load_task(task, changes={"scene": bodies, "search.time_limit": LIMIT})
+    began = time.perf_counter()
+    try:
+        result = brachis.plan(task, strict=False)
+        said = f"a motion, verified: {result.verified}"
+        is_right = False
+    except BrachisError as error:
+        said = f"{type(error).__name__}: {str(error)[:300]}"
+        at = getattr(error, "s_interval", None)
+        is_there = at is not None and at[0] <= last and at[1] >= first
+        is_right = "blocker" in str(error) and is_there
+        said += f" at {at}"
+    seconds = f"{time.perf_counter() - began:.1f} s"
+    name = f"{made.name}, {len(bodies)} obstacles"
+    where = f"s in [{first:.3f}, {last:.3f}]"
+    return name, "right" if is_right else "WRONG", where, said, seconds
+
+
 def main() -> None:
     """Print a row for every scene."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robot", choices=ROBOTS)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=10, help="scenes of each robot")
+    parser.add_argument("--blocked", action="store_true", help="without a solution")
     parser.add_argument("--save", action="store_true")
     given = parser.parse_args()
     warnings.simplefilter("ignore", BrachisWarning)
     rows = []
+    plan = plan_blocked if given.blocked else plan_scene
     with tempfile.TemporaryDirectory() as folder:
         for robot in [given.robot] if given.robot else ROBOTS:
             made = 0
             for number in range(6 * given.count):
-                row = plan_scene(robot, given.seed, number, Path(folder))
+                row = plan(robot, given.seed, number, Path(folder))
                 if row is None:
                     continue
                 rows.append(row)
@@ -213,7 +296,11 @@ def main() -> None:
                 if made == given.count:
                     break
     columns = ("scene", "plan", "known", "without obstacles", "distance", "time")
-    save("Random scenes", columns, rows, "Each scene has a known motion.")
+    if given.blocked:
+        columns = ("scene", "refusal", "blocked", "what was said", "time")
+        save("Scenes without a solution", columns, rows, "An obstacle is on the path.")
+    else:
+        save("Random scenes", columns, rows, "Each scene has a known motion.")
 
 
 if __name__ == "__main__":

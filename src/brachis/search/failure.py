@@ -322,18 +322,7 @@ def explain_no_motion(
         missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
     more = f". {missing}" if missing else ""
     if dead_ends and not has_joint_path:
-        name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
-        own = name if name == ALL_POSTURES else f"redundant joints {name}"
-        others = f" ({own}; the furthest of {len(dead_ends)} lattices)"
-        start = "" if problem.start is None else "start in another posture, "
-        scene = ", move bodies of the scene" if problem.task.scene else ""
-        hint = f"{start}shorten or move the path{scene}, or widen the joint ranges"
-        return Failure(
-            f"no joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
-            phase="path",
-            s_interval=dead_ends[name].interval,
-            hint=hint.capitalize() + more,
-        )
+        return _explain_dead_ends(problem.task, dead_ends, more)
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(
         status if n == 1 else f"{status} ({n} times)" for status, n in counts.items()
@@ -359,8 +348,32 @@ def explain_no_motion(
     )
 
 
-def explain_time_limit(task: Task, not_completed: Sequence[str]) -> Failure:
-    """Say that the time was up, and what was not completed."""
+def _explain_dead_ends(
+    task: Task, dead_ends: Mapping[str, DeadEnd], more: str
+) -> Failure:
+    """Say where the lattice ends that has the longest way."""
+    name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
+    own = name if name == ALL_POSTURES else f"redundant joints {name}"
+    others = f" ({own}; the furthest of {len(dead_ends)} lattices)"
+    start = "" if task.start == "free" else "start in another posture, "
+    scene = ", move bodies of the scene" if task.scene else ""
+    hint = f"{start}shorten or move the path{scene}, or widen the joint ranges"
+    return Failure(
+        f"no joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
+        phase="path",
+        s_interval=dead_ends[name].interval,
+        hint=hint.capitalize() + more,
+    )
+
+
+def explain_time_limit(
+    task: Task, not_completed: Sequence[str], dead_ends: Mapping[str, DeadEnd]
+) -> Failure:
+    """Say that the time was up, and what was not completed; where a lattice ended, if one did."""
+    if dead_ends:
+        limit = f"{task.search.time_limit:g} s"
+        more = f". Not every lattice was searched within {limit}: raise search.time_limit to search them all"
+        return _explain_dead_ends(task, dead_ends, more)
     return Failure(
         f"no motion was found within the time limit of {task.search.time_limit:g} s: {'; '.join(not_completed)}",
         hint="Raise search.time_limit",

@@ -244,7 +244,12 @@ class Search:
             failure = explain_speeds(starts, are_tried=True)
         if failure is None and (self.interrupted or self._is_cut_short()):
             self.interrupted = True
-            failure = explain_time_limit(self._problem.task, self.not_completed())
+            has_joint_path = any(each.start for each in self.candidates)
+            failure = explain_time_limit(
+                self._problem.task,
+                self.not_completed(),
+                {} if has_joint_path else self._dead_ends,
+            )
         return failure or explain_no_motion(
             self._problem,
             self._decompositions,
