@@ -247,6 +247,17 @@ def test_padded_balls_are_found_from_as_far_away_as_they_are_large(tmp_path):
     assert np.all(bounds <= near.distance + 1e-6)
 
 
+def test_the_closest_pair_of_each_posture_is_found():
+    robot, found = scene()
+    placed = Chain.of(robot.model).place(postures(robot))
+    every = everything(found, placed)
+    closest = found.find_closest(placed)
+    np.testing.assert_array_equal(closest.posture, np.arange(40))
+    for k in range(40):
+        least = every.distance[every.posture == k].min()
+        assert closest.distance[k] == pytest.approx(least, abs=1e-12)
+
+
 def test_only_pairs_that_come_close_are_kept():
     given = task()
     robot = robot_for(None, given.robot)

@@ -110,6 +110,13 @@ class Factor:
     slides: tuple[int, ...] = ()
 
 
+Steps = tuple[Arm, Sequence[np.ndarray]]
+"""The arm while its joints are at zero, and their positions, with the slots before the samples.
+
+A slide whose direction depends on joints that are solved for before it has that direction.
+"""
+
+
 class FactoredSolver(IKSolver):
     """Closed form that solves for one joint after the other; each step has an axis of the answers, its slot.
 
@@ -176,13 +183,8 @@ class FactoredSolver(IKSolver):
         """Put in the points that the joints' screws and the tool's position (3, ...) give."""
 
     @abstractmethod
-    def _steps(
-        self, targets: np.ndarray, q_r: np.ndarray
-    ) -> tuple[Arm, Sequence[np.ndarray]]:
-        """Return the arm while its joints are at zero, and their positions, with the slots before the samples.
-
-        A slide whose direction depends on joints that are solved for before it has that direction.
-        """
+    def _steps(self, targets: np.ndarray, q_r: np.ndarray) -> Steps:
+        """Solve for the joints at targets, (K, c), with the redundant joints held at q_r, (K, r)."""
 
     def _arm_at(self, screws: PosedScrews) -> Arm:
         return self._arm(self._joints.screws(screws), screws.tool_position)

@@ -217,7 +217,6 @@ class EaikSolver(DeterminantSolver):
     def _make_robots(self, values: np.ndarray, tolerance: float) -> list[Any]:
         """Make EAIK's robots at held values (U, h); None where it has no decomposition."""
         create = _import_eaik().Robot
-        none_fixed: list[tuple[int, float]] = []
         screws = self._chain.screws_with(self._held, values)
         axes, points = exact_axes(
             screws.axes[:, self._joints], screws.points[:, self._joints], tolerance
@@ -232,7 +231,7 @@ class EaikSolver(DeterminantSolver):
         robots: list[Any] = []
         for h, p, rotation in zip(*parts, strict=True):
             try:
-                robot = create(h, p, rotation, none_fixed, True)  # noqa: FBT003  (double precision)
+                robot = create(h, p, rotation, [], True)  # noqa: FBT003  (double precision)
             except RuntimeError:  # axes that are almost parallel
                 robots.append(None)
             else:

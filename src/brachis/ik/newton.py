@@ -155,13 +155,13 @@ class Newton:
 def null_spaces(jacobian: np.ndarray) -> np.ndarray:
     """Orthonormal bases (K, n, r) of the null spaces of Jacobians (K, m, n)."""
     m = jacobian.shape[1]
-    return np.asarray(np.swapaxes(np.linalg.svd(jacobian)[2][:, m:], 1, 2))
+    return np.swapaxes(np.linalg.svd(jacobian)[2][:, m:], 1, 2)
 
 
 def solve_each(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve K linear systems, (K, n, n) and (K, n); those of singular matrices by NaN."""
     try:
-        return np.asarray(np.linalg.solve(matrices, right[:, :, None])[:, :, 0])
+        return np.linalg.solve(matrices, right[:, :, None])[:, :, 0]
     except np.linalg.LinAlgError:
         regular = np.abs(np.linalg.det(matrices)) > 0.0
         answers = np.full(right.shape, np.nan)

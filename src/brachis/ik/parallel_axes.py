@@ -40,13 +40,11 @@ without an order of the solutions; the cases with a rail are ours.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from brachis.common.arrays import cross
 from brachis.ik.arm import Arm, RemainingJoints
-from brachis.ik.branches import Factor, FactoredSolver, fit
+from brachis.ik.branches import Factor, FactoredSolver, Steps, fit
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Circle, Poses, Screw
@@ -159,9 +157,7 @@ class ParallelAxesSolver(FactoredSolver):
         """Velocity that p gives the arm along the parallel axes."""
         return dot(arm.screws[self._first].axis, arm.screws[self._slide or 0].axis)
 
-    def _steps(
-        self, targets: np.ndarray, q_r: np.ndarray
-    ) -> tuple[Arm, Sequence[np.ndarray]]:
+    def _steps(self, targets: np.ndarray, q_r: np.ndarray) -> Steps:
         screws, motion = self._displacement(targets, q_r)
         arm = self._arm(screws)
         place = motion.move(arm.centre)

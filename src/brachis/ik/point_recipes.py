@@ -51,7 +51,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import cross
 from brachis.ik.arm import Anchor, Arm, RemainingJoints
-from brachis.ik.branches import SINGULAR, Factor, FactoredSolver, fit
+from brachis.ik.branches import SINGULAR, Factor, FactoredSolver, Steps, fit
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Screw
 from brachis.ik.vectors import across, angle_about, dot
@@ -243,14 +243,8 @@ def _are_cylindrical(joints: RemainingJoints) -> bool:
     )
 
 
-def _front(value: Callable[[Arm], np.ndarray], vanishes: str, *slides: int) -> Factor:
-    return Factor(value, vanishes, ("front", "back"), slides)
-
-
-def _up(value: Callable[[Arm], np.ndarray], vanishes: str, *slides: int) -> Factor:
-    return Factor(value, vanishes, ("up", "down"), slides)
-
-
+_FRONT = ("front", "back")
+_UP = ("up", "down")
 _OUT = "does not move {point} out of the plane in which"
 _AWAY = "does not change the distance between {point} and the point where the axes of"
 
@@ -260,16 +254,17 @@ RECIPES = (
         (),
         solve_plane_of_last,
         (
-            _front(
+            Factor(
                 partial(_across, joint=0, plane=(1, 2)),
                 f"{{a}} {_OUT} {{b}} and {{c}} do",
-                0,
+                _FRONT,
+                (0,),
             ),
-            _up(
+            Factor(
                 partial(_area, plane=(1, 2)),
                 "{b} and {c} move {point} along one line",
-                1,
-                2,
+                _UP,
+                (1, 2),
             ),
         ),
     ),
@@ -278,16 +273,17 @@ RECIPES = (
         (),
         solve_plane_of_first,
         (
-            _front(
+            Factor(
                 partial(_area, plane=(0, 1)),
                 "{a} and {b} move {point} along one line",
-                0,
-                1,
+                _FRONT,
+                (0, 1),
             ),
-            _up(
+            Factor(
                 partial(_across, joint=2, plane=(0, 1)),
                 f"{{c}} {_OUT} {{a}} and {{b}} do",
-                2,
+                _UP,
+                (2,),
             ),
         ),
     ),
@@ -296,13 +292,15 @@ RECIPES = (
         (0, 1),
         solve_meeting_of_first,
         (
-            _front(
+            Factor(
                 partial(_along, joint=1, axis=0),
                 "{b} does not move {point} along the axis of {a}",
+                _FRONT,
             ),
-            _up(
+            Factor(
                 partial(_approach, joint=2, sign=1.0),
                 f"{{c}} {_AWAY} {{a}} and {{b}} meet",
+                _UP,
             ),
         ),
     ),
@@ -311,13 +309,15 @@ RECIPES = (
         (1, 2),
         solve_meeting_of_last,
         (
-            _front(
+            Factor(
                 partial(_along, joint=2, axis=1),
                 "{c} does not move {point} along the axis of {b}",
+                _FRONT,
             ),
-            _up(
+            Factor(
                 partial(_approach, joint=0, sign=-1.0),
                 f"{{a}} {_AWAY} {{b}} and {{c}} meet",
+                _UP,
             ),
         ),
     ),
@@ -326,8 +326,12 @@ RECIPES = (
         (),
         solve_cylinder,
         (
-            _front(_in_front, "{a} and {b} do not move {point} along the axis of {c}"),
-            _up(_to_front, f"{{c}} {_OUT} {{a}} and {{b}} do"),
+            Factor(
+                _in_front,
+                "{a} and {b} do not move {point} along the axis of {c}",
+                _FRONT,
+            ),
+            Factor(_to_front, f"{{c}} {_OUT} {{a}} and {{b}} do", _UP),
         ),
     ),
 )
@@ -430,9 +434,7 @@ class PositioningSolver(FactoredSolver):
     def _arm(self, screws: tuple[Screw, ...], tool: np.ndarray) -> Arm:
         return Arm(screws, tool, self._meeting.at(screws) if self._meeting else tool)
 
-    def _steps(
-        self, targets: np.ndarray, q_r: np.ndarray
-    ) -> tuple[Arm, Sequence[np.ndarray]]:
+    def _steps(self, targets: np.ndarray, q_r: np.ndarray) -> Steps:
         screws = self._geometry.screws_with(self._redundant, q_r)
         start = screws.tool_position[:, None, None]
         end = targets.T[self._order, None, None]

@@ -328,7 +328,7 @@ def check_answers(
         raise NotApplicableError(
             f"its answers have the shape {answers.shape}, not {expected}"
         )
-    turning = ChainGeometry.of(robot).revolute[rest]
+    turning = robot.revolute[rest]
     own = np.abs(difference(answers, q[:, None, None, rest], turning)).max(axis=3)
     if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < 1e-6):
         raise NotApplicableError(
@@ -356,11 +356,7 @@ def _ranges_to_check(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """
     lower = robot.limits.position_lower
     upper = robot.limits.position_upper
-    ranged = (
-        (np.array(robot.position_units) == "m")
-        & np.isfinite(lower)
-        & np.isfinite(upper)
-    )
+    ranged = ~robot.revolute & np.isfinite(lower) & np.isfinite(upper)
     near = np.clip(0.0, lower, upper)
     lower = np.maximum(lower, near - 20.0)
     upper = np.minimum(upper, near + 20.0)

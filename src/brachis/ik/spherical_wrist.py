@@ -30,7 +30,7 @@ import numpy as np
 
 from brachis.common.arrays import cross
 from brachis.ik.arm import Arm, RemainingJoints
-from brachis.ik.branches import Factor, FactoredSolver, fit
+from brachis.ik.branches import Factor, FactoredSolver, Steps, fit
 from brachis.ik.point_recipes import choose_recipe
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Circle, Screw
@@ -95,9 +95,7 @@ class SphericalWristSolver(FactoredSolver):
             screws, centre, self._meeting.at(screws) if self._meeting else centre
         )
 
-    def _steps(
-        self, targets: np.ndarray, q_r: np.ndarray
-    ) -> tuple[Arm, Sequence[np.ndarray]]:
+    def _steps(self, targets: np.ndarray, q_r: np.ndarray) -> Steps:
         screws, motion = self._displacement(targets, q_r)
         arm = self._arm(screws)
         base = self.recipe.solve(arm, motion.move(arm.centre))

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from brachis.common.arrays import spread
+from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
-from brachis.limits import Limit
+from brachis.limits import Limit, Moments
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
@@ -33,6 +34,8 @@ _SLOWER_BY_LOSS = 1.6
 """Power of the slowness wanted that is the factor of the loss, about."""
 _MESHES = 5
 """Choices of knots that are tried, no more."""
+_GAINS = 0.9
+"""Another mesh is tried as long as the last one was slower by less than this part of the one before."""
 _BETTER = 0.5
 """A finer mesh is tried as long as the last one left less than this part of the violation of limits on postures."""
 _MOST_INTERVALS = 40_000
@@ -103,7 +106,11 @@ class Followed:
 
 
 def follow(
-    phase: Phase, own: PhaseTiming, tolerance: float, points: int
+    phase: Phase,
+    own: PhaseTiming,
+    tolerance: float,
+    points: int,
+    deadline: Deadline = NEVER,
 ) -> Followed | None:
     """Lay splines along the fastest timing of a phase's joint path, within the limits.
 
@@ -116,6 +123,8 @@ def follow(
         Part of the time by which they should not be slower.
     points : int
         Collocation points an interval.
+    deadline : Deadline, optional
+        After it no other mesh is tried, and no limit is narrowed further.
 
     Returns
     -------
@@ -128,16 +137,21 @@ def follow(
     best = None
     lost = _FIRST_LOSS * tolerance
     outside = np.inf
+    slower = np.inf
     for number in range(1, _MESHES + 1):
         breaks = _knots(phase, own, timing, lost)
         if len(breaks) > _MOST_INTERVALS:
             break
         allowed = tolerance if number < _MESHES else np.inf
-        laid = _hold_limits(phase, own, timing, breaks, allowed)
+        laid = _hold_limits(phase, own, timing, breaks, allowed, deadline)
         if best is None or laid.is_better_than(best):
             best = laid
-        if laid.slower < tolerance and not _ENOUGH < laid.outside < _BETTER * outside:
+        holds = laid.slower < tolerance
+        if holds and not _ENOUGH < laid.outside < _BETTER * outside:
             break
+        if deadline.passed or laid.slower > _GAINS * slower:
+            break
+        slower = laid.slower
         outside = laid.outside
         wanted = _AIM * tolerance / max(laid.slower, tolerance)
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
@@ -219,8 +233,32 @@ def _hold_limits(
     fastest: Timing,
     breaks: np.ndarray,
     allowed: float,
+    deadline: Deadline,
 ) -> Laid:
     """Lay splines until the limits hold, or until they are slower by more than a part `allowed` of the time."""
+    best = _narrow_until_they_hold(phase, own, fastest, breaks, allowed, deadline)
+    if not np.isfinite(best.violation):
+        return best
+    t = spread(np.unique(best.motion.knots), _LOOKS[-1]) * best.motion.t_end
+    q = phase.joint_map.state(*best.motion.at(t), t=t).q
+    still = Moments.at_rest(q)
+    beyond = [
+        limit.violation(limit.values(still)).max()
+        for limit in phase.limits
+        if is_of_postures(limit)
+    ]
+    return replace(best, outside=max(beyond, default=0.0))
+
+
+def _narrow_until_they_hold(
+    phase: Phase,
+    own: PhaseTiming,
+    fastest: Timing,
+    breaks: np.ndarray,
+    allowed: float,
+    deadline: Deadline,
+) -> Laid:
+    """Lay splines, and narrow the limits that a longer time relieves where they exceed them; see `_hold_limits`."""
     from scipy.interpolate import interp1d
 
     most_acceleration = largest_acceleration(fastest)
@@ -230,7 +268,6 @@ def _hold_limits(
         if is_checked_at_points(limit) and limit.longer_time == "relieves"
     ]
     timing = fastest
-    of_postures = [limit for limit in phase.limits if is_of_postures(limit)]
     best = Laid(_lay_splines(phase, own, timing, breaks))
     motion = best.motion
     idle = 0
@@ -250,8 +287,7 @@ def _hold_limits(
             limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
         }
         violation = max((each.max() for each in beyond.values()), default=0.0)
-        outside = [limit.violation(limit.values(state)).max() for limit in of_postures]
-        laid = Laid(motion, float(violation), outside=max(outside, default=0.0))
+        laid = Laid(motion, float(violation))
         idle = 0 if laid.needed < best.needed * (1.0 - _ENOUGH) else idle + 1
         if laid.needed < best.needed:
             best = laid
@@ -262,7 +298,7 @@ def _hold_limits(
             looks = closer
             best = replace(best, violation=np.inf)
             continue
-        if violation <= _ENOUGH or idle > _PATIENCE:
+        if violation <= _ENOUGH or idle > _PATIENCE or deadline.passed:
             break
         factor = _MORE if narrower else 1.0
         for limit in limits:

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.limits.safeguards import HELD_BACK, MARGIN, MARGINS
 from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
@@ -32,6 +33,8 @@ _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
+_SWINGS = 0.03
+"""Part of the time by which an answer that is faster than its timing is worth more places."""
 _WORTH = 3.0
 """Tolerances by which a timing of the splines' own joint path is faster if it is worth to be followed."""
 _MOST_INTERVALS = 256
@@ -173,6 +176,8 @@ class BetterPaths:
     is_credible : bool
         Whether the answers are about as fast as their timings. Where the tool stands on its path while the joints move,
         curves over the path are none.
+    swings : bool
+        Whether the answers are much faster than their timings: limits are exceeded between the places where they hold.
     is_held_back : bool
         Whether a branch margin is so near to its bound that it holds the motion back.
     """
@@ -182,6 +187,7 @@ class BetterPaths:
     reports: tuple[SolverReport, ...] = ()
     violation: float = 0.0
     is_credible: bool = True
+    swings: bool = False
     is_held_back: bool = False
 
     @property
@@ -247,7 +253,7 @@ def improve_joint_paths(
             break
         again = partial(_better, program.with_margin(effort.margin), solve, count)
         best = again(best, effort, ahead)
-        if not best.is_credible and ahead is HALF_WAY:
+        if best.swings and ahead is HALF_WAY:
             ahead = POINTS_OF_GAUSS
             best = again(best, effort, ahead)
         if not best.is_credible or best.t_end > before * (1.0 - _FALLS * tolerance):
@@ -285,7 +291,7 @@ def _better(
         return replace(best, reports=reports, is_credible=False)
     curves = tuple(over_path.curves(report.x))
     found = BetterPaths(curves, timings, reports, violation)
-    missed = abs(report.objective / found.t_end - 1.0)
+    missed = 1.0 - report.objective / found.t_end
     # The phase plane does not tell whether the limits allow a speed that is given.
     is_given = any(own.given is not None for own in timings)
     is_beyond = is_given and report.violation > _CREDIBLE
@@ -293,7 +299,8 @@ def _better(
         found = replace(best, reports=reports)
     return replace(
         found,
-        is_credible=missed < _CREDIBLE,
+        is_credible=abs(missed) < _CREDIBLE,
+        swings=missed > _SWINGS,
         is_held_back=slack <= HELD_BACK,
     )
 
@@ -308,6 +315,7 @@ def lay_splines(
     timings: Sequence[PhaseTiming | None],
     tolerance: float,
     points: int,
+    deadline: Deadline = NEVER,
 ) -> tuple[Program, SolverReport] | None:
     """Lay splines along the fastest timing of joint paths, over the knots that these need.
 
@@ -321,6 +329,8 @@ def lay_splines(
         Part of the time by which splines should not be slower.
     points : int
         Collocation points an interval.
+    deadline : Deadline, optional
+        See `follow`.
 
     Returns
     -------
@@ -330,10 +340,11 @@ def lay_splines(
     began = time.perf_counter()
     found = []
     for phase, own in zip(program.phases, timings, strict=True):
-        followed = None if own is None else follow(phase, own, tolerance, points)
+        how = tolerance, points, deadline
+        followed = None if own is None else follow(phase, own, *how)
         if followed is None:
             return None
-        found.append(_follow_again(followed, tolerance, points))
+        found.append(_follow_again(followed, *how))
     finer = program.with_phases([own.phase for own in found])
     x = np.concatenate([own.x for own in found])
     violation = max(own.laid.violation for own in found)
@@ -341,14 +352,16 @@ def lay_splines(
     return finer, _report(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)
 
 
-def _follow_again(first: Followed, tolerance: float, points: int) -> Followed:
+def _follow_again(
+    first: Followed, tolerance: float, points: int, deadline: Deadline
+) -> Followed:
     """Follow the timing of the splines' own joint path, where these cut its curves so that it is faster."""
-    if not first.phase.joint_map.r:
+    if not first.phase.joint_map.r or deadline.passed:
         return first
     own = PhaseTiming.of(first.phase, first.x)
     if own is None or own.t_end > first.laid.needed * (1.0 - _WORTH * tolerance):
         return first
-    again = follow(first.phase, own, tolerance, points)
+    again = follow(first.phase, own, tolerance, points, deadline)
     if again is None or not again.laid.is_better_than(first.laid):
         return first
     return again

@@ -139,7 +139,7 @@ class ArcCurve:
     @property
     def normal(self) -> Array:
         """Unit vector of the axis about which the curve turns, for three position rows."""
-        normal: Array = np.cross(self.outward, self.forward)
+        normal = np.cross(self.outward, self.forward)
         return normal / np.linalg.norm(normal)
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -189,9 +190,7 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
         return ()
     tables: list[Array] = []
     goes_on = False  # whether the last table holds up to the end of its segment
-    for begin, end, piece in zip(
-        path.breaks, path.breaks[1:], path.pieces, strict=False
-    ):
+    for (begin, end), piece in zip(pairwise(path.breaks), path.pieces, strict=True):
         if piece.segment is None:
             continue
         speeds = getattr(segments[piece.segment].shape, "speeds", ())

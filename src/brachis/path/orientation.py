@@ -151,8 +151,7 @@ def _with_frame(
     tangent = unit(position.derivatives(sigma, order + 1)[1:])
     sideways = unit(tangent @ hat(up).T)
     upwards = product(hat(tangent), sideways, "...ij,...j->...i")
-    frame: Array = np.stack([tangent, sideways, upwards], axis=-1)
-    return frame @ tool
+    return np.stack([tangent, sideways, upwards], axis=-1) @ tool
 
 
 def orientation_along(
@@ -207,8 +206,7 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> Orientatio
 
     def sine(sigma: Array) -> Array:
         tangent = unit(curve.derivatives(sigma, 1)[1:])[0]
-        size: Array = np.linalg.norm(np.cross(up, tangent), axis=1)
-        return size
+        return np.linalg.norm(np.cross(up, tangent), axis=1)
 
     sigma, least = smallest(sine, curve.knots)
     if least < np.sin(np.deg2rad(1.0)):

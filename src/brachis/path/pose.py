@@ -68,7 +68,7 @@ def least_quality(columns: Curve) -> tuple[float, float]:
 
     def quality(sigma: Array) -> Array:
         quaternions = columns.derivatives(sigma, 0)[0, :, POSITIONS:]
-        lengths: Array = np.linalg.norm(quaternions, axis=1)
+        lengths = np.linalg.norm(quaternions, axis=1)
         return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))
 
     return smallest(quality, columns.knots)

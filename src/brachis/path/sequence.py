@@ -73,11 +73,11 @@ class PathFrame:
 
     def to_world(self, coordinates: Array) -> Array:
         """Return coordinates in the world, (c,)."""
-        return np.asarray(self.turn @ coordinates + self.origin)
+        return self.turn @ coordinates + self.origin
 
     def to_frame(self, coordinates: Array) -> Array:
         """Return coordinates in the frame, (c,), of coordinates in the world."""
-        return np.asarray(self.turn.T @ (coordinates - self.origin))
+        return self.turn.T @ (coordinates - self.origin)
 
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -88,7 +88,7 @@ def integrate(function: Callable[[Array], Array], bounds: Array) -> Array:
     half = np.diff(bounds)[:, None] / 2.0
     nodes = bounds[:-1, None] + half * (_NODES + 1.0)
     values = function(nodes.ravel()).reshape(nodes.shape)
-    return np.asarray((values * half) @ _WEIGHTS)
+    return (values * half) @ _WEIGHTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +104,6 @@ class Piece:
     def length(self) -> float:
         """Range of sigma."""
         return self.last - self.first
-
-    @property
-    def inner_knots(self) -> Array:
-        """The curve's knots between `first` and `last`, without these, sigma."""
-        knots = self.curve.knots
-        return knots[(knots > self.first) & (knots < self.last)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +169,9 @@ class SequencePath:
         """Values of s between which the path is analytic, from its begin to its end."""
         found = [self.breaks]
         for begin, piece in zip(self.breaks[:-1], self.pieces, strict=True):
-            found.append(begin + (piece.inner_knots - piece.first) / self.total)
+            knots = piece.curve.knots
+            inner = knots[(knots > piece.first) & (knots < piece.last)]
+            found.append(begin + (inner - piece.first) / self.total)
         return np.unique(np.concatenate(found))
 
     def between(self, begin: float, end: float) -> Self:

@@ -60,7 +60,7 @@ class TimeLaw:
 
     def at_end(self, end: int) -> Array:
         """Return the same, (4,), at the beginning (0) or the end (-1), free of the spline's error."""
-        return np.asarray(self.ends[end])
+        return self.ends[end]
 
 
 def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:

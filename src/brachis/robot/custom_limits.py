@@ -22,7 +22,6 @@ class LimitModel(Protocol):
 
     def bind(self, robot: Robot, /) -> Any:
         """Return the limit for a robot, a `brachis.limits.Limit`."""
-        ...
 
 
 def custom_limits(task: Task) -> tuple[LimitModel, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -44,7 +44,7 @@ class Friction(Summary):
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""
-        freeze(self, *(each.name for each in fields(self)))
+        freeze(self, *vars(self))
 
     @classmethod
     def of(

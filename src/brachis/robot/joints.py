@@ -24,7 +24,7 @@ def complement(n: int, joints: Iterable[int]) -> list[int]:
 
 def principal(angles: np.ndarray) -> np.ndarray:
     """Return angles in [-pi, pi)."""
-    return np.asarray(np.remainder(angles + np.pi, TURN) - np.pi)
+    return np.remainder(angles + np.pi, TURN) - np.pi
 
 
 def difference(

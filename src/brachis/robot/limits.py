@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, make_dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -199,12 +199,11 @@ def resolve_limits(
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
     """Leave out limits of joints that do not move: they are kept."""
     changed: dict[str, Any] = {}
-    for each in fields(spec):
-        value = getattr(spec, each.name)
+    for kind, value in vars(spec).items():
         if isinstance(value, Mapping):
-            value = {name: limit for name, limit in value.items() if name not in joints}
-        changed[each.name] = value
-    return LimitSpec(**changed)
+            kept = {name: limit for name, limit in value.items() if name not in joints}
+            changed[kind] = kept
+    return replace(spec, **changed)
 
 
 def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:

@@ -459,7 +459,7 @@ class Robot(Summary):
         base = self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
         floor = self.model.frames[base].placement.translation
         up = pin.rpy.rpyToMatrix(*np.radians(self.settings.mounting.rpy_deg))[:, 2]
-        return np.asarray((self.tool_placements(q)[0] - floor) @ up)
+        return (self.tool_placements(q)[0] - floor) @ up
 
 
 def _without_defaults(

@@ -166,7 +166,7 @@ def placement_matrix(placement: Placement) -> np.ndarray:
 def _axis(joint: Element) -> np.ndarray:
     """Return the unit vector of a joint's axis, (3,)."""
     axis = np.array(numbers_of(joint, "axis", "xyz", "1 0 0"))
-    return np.asarray(axis / np.linalg.norm(axis))
+    return axis / np.linalg.norm(axis)
 
 
 def inertia_matrix(inertial: Element) -> np.ndarray:
@@ -204,7 +204,7 @@ def check_inertia(
 
 def _spread(lever: np.ndarray) -> np.ndarray:
     """Second moment of a point of 1 kg at `lever`, (3,) m, about the origin, kg m^2."""
-    return np.asarray(np.dot(lever, lever) * np.eye(3) - np.outer(lever, lever))
+    return np.dot(lever, lever) * np.eye(3) - np.outer(lever, lever)
 
 
 def origin_of(owner: Element, path: str) -> np.ndarray:

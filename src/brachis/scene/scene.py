@@ -46,6 +46,10 @@ class ClosePairs:
     points: np.ndarray
     normal: np.ndarray
 
+    def only(self, chosen: np.ndarray) -> ClosePairs:
+        """Return some of them, by number or mask."""
+        return ClosePairs(*(value[chosen] for value in vars(self).values()))
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -140,14 +144,14 @@ class Scene:
         posture, pair = np.nonzero(self.bounds(placed) < within)
         kept = self._gaps(placed, posture, pair) < within
         found = self.measure(placed, posture[kept], pair[kept])
-        kept = found.distance < within
-        return ClosePairs(
-            found.posture[kept],
-            found.pair[kept],
-            found.distance[kept],
-            found.points[kept],
-            found.normal[kept],
-        )
+        return found.only(found.distance < within)
+
+    def find_closest(self, placed: Placed) -> ClosePairs:
+        """Find the pair in each posture that is closest."""
+        found = self.find_close(placed, np.inf)
+        order = np.lexsort((found.distance, found.posture))
+        first = np.unique(found.posture[order], return_index=True)[1]
+        return found.only(order[first])
 
     def _gaps(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray

@@ -119,7 +119,11 @@ def plan_timing(
     assert candidate.start is not None
     spline = candidate.start.problem.task.spline
     laid = retiming.lay_splines(
-        program, timings, spline.tolerance, spline.points_per_interval
+        program,
+        timings,
+        spline.tolerance,
+        spline.points_per_interval,
+        options.deadline,
     )
     if laid is None:
         return None

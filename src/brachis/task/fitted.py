@@ -22,7 +22,7 @@ from brachis.task.point_data import (
 from brachis.task.points.checks import refuse_repetitions
 from brachis.task.points.curves import cut_at_corners, fit_curves
 from brachis.task.points.gcode import SUFFIXES, read_gcode
-from brachis.task.points.points import Points, points_from
+from brachis.task.points.points import Points, Rows, points_from
 from brachis.task.points.tables import read_points, read_table
 from brachis.task.segments import (
     BSplineCurve,
@@ -197,7 +197,7 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
 
 
 def _read(
-    segment: CsvSegment, rows: tuple[str, ...] | str, where: str, folder: Path
+    segment: CsvSegment, rows: Rows, where: str, folder: Path
 ) -> list[SplineSegment | BSplineSegment]:
     """Return the segments along the points of a file; `rows` are the task space's."""
     path = folder / segment.csv.file

@@ -24,6 +24,7 @@ from brachis.task.settings import (
     SearchSettings,
     SolverSettings,
     SplineSettings,
+    expand_solver_name,
 )
 from brachis.task.tolerances import Margins, Tolerances
 
@@ -210,8 +211,8 @@ def _as_keyword(parts: Sequence[str]) -> str:
 
 def _in_full(key: str, value: object) -> object:
     """Write a posture, or a solver's name, as a task file does."""
-    if key == "solver" and isinstance(value, str):
-        return {"name": value}
+    if key == "solver":
+        return expand_solver_name(value)
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
     if isinstance(value, Mapping) and set(value) == {"joints"}:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -236,12 +235,8 @@ def _by_joint(
 
 def _differences(limits: LimitSpec) -> dict[str, Any]:
     """Return what differs from the defaults."""
-    usual = LimitSpec()
-    names = [each.name for each in fields(limits)]
-    values = {name: getattr(limits, name) for name in names}
-    return {
-        name: value for name, value in values.items() if value != getattr(usual, name)
-    }
+    usual = vars(LimitSpec())
+    return {kind: value for kind, value in vars(limits).items() if value != usual[kind]}
 
 
 def _check_joints(

@@ -13,6 +13,8 @@ from brachis.errors import TaskError, nearest
 from brachis.task.fields import REFUSED, WRONG_FORM, WRONG_KEYS, Model, plain
 
 _M = TypeVar("_M", bound=Model)
+_Location = tuple[str | int, ...]
+"""Keys and indices on the way to a value, and tags of unions, as pydantic gives them."""
 
 
 def validate(model: type[_M], content: object, source: str) -> _M:
@@ -93,7 +95,7 @@ def _is_tag(part: str | int) -> bool:
     return isinstance(part, str) and part.startswith("<") and part.endswith(">")
 
 
-def _write_location(location: tuple[str | int, ...], key: str) -> str:
+def _write_location(location: _Location, key: str) -> str:
     """Return a location, and a key below it, as ``path[0].line.to``, without the tags of unions."""
     text = "".join(
         f"[{part}]" if isinstance(part, int) else f".{part}"
@@ -121,7 +123,7 @@ def _fields_of(model: type) -> Mapping[str, object]:
     return get_type_hints(model)
 
 
-def _models_at(location: tuple[str | int, ...], model: type[Model]) -> list[type]:
+def _models_at(location: _Location, model: type[Model]) -> list[type]:
     """Return the models that may stand at a location."""
     models: list[type] = [model]
     for part in location:
@@ -135,7 +137,7 @@ def _models_at(location: tuple[str | int, ...], model: type[Model]) -> list[type
     return models
 
 
-def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
+def _keys_at(location: _Location, model: type[Model]) -> list[str]:
     """Return the keys that are allowed at a location."""
     return [name for one in _models_at(location, model) for name in _fields_of(one)]
 
@@ -156,7 +158,7 @@ def key_paths(name: str, model: type[Model]) -> list[str]:
     return []
 
 
-def _description_at(location: tuple[str | int, ...], model: type[Model]) -> str | None:
+def _description_at(location: _Location, model: type[Model]) -> str | None:
     """Return what is said of the key at a location."""
     names = [part for part in location if isinstance(part, str) and not _is_tag(part)]
     if not names:

@@ -37,8 +37,8 @@ from brachis.task.points.units import choices
 from brachis.task.scene import (
     CollisionSettings,
     SceneBody,
-    bodies_by_name,
-    check_names,
+    list_bodies,
+    name_bodies,
 )
 from brachis.task.segments import (
     CsvSegment,
@@ -63,15 +63,8 @@ from brachis.task.tolerances import (
 )
 
 Row = Literal["x", "y", "z", "yaw"]
-_Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
-
-
-def _expand_position(space: _Space) -> _Space:
-    """Spell ``position`` out, so that equal task spaces compare equal."""
-    return POSITION_ROWS if space == "position" else space
-
 
 _EACH_ONCE = must(
     lambda names: len(set(names)) == len(names),
@@ -87,7 +80,8 @@ TaskSpace = Annotated[
     Literal["position", "pose", "pose_free_roll", "joints"]
     | Annotated[NonEmpty[Row], _EACH_ONCE, _YAW_LAST],
     ByForm(_SPACE_FORMS),
-    AfterValidator(_expand_position),
+    # ``position`` is spelled out, so that equal task spaces compare equal.
+    AfterValidator(lambda space: POSITION_ROWS if space == "position" else space),
 ]
 
 
@@ -196,8 +190,8 @@ class Task(Model):
     """Limits on the motion of the tool."""
     scene: Annotated[
         tuple[SceneBody, ...],
-        BeforeValidator(bodies_by_name),
-        AfterValidator(check_names),
+        BeforeValidator(list_bodies),
+        AfterValidator(name_bodies),
     ] = Field(default=(), json_schema_extra=or_form(_SCENE_FILE))
     """Bodies around the robot and on it, which it keeps clear of; or {file: cell.yaml} (see docs/my_cell.md)."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
@@ -363,18 +357,19 @@ class Task(Model):
         frame = f"frames: {{{name}: {{xyz: [...], rpy_deg: [...]}}}} in the task"
         joints = self.task_space == "joints"
         no_choice = "a path of joints leaves no choice of postures"
-        if self.path[-1].blend is not None:
+        last = self.path[-1]
+        last_key = f"path[{len(self.path) - 1}]"
+        if last.blend is not None:
             raise refuse(
                 "the last segment has no corner to blend",
-                key=f"path[{len(self.path) - 1}].blend",
-                found=self.path[-1].blend,
+                key=f"{last_key}.blend",
+                found=last.blend,
                 allowed="no blend on the last segment",
             )
-        last = self.path[-1]
         if last.stop:
             raise refuse(
                 "the last segment cannot stop: the path ends there, and the motion with it",
-                key=f"path[{len(self.path) - 1}].{'dwell' if last.dwell else 'stop'}",
+                key=f"{last_key}.{'dwell' if last.dwell else 'stop'}",
                 found=last.dwell or True,
                 allowed="no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
             )

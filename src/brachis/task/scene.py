@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -138,36 +137,19 @@ class CollisionSettings(Model):
     """auto: a robot without collision geometry gets capsules along its links."""
 
 
-def bodies_by_name(scene: Any) -> Any:
-    """Name bodies without a name by their shape and their number.
-
-    Parameters
-    ----------
-    scene : sequence or object
-        What a task has under ``scene``; what is no sequence of mappings stays.
-    """
-    if isinstance(scene, SceneBody):
-        scene = (scene,)
-    if not isinstance(scene, list | tuple):
-        return scene
-    return [_with_name(number, body) for number, body in enumerate(scene)]
+def list_bodies(scene: object) -> object:
+    """Take one body for a list of it."""
+    return (scene,) if isinstance(scene, SceneBody) else scene
 
 
-def check_names(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
-    """Refuse two bodies of one name."""
-    names = [body.name for body in scene]
+def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
+    """Name bodies without a name by their shape and their number, and refuse two bodies of one name."""
+    named = tuple(
+        body.model_copy(update={"name": body.name or f"{body.shape} {number}"})
+        for number, body in enumerate(scene)
+    )
+    names = [body.name for body in named]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise refuse("two bodies have this name", found=twice[0], allowed="each once")
-    return scene
-
-
-def _with_name(number: int, body: Any) -> Any:
-    if isinstance(body, SceneBody):
-        if body.name is not None:
-            return body
-        return body.model_copy(update={"name": f"{body.shape} {number}"})
-    if not isinstance(body, Mapping) or body.get("name") is not None:
-        return body
-    shape = next((key for key in SHAPES if body.get(key) is not None), "body")
-    return {**body, "name": f"{shape} {number}"}
+    return named

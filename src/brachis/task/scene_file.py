@@ -5,16 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from pydantic import BeforeValidator
+from typing import Any, Literal
 
 from brachis.common.files import read_text
 from brachis.errors import TaskError
 from brachis.task.fields import Model
 from brachis.task.messages import show, validate
 from brachis.task.models import Task
-from brachis.task.scene import SceneBody, bodies_by_name
+from brachis.task.scene import SceneBody
 from brachis.task.yaml_reader import read_yaml
 
 
@@ -23,7 +21,7 @@ class SceneFile(Model):
 
     brachis_scene: Literal[1]
     """Version of the format."""
-    bodies: Annotated[tuple[SceneBody, ...], BeforeValidator(bodies_by_name)]
+    bodies: tuple[SceneBody, ...]
     """Bodies as in scene; files are relative to this file."""
 
 

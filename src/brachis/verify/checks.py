@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.robot import Robot, TaskMap
-from brachis.robot.joints import UNITS
+from brachis.robot import TaskMap
 from brachis.trajectory import CONTINUOUS_TORQUE, PhaseSpline
 from brachis.verify.motion import Given, MotionStates
-from brachis.verify.phases import times_of_stops
+from brachis.verify.phases import check_joints, derivatives_at_rest, times_of_stops
 from brachis.verify.report import Check
 
 
@@ -61,17 +60,11 @@ def _path_speeds(
 def check_ends(given: Given) -> list[Check]:
     """Check that the motion begins and ends as the task says."""
     trajectory = given.trajectory
-    options = given.options
     task = given.task
     boundary = task.boundary
     ends = (
         ("start", 0.0, task.start, boundary.start_speed),
         ("end", trajectory.t_end, task.end, boundary.end_speed),
-    )
-    derivatives = (
-        ("velocity", "velocity", options.rest_velocity_tolerance),
-        ("acceleration", "acceleration", options.rest_acceleration_tolerance),
-        ("jerk", "relative", options.rest_jerk_tolerance),
     )
     checks = []
     for name, time, posture, speed in ends:
@@ -80,25 +73,21 @@ def check_ends(given: Given) -> list[Check]:
             target = given.path.sample(np.array([time / trajectory.t_end])).target
             nearest = _move_onto(wanted, given.task_map, target)
             miss = trajectory.position(time) - nearest
-            allowed = options.posture_tolerance
-            checks.append(
-                _check_joints(
-                    f"{name} posture", miss, allowed, "position", given.robot, time
-                )
-            )
+            allowed = given.options.posture_tolerance
+            found = (miss[None], np.array([time]), "position", allowed)
+            checks.append(check_joints(given, f"{name} posture", *found))
         if boundary.periodic:
             continue
         if speed:
             checks += _check_speed(given, name, speed, time)
             continue
-        for what, unit, allowed in derivatives[: max(task.spline.vanishing, 1)]:
+        for what, unit, allowed in derivatives_at_rest(given):
             derivative = getattr(trajectory, what)
             miss = derivative(time)
             if unit == "relative":
                 miss = miss / (1.0 + np.abs(derivative(trajectory.times)).max())
-            checks.append(
-                _check_joints(f"{name} {what}", miss, allowed, unit, given.robot, time)
-            )
+            found = (miss[None], np.array([time]), unit, allowed)
+            checks.append(check_joints(given, f"{name} {what}", *found))
     return checks
 
 
@@ -135,30 +124,21 @@ def _move_onto(given: np.ndarray, task_map: TaskMap, target: np.ndarray) -> np.n
     if np.abs(miss).max(initial=0.0) > tolerances.WRITTEN:
         return given
     jacobian = task_map.jacobian(task_map.twists(given[None]))[0]
-    return np.asarray(given + np.linalg.lstsq(jacobian, miss, rcond=None)[0])
+    return given + np.linalg.lstsq(jacobian, miss, rcond=None)[0]
 
 
 def check_splines(given: Given) -> list[Check]:
     """Check that the splines of the redundant joints are their motion."""
     trajectory = given.trajectory
-    robot = given.robot
     states = given.states
+    names = given.robot.joint_names
     if not trajectory.redundant_joints:
         return []
-    joints = [robot.joint_names.index(name) for name in trajectory.redundant_joints]
+    joints = [names.index(name) for name in trajectory.redundant_joints]
     misses = np.zeros_like(states.q)
     misses[:, joints] = trajectory.redundant_spline(states.t) - states.q[:, joints]
-    worst = int(np.argmax(np.abs(misses).max(axis=1)))
-    return [
-        _check_joints(
-            "redundant joints' splines",
-            misses[worst],
-            given.options.spline_tolerance,
-            "position",
-            robot,
-            float(states.t[worst]),
-        )
-    ]
+    found = (misses, states.t, "position", given.options.spline_tolerance)
+    return [check_joints(given, "redundant joints' splines", *found)]
 
 
 def check_continuity(given: Given) -> list[Check]:
@@ -193,13 +173,3 @@ def check_continuity(given: Given) -> list[Check]:
             allowed = given.options.jump_tolerance
             checks.append(Check(f"{name}{what}", value, allowed, "relative", time=time))
     return checks
-
-
-def _check_joints(
-    name: str, misses: np.ndarray, allowed: float, kind: str, robot: Robot, time: float
-) -> Check:
-    """Check the joint that misses most; `kind` is a key of `UNITS`, or the unit of all joints."""
-    joint = int(np.argmax(np.abs(misses)))
-    unit = UNITS[kind][robot.position_units[joint]] if kind in UNITS else kind
-    value = float(abs(misses[joint]))
-    return Check(name, value, allowed, unit, robot.joint_names[joint], time)

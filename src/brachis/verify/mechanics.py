@@ -230,6 +230,4 @@ def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.nda
     along = axis[:, None]
     cosine = np.cos(angles)
     parallel = along * (axis @ vectors) * (1.0 - cosine)
-    return np.asarray(
-        vectors * cosine + cross(along, vectors) * np.sin(angles) + parallel
-    )
+    return vectors * cosine + cross(along, vectors) * np.sin(angles) + parallel

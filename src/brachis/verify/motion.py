@@ -13,7 +13,7 @@ does.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,7 +35,7 @@ def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
     u = u.reshape(-1, *[1] * (values.ndim - 2))
     while len(values) > 1:
         values = (1.0 - u) * values[:-1] + u * values[1:]
-    return np.asarray(values[0])
+    return values[0]
 
 
 def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -138,11 +138,11 @@ class Pieces:
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the times of places, s."""
-        return np.asarray(self.times[piece] + u * self.lengths[piece])
+        return self.times[piece] + u * self.lengths[piece]
 
     def positions(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Joint positions at places, (K, n)."""
-        return np.asarray(self.nodes[piece] + values_of(self.position[:, piece], u))
+        return self.nodes[piece] + values_of(self.position[:, piece], u)
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
@@ -211,9 +211,7 @@ class MotionStates:
 
     def only(self, chosen: np.ndarray | slice) -> MotionStates:
         """Return some of the states, in the order that is chosen."""
-        return MotionStates(
-            *(getattr(self, field.name)[chosen] for field in fields(self))
-        )
+        return MotionStates(*(values[chosen] for values in vars(self).values()))
 
     def merge(self, other: MotionStates) -> tuple[MotionStates, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""

@@ -42,20 +42,11 @@ def check_stops(given: Given) -> list[Check]:
     sides = (np.append(before, piece), np.append(np.ones(len(before)), u))
     states = MotionStates.at(pieces, *sides)
     jerks = np.abs(pieces.jerk).max(initial=0.0)
-    derivatives = (
-        ("velocity", states.qdot, "velocity", options.rest_velocity_tolerance),
-        (
-            "acceleration",
-            states.qddot,
-            "acceleration",
-            options.rest_acceleration_tolerance,
-        ),
-        ("jerk", states.qdddot / (1.0 + jerks), None, options.rest_jerk_tolerance),
-    )
-    count = max(given.task.spline.vanishing, 1)
-    for name, values, kind, allowed in derivatives[:count]:
+    derivatives = (states.qdot, states.qddot, states.qdddot / (1.0 + jerks))
+    resting = zip(derivatives_at_rest(given), derivatives, strict=False)
+    for (name, kind, allowed), values in resting:
         found = (values, states.t, kind, allowed)
-        checks.append(_check_joints(given, f"{name} at stops", *found))
+        checks.append(check_joints(given, f"{name} at stops", *found))
     moved = [
         given.during(phase.begin, phase.end).states
         for leg in stops
@@ -65,8 +56,19 @@ def check_stops(given: Given) -> list[Check]:
         speeds = np.concatenate([each.qdot for each in moved])
         times = np.concatenate([each.t for each in moved])
         found = (speeds, times, "velocity", options.rest_velocity_tolerance)
-        checks.append(_check_joints(given, "velocity in dwells", *found))
+        checks.append(check_joints(given, "velocity in dwells", *found))
     return checks
+
+
+def derivatives_at_rest(given: Given) -> list[tuple[str, str, float]]:
+    """List the derivatives that vanish at ends and stops: their name, kind (see `check_joints`) and largest value."""
+    options = given.options
+    derivatives = [
+        ("velocity", "velocity", options.rest_velocity_tolerance),
+        ("acceleration", "acceleration", options.rest_acceleration_tolerance),
+        ("jerk", "relative", options.rest_jerk_tolerance),
+    ]
+    return derivatives[: max(given.task.spline.vanishing, 1)]
 
 
 def times_of_stops(given: Given) -> np.ndarray:
@@ -140,21 +142,24 @@ def _check_worst(
     return Check(name, misses[worst], allowed, unit, subjects[worst])
 
 
-def _check_joints(
+def check_joints(
     given: Given,
     name: str,
     values: np.ndarray,
     times: np.ndarray,
-    kind: str | None,
+    kind: str,
     allowed: float,
 ) -> Check:
-    """Check the joint and the time at which values, (K, n), are largest; `kind` is a key of `UNITS`."""
+    """Check the joint and the time at which values, (K, n), are largest.
+
+    `kind` is a key of `UNITS`, or the unit of all joints.
+    """
     if not len(times):
         return Check(name, np.inf, allowed, "relative")
     size = np.abs(values)
     k, joint = np.unravel_index(int(np.argmax(size)), size.shape)
     robot = given.robot
-    unit = UNITS[kind][robot.position_units[joint]] if kind else "relative"
+    unit = UNITS[kind][robot.position_units[joint]] if kind in UNITS else kind
     subject = robot.joint_names[joint]
     value = float(size[k, joint])
     return Check(name, value, allowed, unit, subject, float(times[k]))

@@ -35,7 +35,10 @@ from brachis.task import Tolerances
 
 @dataclass(frozen=True, eq=False, repr=False)
 class JointSpace(TaskMap):
-    """All n joint positions; the Jacobian is the identity."""
+    """All n joint positions; the Jacobian is the identity.
+
+    Whole turns count in differences, since the path says in which turn a joint is.
+    """
 
     frame = pin.ReferenceFrame.LOCAL
 
@@ -53,10 +56,6 @@ class JointSpace(TaskMap):
     def values(self, q: np.ndarray) -> np.ndarray:
         """Return the joint positions themselves."""
         return q
-
-    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the displacement joint by joint; whole turns count, since the path says in which turn a joint is."""
-        return np.asarray(first - second, dtype=float)
 
     def jacobian(self, twists: np.ndarray) -> np.ndarray:
         """Return identity matrices, (K, n, n)."""
@@ -211,6 +210,7 @@ def with_tool_joints(robot: Robot, joints: Sequence[ToolJoint]) -> Robot:
     model.addFrame(pin.Frame(name, last, robot.frame_id, place, pin.FrameType.OP_FRAME))
     count = len(joints)
     friction = robot.friction
+    nothing = np.zeros(count)
     return replace(
         robot,
         tool_joints=tuple(joints),
@@ -220,9 +220,9 @@ def with_tool_joints(robot: Robot, joints: Sequence[ToolJoint]) -> Robot:
         limits=robot.limits.with_tool_joints(joints),
         urdf_limits=(*robot.urdf_limits, *(UrdfLimit(None, None, None, None),) * count),
         friction=Friction(
-            armature=np.append(friction.armature, np.zeros(count)),
-            viscous=np.append(friction.viscous, np.zeros(count)),
-            coulomb=np.append(friction.coulomb, np.zeros(count)),
+            armature=np.append(friction.armature, nothing),
+            viscous=np.append(friction.viscous, nothing),
+            coulomb=np.append(friction.coulomb, nothing),
             v_eps=np.append(friction.v_eps, np.ones(count)),
         ),
     )

@@ -139,9 +139,9 @@ class TaskMap(Summary, ABC):
         """Task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3); a space of joints has none."""
         raise NotImplementedError
 
-    @abstractmethod
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Displacement (..., m) that leads from the `second` task coordinates (..., c) to the `first`."""
+        """Displacement (..., m) that leads from the `second` task coordinates (..., c) to the `first`; row by row."""
+        return np.asarray(first - second, dtype=float)
 
     def norms(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Sizes (...) of displacements (..., m): of their position part, m, and of their angle part, rad."""

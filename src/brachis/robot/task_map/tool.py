@@ -138,10 +138,6 @@ class WorldRows(TaskMap):
         """Return the rows of the positions, (K, m)."""
         return positions[:, list(self.axes)]
 
-    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the displacement row by row."""
-        return np.asarray(first - second, dtype=float)
-
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """Return the rows of the linear velocity."""
         return twists[list(self.axes)]

@@ -15,6 +15,7 @@ from brachis.task.point_data import FitTolerance
 from brachis.task.points.points import (
     Array,
     Points,
+    PointsAndNotes,
     angles_between,
     shares_along,
     sum_up,
@@ -138,10 +139,10 @@ def _residuals(values: Array, chords: Array) -> Array:
         for weight, k in zip(weights, neighbours, strict=True)
     )
     scale = np.sqrt(1.0 + np.sum(weights**2, axis=0))
-    return np.asarray((values[inner] - foreseen) / scale[:, None])
+    return (values[inner] - foreseen) / scale[:, None]
 
 
-def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
+def without_repetitions(points: Points) -> PointsAndNotes:
     """Leave out points that repeat their predecessors, and say which.
 
     Raises

@@ -14,7 +14,7 @@ from brachis.common.arrays import interpolate_columns, spread, with_like_signs
 from brachis.errors import write_count
 from brachis.task.points.checks import Scatter
 from brachis.task.points.fit import lengths_along
-from brachis.task.points.points import Array, Indices, Points
+from brachis.task.points.points import Array, Indices, Points, PointsAndNotes
 
 LEAST_ANGLE = np.deg2rad(12.0)
 """Smaller changes of direction are left to the fit."""
@@ -182,7 +182,7 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
     return bool(np.linalg.norm(foreseen - position[i]) <= allowed)
 
 
-def fill_gaps(points: Points) -> tuple[Points, tuple[str, ...]]:
+def fill_gaps(points: Points) -> PointsAndNotes:
     """Put points on the straight ways that are five times longer than usual, and say how many ways there are."""
     chords = points.steps
     usual = float(np.median(chords))

@@ -173,7 +173,7 @@ def lengths_along(position: Array, deviation: float) -> Array:
     index = np.concatenate([[-0.5], centres, [count - 0.5]])
     at_index = sum_up(chords)
     lengths = np.interp(np.arange(count), index, at_index)
-    return np.asarray(lengths - lengths[0])
+    return lengths - lengths[0]
 
 
 def _block(position: Array, deviation: float) -> int:
@@ -283,8 +283,7 @@ def _near_bad(breaks: Array, bad: np.ndarray, removed: Array) -> np.ndarray:
     wide = bad.copy()
     wide[1:] |= bad[:-1]
     wide[:-1] |= bad[1:]
-    near: np.ndarray = wide[np.searchsorted(breaks, removed) - 1]
-    return near
+    return wide[np.searchsorted(breaks, removed) - 1]
 
 
 def _use_fewest_knots(points: Points, fit: Fit, tolerance: FitTolerance) -> Fit:

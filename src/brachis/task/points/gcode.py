@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from brachis.errors import TaskError, write_count
-from brachis.task.points.points import Array, Points
+from brachis.task.points.points import Array, Points, PointsAndNotes, Rows
 from brachis.task.points.tables import POSITION
 
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
@@ -59,9 +59,7 @@ class _Machine:
         return TaskError(problem, found=found, allowed=allowed, where=where)
 
 
-def read_gcode(
-    text: str, rows: tuple[str, ...] | str, source: str
-) -> tuple[Points, tuple[str, ...]]:
+def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
     """Return the points of a program, and notes on what was skipped.
 
     Parameters

@@ -16,6 +16,8 @@ from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS, quaternions_of
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
+Rows = tuple[str, ...] | str
+"""Rows of the task space, or the word for one of poses."""
 QUATERNION = 4
 
 
@@ -108,10 +110,13 @@ class Points:
         )
 
 
+PointsAndNotes = tuple[Points, tuple[str, ...]]
+"""Points, and notes on what was found out about them."""
+
+
 def steps_of(position: Array) -> Array:
     """Return the distances, (n - 1,), of successive positions, (n, p)."""
-    steps: Array = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    return steps
+    return np.linalg.norm(np.diff(position, axis=0), axis=1)
 
 
 def sum_up(steps: npt.ArrayLike) -> Array:
@@ -128,12 +133,12 @@ def shares_along(points: Array, begin: Array, side: Array) -> Array:
 def angles_between(one: Array, other: Array) -> Array:
     """Return the angles, (n,), rad, between what `Points.turning` holds, (n, q) both; zero where it holds nothing."""
     if one.shape[1] != QUATERNION:
-        return np.asarray(np.abs(one - other).sum(axis=1))
+        return np.abs(one - other).sum(axis=1)
     unit = one / np.linalg.norm(one, axis=1)[:, None]
     apart = np.minimum(
         np.linalg.norm(unit - other, axis=1), np.linalg.norm(unit + other, axis=1)
     )
-    return np.asarray(4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0)))
+    return 4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0))
 
 
 def points_from(

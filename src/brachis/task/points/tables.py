@@ -19,7 +19,7 @@ from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
 from brachis.task.fields import LARGEST
 from brachis.task.point_data import FileUnits, PointFile
-from brachis.task.points.points import Array, Indices, Points
+from brachis.task.points.points import Array, Indices, Points, PointsAndNotes, Rows
 from brachis.task.points.units import (
     CONVENTIONS,
     UNITS,
@@ -186,12 +186,12 @@ _HEADING = re.compile(
 )
 
 
-def _allowed_columns(rows: tuple[str, ...] | str) -> str:
+def _allowed_columns(rows: Rows) -> str:
     """Return the columns that a file may have, for messages."""
     return " | ".join(",".join(choice) for choice in _choices(rows))
 
 
-def _choices(rows: tuple[str, ...] | str) -> tuple[tuple[str, ...], ...]:
+def _choices(rows: Rows) -> tuple[tuple[str, ...], ...]:
     if isinstance(rows, tuple):
         return (rows,)
     return (POSITION, *(POSITION + columns for columns in _ORIENTATIONS))
@@ -222,8 +222,8 @@ class _Columns:
 def _read_columns(
     header: tuple[str, ...],
     where: str,
-    rows: tuple[str, ...] | str,
-    stated: str | None = None,
+    rows: Rows,
+    stated: str | None,
 ) -> _Columns:
     """Return what the columns of a table are.
 
@@ -337,8 +337,8 @@ def _unit_of(name: str, kind: str, columns: _Columns, units: FileUnits) -> str:
 
 
 def read_points(
-    text: str, rows: tuple[str, ...] | str, settings: PointFile, source: str
-) -> tuple[Points, tuple[str, ...]]:
+    text: str, rows: Rows, settings: PointFile, source: str
+) -> PointsAndNotes:
     """Return the points of a table in SI units, and notes on how it was read.
 
     Parameters
