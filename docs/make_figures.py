@@ -27,6 +27,7 @@ from brachis.apps.plots import (
     plot_comparison,
     plot_fit,
     plot_limits,
+    plot_motion,
     plot_overview,
     plot_postures,
     plot_timeline,
@@ -194,6 +195,13 @@ def tilted_torch() -> Planned:
     return {"tilt up to 15 degrees": result, "no tilt": fixed}
 
 
+def into_the_car_body() -> Planned:
+    """Draw a motion through a window, with the smallest distance over time."""
+    result = planned("16_into_the_car_body")
+    save(plot_motion(result.trajectory), "into_the_car_body")
+    return {"through the window": result}
+
+
 def crane() -> Planned:
     """Draw the motion with a plug-in's closed form."""
     family = load("examples/ik_plugin/src/brachis_polar/__init__.py").polar
@@ -229,6 +237,7 @@ EXAMPLES: dict[str, Callable[[], Planned]] = {
     "13": weld_seams,
     "14": round_the_post,
     "15": tilted_torch,
+    "16": into_the_car_body,
     "ik_plugin": crane,
     "limit_plugin": coupled,
 }

@@ -26,6 +26,7 @@ PICTURES = {
     "13": "weld_seams.png",
     "14": "round_the_post.png",
     "15": "tilted_torch.png",
+    "16": "into_the_car_body.png",
     "ik_plugin": "crane.png",
     "limit_plugin": "coupled.png",
 }

@@ -316,11 +316,13 @@ def test_example_13():
     assert phases[3].duration == pytest.approx(0.5, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["14_round_the_post", "15_tilted_torch"])
+@pytest.mark.parametrize(
+    "name", ["14_round_the_post", "15_tilted_torch", "16_into_the_car_body"]
+)
 def test_examples_of_cells(name):
     """They keep their clearance and their cone, and say so."""
     task = brachis.load_task(ROOT / f"examples/{name}.yaml")
-    result = brachis.plan(task, effort="single", least_motion=False)
+    result = brachis.plan(task, effort="single", intervals=10, least_motion=False)
     assert result.verified
     kinds = {check.name for check in result.verification.checks}
     assert kinds >= ({"clearance ratio"} if task.scene else {"tool tilt ratio"})

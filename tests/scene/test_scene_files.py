@@ -62,7 +62,8 @@ CELL = """<robot name="cell">
 <link name="table"><collision><origin xyz="0 0 -0.05"/><geometry><box size="1 0.6 0.1"/></geometry></collision></link>
 <link name="post"><collision><geometry><cylinder radius="0.05" length="1.2"/></geometry></collision></link>
 <joint name="a" type="fixed"><parent link="world"/><child link="table"/><origin xyz="0.5 0 0.4"/></joint>
-<joint name="b" type="fixed"><parent link="table"/><child link="post"/><origin xyz="0 0.25 0.6" rpy="0 1.5707963 0"/></joint>
+<joint name="b" type="fixed"><parent link="table"/><child link="post"/><origin xyz="0 0.25 0.6" rpy="0 1.57079633 0"/>
+</joint>
 </robot>
 """
 

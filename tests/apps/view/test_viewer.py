@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.apps.plots.panels import panels_of
 from brachis.apps.plots.style import COLOURS
 from brachis.apps.view import Viewer
 from brachis.apps.view.bodies import placements, prescribed_path
@@ -67,7 +68,8 @@ def test_path_and_trace_are_one_curve_and_every_layer_can_be_hidden(shown):
     samples = shown._scene.samples
     path = prescribed_path(shown._trajectory, samples)
     np.testing.assert_allclose(path, samples.tool_position, atol=1e-8)
-    for name in LAYERS:
+    assert [*shown._scene.layers, "closest pair"] == list(LAYERS)
+    for name in shown._scene.layers:
         assert shown._scene.layers[name]
         shown._scene.set_visible(name, visible=False)
         assert not any(handle.visible for handle in shown._scene.layers[name])
@@ -205,3 +207,24 @@ def test_the_panel_says_whether_the_motion_is_verified(line_result):
     told = summary(line_result.trajectory, ["not shown: a: no file <x>"], verified=None)
     assert "erified" not in told
     assert "no file &lt;x&gt;" in told
+
+
+def test_a_line_joins_the_closest_bodies_and_a_panel_shows_their_distance():
+    ball = brachis.Sphere(0.05, position=[0.9, 0.4, 0.0], name="ball")
+    task = brachis.load_task(
+        brachis.examples.scara_line,
+        changes={"scene": [ball], "search.effort": "single"},
+    )
+    motion = brachis.plan(task, intervals=8, strict=False).trajectory
+    samples = motion.at(np.linspace(0.0, motion.t_end, 21))
+    (panel,) = panels_of(motion, samples, "clearance")
+    (curve,) = panel.curves
+    assert curve.lower == task.collisions.clearance
+    with Viewer(motion, port=0) as viewer:
+        for k in (0, 10, 20):
+            viewer.playback.time = float(samples.t[k])
+            viewer.show()
+            line, label = viewer._scene.layers["closest pair"]
+            apart = float(np.linalg.norm(line.points[0, 1] - line.points[0, 0]))
+            assert apart == pytest.approx(curve.values[k], abs=1e-6)
+            assert label.text.endswith(f"{1e3 * apart:.1f} mm")

@@ -245,12 +245,8 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     from scipy.optimize import linprog
 
     rows, jacobian = rows_and_jacobian(program, x)
-    below = np.flatnonzero(np.isfinite(program.lower))
-    above = np.flatnonzero(np.isfinite(program.upper))
-    slopes = sparse.vstack([-jacobian[below], jacobian[above]], format="csr")
-    room = np.concatenate(
-        [(rows - program.lower)[below], (program.upper - rows)[above]]
-    )
+    slopes = sparse.vstack([-jacobian, jacobian], format="csr")
+    room = np.concatenate([rows - program.lower, program.upper - rows])
     # Directions that change nothing to first order are not followed without end.
     lowest = np.clip(program.x_lower - x, -1.0, 0.0)
     highest = np.clip(program.x_upper - x, 0.0, 1.0)
@@ -286,7 +282,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     PlanningError
         No backend found a feasible point, and x is not feasible either.
     """
-    answers: list[np.ndarray] = []
+    answers = []
     curved = any(limit.guarantee.is_mean for limit in program.limits)
     for solver in solvers_for("auto", curved=curved):
         try:

@@ -377,8 +377,8 @@ def sensitivities(refined: SolvedProgram) -> Sensitivities:
 
 def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
     """Derive what every limit costs from a problem and the multipliers of its answer."""
-    found: list[Sensitivity] = []
-    boundaries: list[BranchBoundary] = []
+    found = []
+    boundaries = []
     for limit in program.limits:
         rows = program.rows_of(limit)
         for bound in limit.bounds:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextvars import ContextVar
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer import Option
@@ -17,9 +17,6 @@ from brachis.common import interrupts
 from brachis.common.files import is_file, is_folder
 from brachis.common.interrupts import INTERRUPTED
 from brachis.errors import BrachisError, ResultFileError, TaskError, UnknownNameError
-
-if TYPE_CHECKING:
-    from brachis.task import Task
 
 EXIT_CODES = (
     "0    done; of a plan: planned and verified",
@@ -258,7 +255,7 @@ def task_space_of(text: str | None) -> str | list[str] | None:
 
 def load_changed_task(
     path: Path, changes: Sequence[str] | None, *, strict: bool | None = None
-) -> Task:
+) -> brachis.Task:
     """Load a task file with keys set as in ``spline.intervals=40``, and with ``strict`` if it is given.
 
     If a key is set twice, the last value counts.

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import brachis
 from brachis.apps.cli.output import json_text, print_error, print_json, print_lines
@@ -26,9 +26,6 @@ from brachis.common.files import (
     writing_errors,
 )
 from brachis.errors import InputError
-
-if TYPE_CHECKING:
-    from brachis.result import Result
 
 Writer = Callable[[Path], object]
 """Writes one file to a path."""
@@ -259,7 +256,7 @@ def finish(
     names: Sequence[str],
     verified: bool,
     show: Callable[[], None] | None,
-    result: Result | None,
+    result: brachis.Result | None,
     complaint: str = "it is marked unverified",
 ) -> int:
     """Write a motion's files, print the answer and what was not completed, and return the exit code.

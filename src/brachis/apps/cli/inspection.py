@@ -165,16 +165,16 @@ def _print_robot(
     print_lines(*(f"{name} limit: {text}" for name, text in guarantees))
     pairs = data["collisions"]["pairs"]
     if pairs:
+        more = ", ..." if len(pairs) > _PAIRS else ""
         print_lines(
-            f"{write_count(len(pairs), 'pair')} that may collide (all: --json):"
+            f"{write_count(len(pairs), 'pair')} that may collide (all: --json):",
+            f"  {'; '.join(pairs[:_PAIRS])}{more}",
         )
-        print_lines(
-            "  " + "; ".join(pairs[:_PAIRS]) + (", ..." if len(pairs) > _PAIRS else "")
-        )
-    if task is not None and not task.fits:
-        print_lines("no part of the path comes from points")
-    for fit in task.fits if task is not None else ():
-        _print_fit(fit)
+    if task is not None:
+        if not task.fits:
+            print_lines("no part of the path comes from points")
+        for fit in task.fits:
+            _print_fit(fit)
     redundancy = data["degree_of_redundancy"]
     space = ", ".join(data["task_space"])
     print_lines(f"task space [{space}]: degree of redundancy {redundancy}")

@@ -30,7 +30,6 @@ from brachis.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from brachis.apps.view import Viewer
-    from brachis.trajectory import Trajectory
 
 ResultFile = Annotated[
     Path,
@@ -176,13 +175,13 @@ def report(
     raise typer.Exit(0 if page.verified else 1)
 
 
-def _load(result: Path) -> tuple[Path, Trajectory]:
+def _load(result: Path) -> tuple[Path, brachis.Trajectory]:
     """Load a motion from its file or folder; returns the file too."""
     result = motion_file(result)
     return result, brachis.Trajectory.load(result)
 
 
-def _inputs(result: Path, trajectory: Trajectory) -> list[Path]:
+def _inputs(result: Path, trajectory: brachis.Trajectory) -> list[Path]:
     """Return the files that nothing made of a motion may overwrite: the motion's and its URDF."""
     urdf = trajectory.task.robot.urdf
     return [result, Path(urdf)] if urdf else [result]
@@ -250,7 +249,9 @@ def show(viewer: Viewer, *, browser: bool = True) -> None:
         viewer.wait()
 
 
-def _read_candidates(path: Path, trajectory: Trajectory) -> list[dict[str, Any]]:
+def _read_candidates(
+    path: Path, trajectory: brachis.Trajectory
+) -> list[dict[str, Any]]:
     """Read the candidates of a motion's search from the JSON written with it; an empty list if it is another's."""
     try:
         data = json_library.loads(read_file(path.with_suffix(".json"), 64_000_000))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -39,13 +39,8 @@ from brachis.apps.cli.output import (
     print_verification,
     show_progress,
 )
+from brachis.common.progress import Listener
 from brachis.errors import InputError, write_count
-
-if TYPE_CHECKING:
-    from brachis.apps.sweeps import SweepResult
-    from brachis.common.progress import Listener
-    from brachis.result import Result
-    from brachis.trajectory import Trajectory
 
 _PLANNED = ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png")
 _BOTTLENECK = ("bottleneck.json", "timeline.png")
@@ -108,14 +103,15 @@ def _plan_task(
     changes: Sequence[str] | None,
     strict: bool | None,
     listener: Listener,
-) -> Result:
+) -> brachis.Result:
     changed = load_changed_task(task, changes, strict=strict)
     return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
 
 
-def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
+def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
     from brachis.optimise.candidate import coordinates
+    from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
@@ -149,8 +145,14 @@ def _print_plan(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
     if len(trajectory.phases) > 1:
         print_table("phases", PHASE_COLUMNS, phase_rows(trajectory.phases))
     print_lines(*(f"path from {fit}" for fit in result.fits))
-    if len(result.candidates) > 1:
-        _print_candidates(data["candidates"])
+    tried = len(result.candidates)
+    if tried > 1:
+        listed = candidate_rows(data["candidates"])[:40]
+        count = str(tried)
+        if tried > len(listed):
+            count += f", {tried - len(listed)} of them in the JSON only"
+        columns = (*WORDS, *TIMES, STATUS)
+        print_table(f"candidates ({count})", columns, listed, numbers=TIMES)
     print_verification(result.verification, degrees=degrees)
 
 
@@ -164,18 +166,6 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
         unit, factor = shown_unit(si_unit, degrees=degrees)
         parts.append(f"{name} {factor * value:.4f} {unit}")
     return ", ".join(parts)
-
-
-def _print_candidates(candidates: Sequence[Mapping[str, Any]]) -> None:
-    """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once."""
-    from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
-
-    rows = candidate_rows(candidates)[:40]
-    count = str(len(candidates))
-    if len(candidates) > len(rows):
-        count += f", {len(candidates) - len(rows)} of them in the JSON only"
-    columns = (*WORDS, *TIMES, STATUS)
-    print_table(f"candidates ({count})", columns, rows, numbers=TIMES)
 
 
 def bottleneck(
@@ -245,14 +235,9 @@ def bottleneck(
             result or trajectory, check=check, reference=reference
         )
     data["bottleneck"] = report.to_dict()
-
-    def show_report() -> None:
-        redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
-        print_lines(
-            f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}",
-            report.text(degrees=degrees),
-        )
-
+    redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
+    head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
+    show_report = partial(print_lines, head, report.text(degrees=degrees))
     code = finish(
         data,
         {},
@@ -267,7 +252,7 @@ def bottleneck(
     raise typer.Exit(code)
 
 
-def _verify_again(trajectory: Trajectory) -> dict[str, Any]:
+def _verify_again(trajectory: brachis.Trajectory) -> dict[str, Any]:
     """Verify a saved motion, and return its figures as those of a plan."""
     verification = brachis.verify_trajectory(trajectory)
     return {
@@ -326,7 +311,7 @@ def sweep(
     raise typer.Exit(exit_code(verified, failures))
 
 
-def _print_sweep(result: SweepResult, files: Sequence[str]) -> None:
+def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
     from brachis.apps.sweeps.plans import FAILED, UNVERIFIED, VERIFIED
     from brachis.apps.sweeps.run import write_duration

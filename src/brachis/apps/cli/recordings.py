@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from typer import Argument, Option
@@ -18,9 +18,6 @@ from brachis.apps.cli.output import (
     print_verification,
     show_progress,
 )
-
-if TYPE_CHECKING:
-    from brachis.apps.comparison import Comparison
 
 _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")
 """The recorded motion, the plan, the figures and the drawing."""
@@ -37,7 +34,6 @@ RecordedFile = Annotated[
 RobotFile = Annotated[
     Path,
     Option(
-        "--robot",
         help="URDF file; or a task file (.yaml), whose robot, limits and settings are used.",
     ),
 ]
@@ -52,17 +48,17 @@ RecordedSpace = Annotated[
 
 AngleUnit = Annotated[
     str | None,
-    Option("--angle", help="Unit of angles in columns without a unit: rad, deg."),
+    Option(help="Unit of angles in columns without a unit: rad, deg."),
 ]
 
 LengthUnit = Annotated[
     str | None,
-    Option("--length", help="Unit of lengths in columns without a unit: m, mm."),
+    Option(help="Unit of lengths in columns without a unit: m, mm."),
 ]
 
 TimeUnit = Annotated[
     str | None,
-    Option("--time", help="Unit of times in a column without a unit: s, ms."),
+    Option(help="Unit of times in a column without a unit: s, ms."),
 ]
 
 PathTolerance = Annotated[
@@ -189,7 +185,7 @@ def _units(**units: str | None) -> dict[str, str]:
     return {name: unit for name, unit in units.items() if unit is not None}
 
 
-def _print_comparison(found: Comparison) -> None:
+def _print_comparison(found: brachis.Comparison) -> None:
     """Print the comparison for a person."""
     print_lines(found.verdict)
     kept = "kept at all recorded rows"

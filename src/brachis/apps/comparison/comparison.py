@@ -259,8 +259,8 @@ def compare(
             tolerance=tolerance,
             noise=noise,
         )
-    results: list[Result] = []
-    failures: list[PlanningError] = []
+    results = []
+    failures = []
     for asked in tasks_of(recorded, keep_end=keep_end):
         try:
             result = plan(recorded.robot, asked, listener=listener, check_advice=False)
@@ -330,7 +330,8 @@ def plot_both_motions(comparison: Comparison) -> Figure:
         if name == "recorded" and comparison.proven:
             t = comparison.proven[0].t
             proven = [bounds.ratios.max(axis=1) for bounds in comparison.proven]
-            least = np.interp(ratios.t, t, np.max(proven, axis=0))
+            known = np.max(proven, axis=0)
+            least = np.interp(ratios.t, t, known)
             ratio.fill_between(
                 ratios.t,
                 least,
@@ -340,7 +341,7 @@ def plot_both_motions(comparison: Comparison) -> Figure:
                 linewidth=0.0,
                 label="recorded, between its rows: up to",
             )
-            largest = np.max(proven, axis=0)
+            largest = known
         ratio.plot(t, largest, **look)
     ratio.axhline(1.0, color=style.GREY, linewidth=0.8)
     style.dress(progress, "", "$s$")

@@ -58,10 +58,12 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
         if within:
             by_ros = any(files.is_file(place) for place in files.ros_files(within))
             path = None if by_ros or scheme != "package" else files.mesh_file(name, old)
-        if path is not None and target is not None:
-            element.set("filename", os.path.relpath(path, target.parent.resolve()))
-        elif path is not None:
-            element.set("filename", os.path.normpath(path))
+        if path is None:
+            continue
+        placed = os.path.normpath(path)
+        if target is not None:
+            placed = os.path.relpath(path, target.parent.resolve())
+        element.set("filename", placed)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -60,7 +60,7 @@ def frames(
     ax: Any = draw_postures(figure, trajectory, samples, grid[0])
     panels = draw_holding(figure, grid[1], trajectory, samples)
     lines = lines_of(panels, trajectory)
-    style.legend_below(figure, style.PAGE_WIDTH - 10.0, lines)
+    style.legend_below(figure, lines)
     view = list(plane_of(trajectory) or (0, 1, 2))
     bones = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
     look = {"color": "black", "animated": True}

@@ -79,7 +79,7 @@ def write_mcap(rows: JointRows, stream: BinaryIO) -> None:
         writer.add_metadata("brachis", {"left_out": "; ".join(rows.left_out)})
 
 
-_SERVOJ = {"lookahead": 0.03, "gain": 300}
+_SERVOJ = "0.03, 300"
 """The shortest lookahead time of servoj, s, and its proportional gain, the default of its manual."""
 
 
@@ -105,9 +105,8 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
         )
     first, *postures = (f"[{', '.join(map(repr, row))}]" for row in rows.q.tolist())
     periods = np.diff(rows.t).round(12).tolist()
-    settings = f"{_SERVOJ['lookahead']}, {_SERVOJ['gain']}"
     moves = [
-        f"  servoj({posture}, 0, 0, {period!r}, {settings})"
+        f"  servoj({posture}, 0, 0, {period!r}, {_SERVOJ})"
         for posture, period in zip(postures, periods, strict=True)
     ]
     lines = [

@@ -92,7 +92,7 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
             found="no rows",
             allowed="at least one",
         )
-    cells: dict[tuple[Case, str], float] = {}
+    cells = {}
     for number, row in enumerate(rows):
         allowed = None
         if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 3:
@@ -153,9 +153,16 @@ def _draw_bars(
                 horizontalalignment="center",
                 verticalalignment="bottom",
             )
-        look = style.bar_style(column)
-        label = style.plain(choice)
-        ax.bar(list(bars), list(bars.values()), 0.9 * width, label=label, **look)
+        ax.bar(
+            list(bars),
+            list(bars.values()),
+            0.9 * width,
+            label=style.plain(choice),
+            color=style.COLOURS[column % len(style.COLOURS)],
+            hatch=style.HATCHES[column % len(style.HATCHES)],
+            edgecolor="white",
+            linewidth=0.0,
+        )
 
 
 _MARKS: dict[str, dict[str, Any]] = {

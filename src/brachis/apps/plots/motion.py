@@ -22,6 +22,7 @@ from brachis.apps.plots.panels import (
     panels_of,
     ratio_panel,
     titles_of,
+    tool_rows_of,
     torque_panels,
 )
 from brachis.apps.plots.postures import draw_postures, legend_postures
@@ -49,7 +50,7 @@ def plot_motion(trajectory: Trajectory) -> Figure:
         One column wide. Thin dashed lines are limits in the colours of their joints, drawn where the motion comes near
         them; the faint ticks are the knots of the splines.
     """
-    rows = ("position", "velocity", "path coordinate", "tool speed")
+    rows = ("position", "velocity", "path coordinate", *tool_rows_of(trajectory))
     return _stack(trajectory, panels_of(trajectory, dense_samples(trajectory), *rows))
 
 
@@ -140,7 +141,7 @@ def plot_overview(trajectory: Trajectory) -> Figure:
         cells = [grid[row + 1, column] for row in range(len(found))]
         joints += draw_panels(figure, cells, trajectory, found)
     lines = lines_of(joints, trajectory)
-    style.legend_below(figure, style.PAGE_WIDTH - 10.0, lines)
+    style.legend_below(figure, lines)
     return figure
 
 
@@ -214,7 +215,10 @@ def _draw_panel(ax: Axes, panel: Panel) -> None:
     ends = panel.view()
     for limit, curves in panel.near_limits():
         if panel.is_ratio:
-            style.draw_limit(ax, float(limit[0]), ends[1])
+            level = float(limit[0])
+            ax.axhline(level, color=style.GREY, **style.LIMIT)
+            outer = np.sign(level) * ends[1]
+            ax.axhspan(level, outer, facecolor="#EFEFEF", edgecolor="none", zorder=0.0)
             continue
         for place, curve in enumerate(curves):
             look = {

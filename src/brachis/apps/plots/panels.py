@@ -14,6 +14,8 @@ from brachis.apps.bottleneck.saturation import LimitRatios
 from brachis.limits.tool import build_tool_speed
 from brachis.robot.joints import UNITS, shown_unit
 from brachis.robot.limits import Limits
+from brachis.scene import scene_of
+from brachis.scene.chain import Chain
 from brachis.trajectory import Samples, Trajectory
 
 BLACK = 48
@@ -162,6 +164,10 @@ class Row:
         Unit of the values; None for joints, which have their own.
     largest : callable or None
         Of trajectory and samples: the largest values that the task allows, (K,).
+    smallest : callable or None
+        Of the trajectory: the smallest value that the task allows.
+    name : str
+        Of the curve.
     ends : (float or None, float or None)
         See `Panel`.
     """
@@ -174,6 +180,8 @@ class Row:
     only_if_limited: bool = False
     unit: str | None = None
     largest: Callable[[Trajectory, Samples], np.ndarray | float] | None = None
+    smallest: Callable[[Trajectory], float] | None = None
+    name: str = "tool"
     ends: tuple[float | None, float | None] = (None, None)
 
 
@@ -181,6 +189,14 @@ def _allowed_tool_speed(trajectory: Trajectory, samples: Samples) -> np.ndarray 
     """Return the largest speed of the tool that the task allows, (K,), m/s; infinite without a limit."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
     return np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
+
+
+def _smallest_distances(trajectory: Trajectory, samples: Samples) -> np.ndarray:
+    """Return the distances of the closest pairs of bodies, (K,), m."""
+    scene = scene_of(trajectory.robot, trajectory.task)
+    assert scene is not None
+    placed = Chain.of(trajectory.robot.model).place(samples.q)
+    return scene.find_closest(placed).distance
 
 
 PANELS = {
@@ -210,6 +226,13 @@ PANELS = {
         largest=_allowed_tool_speed,
         ends=(0.0, None),
     ),
+    "clearance": Row(
+        _smallest_distances,
+        "clearance",
+        unit="m",
+        smallest=lambda trajectory: trajectory.task.collisions.clearance,
+        name="closest pair",
+    ),
 }
 """All panels by their titles. Rows without a unit are of joints; their keys are the names of the robot's limits."""
 
@@ -225,6 +248,13 @@ def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
             or np.isfinite(_limits_of(trajectory.robot.limits, name)).any()
         )
     )
+
+
+def tool_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
+    """Return the rows of the tool, and of the clearance where the task looks at it."""
+    scene = scene_of(trajectory.robot, trajectory.task)
+    has_pairs = scene is not None and len(scene.pairs) > 0
+    return ("tool speed", "clearance") if has_pairs else ("tool speed",)
 
 
 def panels_of(
@@ -255,7 +285,8 @@ def panels_of(
             continue
         values = row.values(trajectory, samples)
         largest = row.largest(trajectory, samples) if row.largest else np.inf
-        curve = Curve("tool", BLACK, values, upper=largest)
+        smallest = row.smallest(trajectory) if row.smallest else -np.inf
+        curve = Curve(row.name, BLACK, values, smallest, largest)
         found.append(
             Panel(name, row.symbol, row.unit, samples.t, (curve,), ends=row.ends)
         )

@@ -146,6 +146,7 @@ LINE_STYLES: tuple[Any, ...] = (
 )
 """Line styles that differ in print without colours; one fewer than colours, so that joints of long chains differ."""
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
+"""Hatchings of bars that differ in print without colours."""
 LIMIT: dict[str, Any] = {
     "linewidth": 0.7,
     "linestyle": (0, (4.0, 2.0)),
@@ -171,16 +172,6 @@ def joint_style(joint: int) -> dict[str, Any]:
         "color": COLOURS[joint % len(COLOURS)],
         "linestyle": LINE_STYLES[joint % len(LINE_STYLES)],
         "linewidth": LINE_WIDTH,
-    }
-
-
-def bar_style(column: int) -> dict[str, Any]:
-    """Look of the bars of one choice: a colour and, for print in greys, a hatching."""
-    return {
-        "color": COLOURS[column % len(COLOURS)],
-        "hatch": HATCHES[column % len(HATCHES)],
-        "edgecolor": "white",
-        "linewidth": 0.0,
     }
 
 
@@ -259,9 +250,9 @@ def legend_above(
         _add_legend(ax, width, lines, borderaxespad=0.2, borderpad=0.2, **look)
 
 
-def legend_below(figure: Figure, width: float, lines: Mapping[str, Artist]) -> None:
-    """Put one legend for all axes at the foot of the figure; `width` in mm."""
-    _add_legend(figure, width, lines, loc="outside lower center")
+def legend_below(figure: Figure, lines: Mapping[str, Artist]) -> None:
+    """Put one legend for all axes at the foot of a figure of two columns' width."""
+    _add_legend(figure, PAGE_WIDTH - 10.0, lines, loc="outside lower center")
 
 
 def _add_legend(
@@ -294,13 +285,6 @@ def lines_by_label(panels: Sequence[Axes]) -> dict[str, Artist]:
         for ax in panels
         for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
     }
-
-
-def draw_limit(ax: Axes, level: float, top: float) -> None:
-    """Draw a limit, and shade what is beyond it, up to `top`."""
-    ax.axhline(level, color=GREY, **LIMIT)
-    beyond: dict[str, Any] = {"facecolor": "#EFEFEF", "edgecolor": "none"}
-    ax.axhspan(level, np.sign(level) * top, zorder=0.0, **beyond)
 
 
 def plain(name: str) -> str:

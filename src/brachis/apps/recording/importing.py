@@ -16,9 +16,14 @@ from typing import Any
 import numpy as np
 
 from brachis import ik
-from brachis.apps.recording.nodes import Nodes, nodes_of
+from brachis.apps.recording.nodes import (
+    Nodes,
+    find_rests,
+    nodes_of,
+    split_at_rests,
+    with_rests,
+)
 from brachis.apps.recording.recording import Recording, check_units, read_recording
-from brachis.apps.recording.rests import find_rests, split_at_rests, with_rests
 from brachis.common.arguments import check_keywords, file_name, numbers
 from brachis.common.arrays import spread, with_like_signs
 from brachis.common.files import TASK_SUFFIXES, Kind, kind_of

@@ -13,16 +13,20 @@ Accelerations that jump between two rows are found by what lies on both sides. A
 before and one after a jump, overshoots by up to a tenth of it. If both rows are continued at constant jerk, the
 velocities meet where the jump is (subcell resolution: A. Harten, Journal of Computational Physics 83, 1989). There the
 acceleration changes from the one to the other within a small part of the period.
+
+A recorded motion waits where several rows have the same posture; between the waits it moves along the path.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
 from brachis.apps.recording.recording import FEWEST_ROWS, Recording
+from brachis.common import tolerances
 from brachis.errors import write_count
 from brachis.trajectory.trajectory import piece_coefficients
 
@@ -33,6 +37,8 @@ _AT_REST = {1: 1e-3, 2: 1e-2}
 """Velocity and acceleration at an end, as parts of the largest ones, below which they are zero."""
 _NARROWEST = 0.02
 """Half of the shortest part of a period in which the acceleration changes at a jump."""
+_SLOW = 1e-3
+"""Part of the largest velocity up to which a velocity at rest is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +183,11 @@ def _fit_rows(
     """
     # More intervals, until the spline is about as far off as noise alone, which is 1.
     count = 4.0
-    states, off = _fit_spline(t, q, deviation, int(count), 0, 0)
-    while off > 1.05 and 1.2 * count <= len(t) / 2.0:
-        count *= 1.2
+    while True:
         states, off = _fit_spline(t, q, deviation, int(count), 0, 0)
+        if off <= 1.05 or 1.2 * count > len(t) / 2.0:
+            break
+        count *= 1.2
     largest = np.abs(states).max(axis=1)
     first = _count_vanishing(t - t[0], q, deviation, largest)
     last = _count_vanishing(t[-1] - t[::-1], q[::-1], deviation, largest)
@@ -237,7 +244,8 @@ def _fit_spline(
     columns = np.clip(points - first, 0, points[-1] - first - last)
     tied = csr_array((np.ones(len(points)), (points, columns)))
     design = BSpline.design_matrix(t, knots, _DEGREE) @ tied
-    free = spsolve(design.T @ design, design.T @ q).reshape(-1, q.shape[1])
+    free = np.asarray(spsolve(design.T @ design, design.T @ q))
+    free = free.reshape(-1, q.shape[1])
     spline = BSpline(knots, tied @ free, _DEGREE)
     states = np.stack([spline(t, nu=order) for order in range(4)])
     off = np.sqrt(np.mean(((states[0] - q) / deviation) ** 2, axis=0)).max()
@@ -358,3 +366,38 @@ def _extrapolate(state: np.ndarray, t: np.ndarray | float) -> np.ndarray:
             qddot + t * jerk,
         ]
     )
+
+
+def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
+    """Find the waits inside a motion: numbers of the first and the last node of each.
+
+    A wait has five rows or more, none of them the first or the last one of the motion.
+    """
+    speed = np.abs(nodes.qdot).max(axis=1)
+    same = np.all(np.abs(np.diff(nodes.q, axis=0)) <= tolerances.ROUNDING, axis=1)
+    slow = speed <= _SLOW * speed.max()
+    still = np.concatenate([[False], same & slow[1:] & slow[:-1], [False]])
+    edges = np.flatnonzero(np.diff(still))
+    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    last = len(nodes.t) - 1
+    return [
+        (first, end)
+        for first, end in runs
+        if first > 0 and end < last and end - first + 1 >= FEWEST_ROWS
+    ]
+
+
+def with_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> Nodes:
+    """Return the motion without the rounding of its positions, velocities and accelerations at rest."""
+    states = np.stack([nodes.q, nodes.qdot, nodes.qddot])
+    for first, end in rests:
+        states[0, first : end + 1] = nodes.q[first]
+        states[1:, first : end + 1] = 0.0
+    q, qdot, qddot = states
+    return Nodes(nodes.t, q, qdot, qddot, nodes.notes)
+
+
+def split_at_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> list[Nodes]:
+    """Return the parts between waits in which the motion moves."""
+    edges = [0, *chain(*rests), len(nodes.t) - 1]
+    return [nodes.part(*ends) for ends in list(pairwise(edges))[::2]]

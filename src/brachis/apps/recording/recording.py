@@ -262,7 +262,7 @@ def read_recording(
     where = f"{source}: line {table.header_line}"
     columns = _find_columns(table.header, joints, where)
     t, time_unit, _ = _read_column(table, columns, ("t", ""), "s", units, where)
-    parts: dict[str, np.ndarray] = {}
+    parts = {}
     for kind in ("q", "qdot", "qddot"):
         if (kind, joints[0]) in columns:
             read = [

@@ -15,6 +15,7 @@ from brachis.apps.plots.panels import (
     curves_of,
     joint_rows_of,
     panels_of,
+    tool_rows_of,
     torque_panels,
 )
 from brachis.apps.plots.postures import plane_of, skeleton
@@ -45,7 +46,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     panels = panels_of(trajectory, samples, *rows, degrees=motion.degrees)
     over_limits = torque_panels(trajectory, samples, motion.ratios)
     panels += [panel for panel in over_limits if panel.is_ratio]
-    panels += panels_of(trajectory, samples, "tool speed")
+    panels += panels_of(trajectory, samples, *tool_rows_of(trajectory))
     heights = [210 if len(panel.curves) > 2 else 130 for panel in panels]
     ends = 1.0 - np.cumsum([0, *heights]) / sum(heights)
     layout = _layout(trajectory, sum(heights))

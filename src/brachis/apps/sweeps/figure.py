@@ -68,20 +68,21 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
         )
     columns = list(zip(*cells, strict=True))
     values = [_sort_values(column) for column in columns]
-    is_heat_map = len(keys) == 2 and 2 * len(cells) >= math.prod(map(len, values))
+    is_line = len(keys) == 1
+    is_heat_map = not is_line and 2 * len(cells) >= math.prod(map(len, values))
     places = [
         _places(column, distinct, is_heat_map)
         for column, distinct in zip(columns, values, strict=True)
     ]
-    height = _HEIGHT if len(keys) == 1 else 1.4 * _HEIGHT
+    height = _HEIGHT if is_line else 1.4 * _HEIGHT
     if is_heat_map:
         height = min(180.0, max(_HEIGHT, 24.0 + 8.0 * len(values[1])))
-    width = style.COLUMN_WIDTH if len(keys) == 1 else style.PAGE_WIDTH
+    width = style.COLUMN_WIDTH if is_line else style.PAGE_WIDTH
     figure = style.new_figure(width, height)
     ax = figure.add_subplot()
     x = places[0]
     shown = np.where(is_verified, times, np.nan)
-    if len(keys) == 1:
+    if is_line:
         y = np.full(len(x), times[is_verified].max())
         order = np.argsort(x)
         look = style.joint_style(0)
@@ -110,7 +111,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
             zorder=3.0,
         )
         style.legend_above(ax, style.COLUMN_WIDTH)
-    for axis, distinct in zip("xy"[: len(keys)], values, strict=True):
+    for axis, distinct in zip("xy", values, strict=False):
         if is_heat_map or not _are_numbers(distinct):
             ticks = range(0, len(distinct), math.ceil(len(distinct) / _MOST_TICKS))
             names = [_write_value(distinct[tick]) for tick in ticks]

@@ -83,14 +83,14 @@ class Outcome:
         cls, error: BaseException, wall_time: float | None = None, *, message: str = ""
     ) -> Outcome:
         """Return the outcome of a plan that failed; the message is the error's own unless another is given."""
-        return cls(
-            {
-                "status": FAILED,
-                "error": type(error).__name__,
-                "message": message or str(error) or type(error).__name__,
-                "wall_time_s": wall_time,
-            }
-        )
+        kind = type(error).__name__
+        facts = {
+            "status": FAILED,
+            "error": kind,
+            "message": message or str(error) or kind,
+            "wall_time_s": wall_time,
+        }
+        return cls(facts)
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
                     unknown[plan.digest] = error
         return unknown[plan.digest]
 
-    refused: dict[str, str] = {}
+    refused = {}
     for key in settings.keys or ("task",):
         plans = [row.plan for row in rows if key in row.changes or not row.changes]
         plans.sort(key=lambda plan: isinstance(plan, BrachisError))

@@ -25,6 +25,7 @@ from brachis.apps.sweeps.plans import Outcome, Plan, run_plan
 from brachis.common import interrupts
 from brachis.common.arguments import count
 from brachis.common.files import is_file
+from brachis.common.progress import Listener
 from brachis.errors import BrachisError, ClusterError, InputError
 
 Outcomes = Generator[tuple[Plan, Outcome], None, None]
@@ -50,9 +51,7 @@ _ONE_THREAD = dict.fromkeys(
 """Environment of worker processes."""
 
 
-def pool_for(
-    jobs: int | None, scheduler: str | None, listener: Callable[[str], None]
-) -> Pool:
+def pool_for(jobs: int | None, scheduler: str | None, listener: Listener) -> Pool:
     """Choose where plans are made.
 
     Parameters
@@ -137,9 +136,7 @@ def _outcome_of(future: Future[Outcome], lost: tuple[type[Exception], ...]) -> O
     raise ClusterError("workers failed to make plans", found=found) from error
 
 
-def on_dask(
-    plans: Iterable[Plan], address: str, listener: Callable[[str], None]
-) -> Outcomes:
+def on_dask(plans: Iterable[Plan], address: str, listener: Listener) -> Outcomes:
     """Make plans on a Dask cluster; workers may come and go meanwhile.
 
     Parameters

@@ -142,7 +142,7 @@ class Store:
         keys : sequence of str
             The varied keys.
         rows : sequence of (mapping, mapping)
-            Values of these keys, and the columns of the outcome.
+            Values of these keys, and the columns of the outcome; those that are left out are null.
         """
         from pyarrow import csv
 
@@ -151,7 +151,7 @@ class Store:
         for key in keys:
             columns[key] = _column([changes.get(key) for changes, _ in rows])
         for name, kind in COLUMNS.items():
-            columns[name] = pa.array([facts[name] for _, facts in rows], kind)
+            columns[name] = pa.array([facts.get(name) for _, facts in rows], kind)
         table = pa.table(columns)
         writers = (self._parquet.write_table, csv.write_csv)
         for name, write in zip(TABLES, writers, strict=True):

@@ -13,7 +13,7 @@ from typing import Any
 import brachis
 from brachis.apps.sweeps.plans import FAILED, Outcome, Plan, SweepPlan, load_sweep
 from brachis.apps.sweeps.pools import Pool, pool_for
-from brachis.apps.sweeps.result import COLUMNS, Store, SweepResult
+from brachis.apps.sweeps.result import Store, SweepResult
 from brachis.common import interrupts
 from brachis.common.arguments import check_callable
 from brachis.common.progress import Listener, report_progress
@@ -100,10 +100,12 @@ def sweep(
         found = _run(planned, store, pool, retry=retry, tell=tell)
     rows = []
     for row in planned.rows:
-        if isinstance(row.plan, Plan):
-            facts = found[row.plan.digest]
-        else:
-            facts = {**dict.fromkeys(COLUMNS), **Outcome.of_error(row.plan).facts}
+        plan = row.plan
+        facts = (
+            found[plan.digest]
+            if isinstance(plan, Plan)
+            else Outcome.of_error(plan).facts
+        )
         rows.append((row.changes, facts))
     keys = planned.settings.keys
     return SweepResult(store.folder, keys, store.write_table(keys, rows))

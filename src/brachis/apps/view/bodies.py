@@ -28,6 +28,8 @@ from brachis.trajectory import Samples, Trajectory
 if TYPE_CHECKING:
     import trimesh
 
+    from brachis.apps.view.solids import Meshes
+
 _COLOURS = {
     "shape": (150, 160, 172, 255),  # of a shape without a colour of its own
     "bone": (72, 101, 129, 255),
@@ -62,7 +64,7 @@ def link_shapes(
     tree = read_tree(urdf, "URDF")
     shapes: dict[str, list[trimesh.Trimesh]] = {}
     unread = []
-    absent: list[str] = []
+    absent = []
     room = _LARGEST
     materials = [each for each in tree.robot if each.tag == "material"]
     visuals = [
@@ -106,7 +108,7 @@ def _find_meshes(visual: Element, folder: Path) -> dict[str, Path | None]:
 
 
 def _check_size(path: Path, room: int) -> int:
-    """Return the size of a mesh file, bytes.
+    """Return the size of a mesh file, of an archive that of what is in it, bytes.
 
     Raises
     ------
@@ -119,7 +121,10 @@ def _check_size(path: Path, room: int) -> int:
             where=path.name,
             hint="Decompress the file",
         )
-    size = _size(path)
+    size = path.stat().st_size
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            size = sum(each.file_size for each in archive.infolist())
     if size > room:
         raise InputError(
             "the mesh is too large to be shown",
@@ -128,14 +133,6 @@ def _check_size(path: Path, room: int) -> int:
             allowed=f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot",
         )
     return size
-
-
-def _size(path: Path) -> int:
-    """Size of a file, of an archive that of what is in it, bytes."""
-    if not zipfile.is_zipfile(path):
-        return path.stat().st_size
-    with zipfile.ZipFile(path) as archive:
-        return sum(each.file_size for each in archive.infolist())
 
 
 def _meshes(
@@ -254,7 +251,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
 
     robot = trajectory.robot
     shapes, unread = link_shapes(robot.urdf, Path(robot.source).absolute().parent)
-    links: dict[int, list[trimesh.Trimesh]] = {}
+    links: Meshes = {}
     for name, meshes in shapes.items():
         frame = robot.model.frames[robot.model.getFrameId(name, pin.FrameType.BODY)]
         for mesh in meshes:
@@ -281,9 +278,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
     return Bodies(links, skeleton, tuple(unread), box, moving_box)
 
 
-def _skeleton(
-    trajectory: Trajectory, radius: float
-) -> dict[int, list[trimesh.Trimesh]]:
+def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
     """Draw every joint, and the link from it to the next one; along the axis of a prismatic joint where it slides."""
     import trimesh
 
@@ -291,7 +286,7 @@ def _skeleton(
     model = robot.model
     base = model.getFrameId(robot.base_frame, pin.FrameType.BODY)
     begin = model.frames[base].placement.translation
-    drawn: dict[int, list[trimesh.Trimesh]] = {}
+    drawn: Meshes = {}
 
     def draw(joint: int, mesh: trimesh.Trimesh, kind: str) -> None:
         drawn.setdefault(joint, []).append(with_colour(mesh, _COLOURS[kind]))
@@ -307,7 +302,8 @@ def _skeleton(
 
     for joint in range(robot.n):
         placement = model.jointPlacements[joint + 1]
-        axis = _axis(model.joints[joint + 1])
+        subspace = np.asarray(model.joints[joint + 1].createData().S).reshape(6, -1)
+        axis = subspace[:3, 0] + subspace[3:, 0]  # one of them is zero
         draw_rod(joint, begin, placement.translation, 1.0, "bone")
         if robot.revolute[joint]:
             half = 2.0 * radius * axis
@@ -321,12 +317,6 @@ def _skeleton(
     tool = model.frames[robot.frame_id]
     draw_rod(tool.parentJoint, begin, tool.placement.translation, 1.0, "bone")
     return drawn
-
-
-def _axis(joint: Any) -> np.ndarray:
-    """Axis of a joint in its own frame, (3,)."""
-    subspace = np.asarray(joint.createData().S).reshape(6, -1)[:, 0]
-    return subspace[:3] if np.any(subspace[:3]) else subspace[3:]
 
 
 def _range(trajectory: Trajectory, joint: int) -> np.ndarray:

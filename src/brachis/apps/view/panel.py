@@ -12,7 +12,13 @@ import numpy as np
 
 from brachis.apps.bottleneck.saturation import LimitRatios, limit_ratios
 from brachis.apps.plots import style
-from brachis.apps.plots.panels import Panel, panels_of, ratio_panel, titles_of
+from brachis.apps.plots.panels import (
+    Panel,
+    panels_of,
+    ratio_panel,
+    titles_of,
+    tool_rows_of,
+)
 from brachis.apps.view import tables
 from brachis.apps.view.scene import Scene, speed_colours
 from brachis.errors import BrachisError
@@ -22,17 +28,17 @@ if TYPE_CHECKING:
     import viser
     from viser import uplot
 
-_PIXELS = {
-    "height": 165,  # of a plot
-    "left": 40,  # of the curves in it, and so on
-    "right": 12,
-    "above": 6,
-    "below": 44,
-    "label": 16,  # of the part below
-    "outside left": 9.5,  # what viser leaves free around a plot; a test measures it
-    "outside": 18.5,  # on both sides together
-    "outside below": 12,
-}
+# Pixels of a plot, and of what is left, right, above and below of the curves in it.
+_HEIGHT = 165
+_LEFT = 40
+_RIGHT = 12
+_ABOVE = 6
+_BELOW = 44
+_LABEL = 16  # of the part below
+# Pixels that viser leaves free around a plot; a test measures them.
+_OUTSIDE_LEFT = 9.5
+_OUTSIDE = 18.5  # on both sides together
+_OUTSIDE_BELOW = 12
 _FONT = "11px sans-serif"
 
 
@@ -57,7 +63,7 @@ def shown_panels(
         free = tuple(curve for curve in panel.curves if not curve.is_limited)
         if free:
             found.append(replace(panel, curves=free, unit=f"{panel.unit}, no limit"))
-    return [*found, *panels_of(trajectory, samples, "tool speed")]
+    return [*found, *panels_of(trajectory, samples, *tool_rows_of(trajectory))]
 
 
 class Chart:
@@ -88,17 +94,17 @@ class Chart:
             axes=(
                 {
                     "font": _FONT,
-                    "size": _PIXELS["below"] - _PIXELS["label"],
+                    "size": _BELOW - _LABEL,
                     "label": "time (s)",
-                    "labelSize": _PIXELS["label"],
+                    "labelSize": _LABEL,
                     "labelFont": _FONT,
                 },
-                {"font": _FONT, "size": _PIXELS["left"]},
+                {"font": _FONT, "size": _LEFT},
             ),
             legend={"show": False},
             cursor={"drag": {"x": False, "y": False, "setScale": False}},
-            height=_PIXELS["height"],
-            padding=(_PIXELS["above"], _PIXELS["right"], 0, 0),
+            height=_HEIGHT,
+            padding=(_ABOVE, _RIGHT, 0, 0),
         )
         self._line = gui.add_html(_line(0.0))
 
@@ -122,11 +128,11 @@ def _series(
 
 def _line(part: float) -> str:
     """Line over the plot above it, at a part of its width; a plot whose data are replaced so often would blink."""
-    before = _PIXELS["outside left"] + _PIXELS["left"]
-    around = _PIXELS["outside"] + _PIXELS["left"] + _PIXELS["right"]
+    before = _OUTSIDE_LEFT + _LEFT
+    around = _OUTSIDE + _LEFT + _RIGHT
     left = f"calc({before}px + {part:.5f} * (100% - {around}px))"
-    bottom = _PIXELS["below"] + _PIXELS["outside below"]
-    height = _PIXELS["height"] - _PIXELS["above"] - _PIXELS["below"]
+    bottom = _BELOW + _OUTSIDE_BELOW
+    height = _HEIGHT - _ABOVE - _BELOW
     place = f"left:{left};bottom:{bottom}px;height:{height}px"
     style_now = f"position:absolute;z-index:5;width:1.5px;background:#D00000;{place}"
     return (
@@ -206,13 +212,12 @@ class Playback:
         if self.time < self.t_end:
             self.time = min(self.time + elapsed * self.rate, self.t_end)
             self._waited = 0.0
-            return self.time
-        if not self.repeats:
+        elif not self.repeats:
             self.playing = False
-            return self.time
-        self._waited += elapsed
-        if self.loops or self._waited >= 0.7:  # s
-            self.time = 0.0
+        else:
+            self._waited += elapsed
+            if self.loops or self._waited >= 0.7:  # s
+                self.time = 0.0
         return self.time
 
     def go_to(self, time: float) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 
 from brachis.apps.plots.postures import plane_of
 from brachis.apps.view.bodies import bodies_of, placements, prescribed_path
+from brachis.scene import scene_of
+from brachis.scene.chain import Chain
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ LAYERS = (
     "tool frame",
     "world frame",
     "ground",
+    "closest pair",
 )
 """What can be shown and hidden."""
 
@@ -75,6 +78,11 @@ class Scene:
         self._draw_path()
         self._draw_trace()
         self.cell = self._draw_ground()
+        self._distances = scene_of(self._robot, trajectory.task)
+        if self._distances is not None and len(self._distances.pairs):
+            self._draw_closest()
+        else:
+            del self.layers["closest pair"]
         hidden = "skeleton" if self.bodies.shows_links else "robot"
         for name in ("world frame", hidden):
             self.set_visible(name, visible=False)
@@ -91,6 +99,31 @@ class Scene:
         for k, handle in enumerate((*self._frames, self._tool)):
             handle.position = positions[0, k]
             handle.wxyz = quaternions[0, k]
+        if "closest pair" in self.layers:
+            self._show_closest(q)
+
+    def _draw_closest(self) -> None:
+        """Draw the line between the closest bodies, and a label."""
+        line = self._api.add_line_segments(
+            "/closest/line",
+            np.zeros((1, 2, 3)),
+            (200, 30, 30),
+            thickness=3.0,
+            thickness_units="screen",
+        )
+        label = self._api.add_label("/closest/label", "")
+        self.layers["closest pair"] += [line, label]
+
+    def _show_closest(self, q: np.ndarray) -> None:
+        """Move the line to the closest bodies in a posture, (n,), and write their distance."""
+        scene = self._distances
+        assert scene is not None
+        found = scene.find_closest(Chain.of(self._robot.model).place(q[None]))
+        line, label = self.layers["closest pair"]
+        line.points = found.points
+        label.position = found.points[0].mean(axis=0)
+        distance = 1e3 * found.distance[0]
+        label.text = f"{scene.names(found.pair[0])}: {distance:.1f} mm"
 
     def _frame(self, name: str, part: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""
@@ -214,10 +247,6 @@ class Scene:
         camera.near = 0.005 * distance
         camera.far = 100.0 * distance
         camera.look_at = self.bodies.moving_box.mean(axis=0)
-        camera.position = camera.look_at + distance * self._direction()
-
-    def _direction(self) -> np.ndarray:
-        """Return the unit vector from the scene to the camera, (3,)."""
         positions, _ = placements(self._robot, self.samples.q)
         reach = (self.samples.tool_position - positions[:, 1]).mean(axis=0)
         azimuth = np.arctan2(reach[1], reach[0]) - np.radians(50.0)
@@ -228,7 +257,8 @@ class Scene:
             (1, 2): (1.0, 0.0, 0.3),
         }
         direction = np.array(directions[plane_of(self._trajectory)])
-        return np.asarray(direction / np.linalg.norm(direction))
+        away = direction / np.linalg.norm(direction)
+        camera.position = camera.look_at + distance * away
 
 
 def speed_colours(parts: np.ndarray) -> np.ndarray:

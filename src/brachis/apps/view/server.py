@@ -48,14 +48,14 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
             """Refuse to give the scene a public address."""
 
         def stop(self) -> None:
-            """Stop without a word."""
-            with _quiet():
+            """Stop without a word: standard output is for results."""
+            with contextlib.redirect_stdout(io.StringIO()):
                 super().stop()
 
     _check(host, port or 0)
     logging.getLogger("websockets.server").addFilter(_is_of_a_page)
     first = FIRST_PORT if port is None else port  # viser takes the next free one
-    with _quiet():
+    with contextlib.redirect_stdout(io.StringIO()):
         server = Server(host=host, port=first, label="brachis", verbose=False)
     if port and port != server.get_port():  # another process took it in between
         server.stop()
@@ -81,11 +81,6 @@ def is_local(host: str) -> bool:
         for found in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     }
     return all(ipaddress.ip_address(address).is_loopback for address in addresses)
-
-
-def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
-    """Keep viser's own messages from standard output, which is for results."""
-    return contextlib.redirect_stdout(io.StringIO())
 
 
 def _is_of_a_page(record: logging.LogRecord) -> bool:

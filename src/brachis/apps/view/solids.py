@@ -13,17 +13,19 @@ from brachis.trajectory import Trajectory
 if TYPE_CHECKING:
     import trimesh
 
+    Meshes = dict[int, list[trimesh.Trimesh]]
+
 _FLOOR = 4.0
 """Length and width of what is drawn of a half-space, m."""
 _THIN = 0.002
 """Its thickness, m."""
 
 
-def scene_meshes(trajectory: Trajectory) -> dict[int, list[trimesh.Trimesh]]:
+def scene_meshes(trajectory: Trajectory) -> Meshes:
     """Make the meshes of the bodies of a task's scene, without the robot's own, in the frames of their joints, m."""
     task = trajectory.task
     found = scene_of(trajectory.robot, task)
-    meshes: dict[int, list[trimesh.Trimesh]] = {}
+    meshes: Meshes = {}
     if found is None:
         return meshes
     own = len(found.solids) - len(task.scene)

@@ -203,9 +203,13 @@ def view(
     True
     >>> viewer.stop()
     """
-    trajectory = motion_of(motion)
     viewer = Viewer(
-        trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port
+        motion_of(motion),
+        candidates,
+        verified=verified,
+        degrees=degrees,
+        host=host,
+        port=port,
     )
     print(f"the motion is shown at {viewer.url}", file=sys.stderr)  # noqa: T201
     if block if block is not None else not hasattr(sys, "ps1"):
