@@ -179,9 +179,9 @@ def weld_seams() -> Planned:
 
 
 def round_the_post() -> Planned:
-    """Draw how near a motion comes to its limits, a post among them."""
+    """Draw a motion that goes round a post, with the smallest distance over time."""
     result = planned("14_round_the_post")
-    save(plot_limits(result.trajectory), "round_the_post")
+    save(plot_motion(result.trajectory), "round_the_post")
     task = brachis.load_task(ROOT / "examples/14_round_the_post.yaml")
     return {"round the post": result, "without a scene": brachis.plan(task, scene=())}
 

@@ -18,6 +18,8 @@ from brachis.scene import scene_of
 from brachis.scene.chain import Chain
 from brachis.trajectory import Samples, Trajectory
 
+MOST_CURVES = 10
+"""Curves of a panel of ratios, no more."""
 BLACK = 48
 """Style of curves of the whole arm: a number that gives a solid black line in all figures."""
 
@@ -341,6 +343,8 @@ def ratio_panel(
 ) -> Panel:
     """Make a panel of the ratios to some kinds of limits; a subject has the same style in all such panels.
 
+    Of many, such as pairs of bodies, those are shown that come nearest to their limits.
+
     Parameters
     ----------
     trajectory : Trajectory
@@ -353,6 +357,9 @@ def ratio_panel(
     subjects = [label.subject for label in ratios.labels]
     order = list(dict.fromkeys((*trajectory.joint_names, *subjects)))
     shown = [k for k, label in enumerate(ratios.labels) if label.axis in titles]
+    if len(shown) > MOST_CURVES:
+        nearest = np.abs(ratios.values[:, shown]).max(axis=0)
+        shown = np.array(shown)[np.argsort(-nearest)[:MOST_CURVES]].tolist()
     values = ratios.values[:, shown]
     is_signed = bool(values.min() < 0.0)
     curves = [
