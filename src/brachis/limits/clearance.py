@@ -17,6 +17,8 @@ from brachis.task import Task
 
 _FAR = 0.1
 """Distance from which on it is not computed, beyond the clearance, m."""
+_DEVIATION = 2e-4
+"""By how much bodies leave where a joint path has them, where splines follow it, m."""
 _NEARBY = 2.0
 """Pairs are left out that stay so many times `_FAR` apart where the motion begins."""
 _STRIDE = 0.05
@@ -41,7 +43,7 @@ class Clearance(Limit):
     kind = "clearance"
     role = Role.SCENE
     at_rest = "posture"
-    spare = 2e-4 / UNIT
+    inset = _DEVIATION / UNIT
     refusal = "is not kept"
 
     def __init__(self, chain: Chain, scene: Scene, clearance: float) -> None:

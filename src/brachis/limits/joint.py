@@ -32,7 +32,7 @@ from brachis.limits.protocol import (
     Label,
     Limit,
     Partials,
-    spare_in,
+    compute_inset,
 )
 from brachis.robot import Robot, dynamics
 from brachis.task import LIMIT_KINDS, Task
@@ -177,7 +177,7 @@ class PositionLimit(_DerivativeLimit):
         self.upper = (high - self._middle) * self._scale
         within = position_measure(low, high)
         self.violation_scale = measure / within
-        self.spare = spare_in(within)
+        self.inset = compute_inset(within)
         width = np.where(np.isfinite(half), 2.0 * half, 1.0)
         self._set_bounds(np.array([width, width]), np.zeros(len(low), dtype=bool))
 

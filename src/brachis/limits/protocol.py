@@ -25,10 +25,10 @@ import numpy as np
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
 
-_LEFT_BY = 3e-5
+_DEVIATION = 3e-5
 """Distance by which splines leave a joint path, about, rad or m."""
-_MOST_SPARE = 0.1
-"""Largest violation that is spared."""
+_LARGEST_INSET = 0.1
+"""Largest violation by which joint paths keep inside a narrow range."""
 
 
 class Guarantee(Enum):
@@ -233,8 +233,9 @@ class Description:
         Highest time derivative of q in the values: 2, or 3 for the jerk. The splines' degree must be at least as high.
     violation_scale : (c,) ndarray or float
         Violation of a value that is beyond its bound by 1 (see the module).
-    spare : (c,) ndarray or float
-        By how much joint paths keep inside the bounds, as a violation: splines leave a joint path by a little.
+    inset : (c,) ndarray or float
+        By how much joint paths keep inside the bounds of a limit on postures, as a violation: splines leave them
+        by a little.
     refusal : str
         What a message says of an arm at rest beyond the limit, after "the ... limit".
     """
@@ -250,7 +251,7 @@ class Description:
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     violation_scale: np.ndarray | float = 1.0
-    spare: np.ndarray | float = 1e-3
+    inset: np.ndarray | float = 1e-3
     refusal: str = "is exceeded at rest"
 
     @property
@@ -275,9 +276,9 @@ class Description:
         )
 
 
-def spare_in(measure: np.ndarray | float) -> np.ndarray | float:
-    """Return the spare violation of positions, whose violations are counted in a measure, rad or m."""
-    return np.minimum(_LEFT_BY / measure, _MOST_SPARE)
+def compute_inset(measure: np.ndarray | float) -> np.ndarray | float:
+    """Return the inset of positions whose violations are counted in a measure, rad or m."""
+    return np.minimum(_DEVIATION / measure, _LARGEST_INSET)
 
 
 class Limit(Description, ABC):

@@ -16,7 +16,7 @@ from brachis.limits.protocol import (
     Limit,
     Partials,
     Role,
-    spare_in,
+    compute_inset,
 )
 from brachis.robot import Robot
 from brachis.robot.task_map import Pose
@@ -71,7 +71,7 @@ class TiltLimit(_Size):
         key = "tolerances.orientation.tilt"
         self._describe(Label("tool", "tilt", "deg", key), figure)
         self._largest = np.radians(figure)
-        self.spare = spare_in(self._largest)
+        self.inset = compute_inset(self._largest)
 
     def values(self, motion: JointStates) -> np.ndarray:
         angles = motion.q[:, self._columns]
@@ -109,7 +109,7 @@ class DistanceLimit(_Size):
         key = "tolerances.position.sphere"
         self._describe(Label("tool", "distance from the path", "m", key), figure)
         self._largest = figure
-        self.spare = spare_in(figure)
+        self.inset = compute_inset(figure)
 
     def values(self, motion: JointStates) -> np.ndarray:
         away = motion.q[:, self._columns]
@@ -141,7 +141,7 @@ class RangeLimit(_Tolerance):
         super().__init__(robot, ("x", "y", "z"))
         self._pose = Pose(robot)
         self._scale = 2.0 / (ranges[:, 1] - ranges[:, 0])
-        self.spare = spare_in(1.0 / self._scale)
+        self.inset = compute_inset(1.0 / self._scale)
         self.lower, self.upper = (ranges * self._scale[:, None]).T
         self.labels = tuple(
             Label(f"tool {axis}", "displacement", "m", f"tolerances.position.{axis}")

@@ -35,7 +35,7 @@ _SLOWER_BY_LOSS = 1.6
 _MESHES = 5
 """Choices of knots that are tried, no more."""
 _GAINS = 0.9
-"""Another mesh is tried as long as the last one was slower by less than this part of the one before."""
+"""Finer meshes are tried for speed as long as the last one was slower by less than this part of what it was before."""
 _BETTER = 0.5
 """A finer mesh is tried as long as the last one left less than this part of the violation of limits on postures."""
 _MOST_INTERVALS = 40_000
@@ -138,26 +138,32 @@ def follow(
     lost = _FIRST_LOSS * tolerance
     outside = np.inf
     slower = np.inf
+    is_last = False
     for number in range(1, _MESHES + 1):
         breaks = _knots(phase, own, timing, lost)
         if len(breaks) > _MOST_INTERVALS:
             break
-        allowed = tolerance if number < _MESHES else np.inf
+        is_last = is_last or number == _MESHES
+        allowed = np.inf if is_last else tolerance
         laid = _hold_limits(phase, own, timing, breaks, allowed, deadline)
         if best is None or laid.is_better_than(best):
             best = laid
-        holds = laid.slower < tolerance
-        if holds and not _ENOUGH < laid.outside < _BETTER * outside:
+        is_fast = laid.slower < tolerance
+        is_done = is_fast and not _ENOUGH < laid.outside < _BETTER * outside
+        if is_last or is_done:
             break
-        if deadline.passed or laid.slower > _GAINS * slower:
-            break
+        # Over the last knots limits are narrowed until they hold, however slow that is.
+        is_last = deadline.passed or not (is_fast or laid.slower < _GAINS * slower)
+        if is_last:
+            continue
         slower = laid.slower
         outside = laid.outside
         wanted = _AIM * tolerance / max(laid.slower, tolerance)
         lost *= np.clip(wanted**_SLOWER_BY_LOSS, *_FINER)
     if best is None:
         return None
-    return Followed(*_as_phase(phase, best.motion, points), best)
+    finer, x = _as_phase(phase, best.motion, points)
+    return Followed(finer, x, best)
 
 
 def begin(
@@ -240,8 +246,11 @@ def _hold_limits(
     if not np.isfinite(best.violation):
         return best
     t = spread(np.unique(best.motion.knots), _LOOKS[-1]) * best.motion.t_end
-    q = phase.joint_map.state(*best.motion.at(t), t=t).q
-    still = Moments.at_rest(q)
+    try:
+        state = phase.joint_map.state(*best.motion.at(t), t=t)
+    except UnreachableError:
+        return replace(best, outside=np.inf)
+    still = Moments.at_rest(state.q)
     beyond = [
         limit.violation(limit.values(still)).max()
         for limit in phase.limits

@@ -264,9 +264,16 @@ class SolverSession:
         return cls(backend, options, deadline, progress)
 
     def over_path(self, options: SolverOptions) -> SolverSession:
-        """Return the session for programs over the path, under other options; of these the task may only allow less."""
-        most = min(options.max_iterations, self.options.max_iterations)
-        own = dataclasses.replace(options, max_iterations=most)
+        """Return the session for programs over the path, under other options.
+
+        Of iterations and time the task may only allow less. Their tolerance is no matter of the task's.
+        """
+        task = self.options
+        own = dataclasses.replace(
+            options,
+            max_iterations=min(options.max_iterations, task.max_iterations),
+            time_limit=min(options.time_limit, task.time_limit),
+        )
         return dataclasses.replace(self, options=own, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:

@@ -1,7 +1,8 @@
 """The NLP over the path: how fast stations of the path are passed, and redundant curves as splines of s.
 
 Places of the path do not move, as they do over time: corners that are passed within milliseconds have their stations.
-With X = sdot^2 linear in s between the stations, u = d2s/dt2 is constant there, as in the phase plane, and
+With X = sdot^2 linear in s between two stations, u = d2s/dt2 is constant there, as in the phase plane. At any place
+between them
 
     ydot = y' sqrt(X),        yddot = y'' X + y' u.
 
@@ -41,12 +42,12 @@ _NOTHING = 1e-24
 _SAMPLES = 20
 """Places in every interval of the splines at which they begin as the curves are."""
 HALF_WAY: tuple[float, ...] = (0.5,)
-"""Parts of an interval between stations that are ahead where limits hold: one place."""
+"""Where limits hold between two stations, as parts of the interval that are still ahead: at one place."""
 POINTS_OF_GAUSS: tuple[float, ...] = (
     0.5 + np.sqrt(1.0 / 12.0),
     0.5 - np.sqrt(1.0 / 12.0),
 )
-"""Two places, where torques otherwise swing beyond their limits on both sides of one."""
+"""The same at two places: where curves bend much, torques swing beyond their limits on both sides of a single one."""
 _SMALL = 2e-5
 """Violation up to which a limit on postures is not narrowed."""
 _RAMP = 2.0
@@ -157,12 +158,12 @@ class PathPhase:
         self._bounds = np.repeat(lower_and_upper[:, None], len(places), axis=1)
         # Splines over time leave a joint path by a little.
         for values, limit in self._posture_limits():
-            self._narrow(values, limit.spare / limit.violation_scale)
+            self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(columns)
         self._last: tuple[bytes, Evaluation] | None = None
 
     def _set_pattern(self, columns: np.ndarray) -> None:
-        """Set where entries of the Jacobian are; `columns`, (P + 1, 4), are the control points of a curve."""
+        """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
         numbers = self._number[:, None]
         of_curves = [self.place_of(j, 0) + columns for j in range(self.curves_count)]
         every = np.hstack([numbers, numbers + 1, *of_curves])
@@ -223,7 +224,7 @@ class PathPhase:
         return x[:count] * self._units, points
 
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Y' and y'', (P + 1, c), and X and u, (P + 1, 1), where limits hold; y in front."""
+        """Y' and y'', (L, c), and X and u, (L, 1), at the L places where limits hold; y in front."""
         squares, points = self._split(x)
         near = points[:, self._columns]
         y, y_ds, y_dds = (

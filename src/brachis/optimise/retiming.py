@@ -46,7 +46,7 @@ _NARROWED = 4
 _ENOUGH = 5e-5
 """Violation of them that is small enough."""
 _FALLS = 2.0
-"""Factor by which levels gain less, about, one after the other."""
+"""A level gains less than the one before by this factor, about."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -59,7 +59,7 @@ class PathEffort:
     ----------
     intervals : tuple of int
         Of the redundant curves over the path, one after the other.
-    stations : int
+    limit_places : int
         Of the path at which limits hold, at least.
     places : int
         At which answers are timed.
@@ -70,16 +70,30 @@ class PathEffort:
     """
 
     intervals: tuple[int, ...]
-    stations: int
+    limit_places: int
     places: int
     margin: float
     options: SolverOptions
 
 
-ROUGH = PathEffort((16,), 56, 800, MARGINS[1], SolverOptions(3e-4, 40, np.inf, 1e-3, 3))
+ROUGH = PathEffort(
+    intervals=(16,),
+    limit_places=56,
+    places=800,
+    margin=MARGINS[1],
+    options=SolverOptions(
+        tolerance=3e-4, max_iterations=40, time_limit=np.inf, progress=1e-3, patience=3
+    ),
+)
 """To rank joint paths, clear of branch boundaries."""
 FINE = PathEffort(
-    (32, 64, 128, 256), 120, PLACES, MARGIN, SolverOptions(1e-5, 100, np.inf, 2e-4, 4)
+    intervals=(32, 64, 128, 256),
+    limit_places=120,
+    places=PLACES,
+    margin=MARGIN,
+    options=SolverOptions(
+        tolerance=1e-5, max_iterations=100, time_limit=np.inf, progress=2e-4, patience=4
+    ),
 )
 """For a plan, from the answer of a rough search."""
 
@@ -177,7 +191,8 @@ class BetterPaths:
         Whether the answers are about as fast as their timings. Where the tool stands on its path while the joints move,
         curves over the path are none.
     swings : bool
-        Whether the answers are much faster than their timings: limits are exceeded between the places where they hold.
+        Whether the answers are so much faster than their timings that limits are exceeded between the places where they
+        hold; such answers are not credible.
     is_held_back : bool
         Whether a branch margin is so near to its bound that it holds the motion back.
     """
@@ -245,17 +260,18 @@ def improve_joint_paths(
     r = program.phases[0].joint_map.r
     if not r:
         return best
+    apart = program.with_margin(effort.margin)
     ahead = HALF_WAY
     for count in effort.intervals:
         before = best.t_end
         is_too_large = count * r > _MOST_INTERVALS
         if is_too_large or not np.isfinite(before) or solve.deadline.passed:
             break
-        again = partial(_better, program.with_margin(effort.margin), solve, count)
-        best = again(best, effort, ahead)
-        if best.swings and ahead is HALF_WAY:
+        solve_level = partial(_better, apart, solve, effort, count)
+        best = solve_level(best, ahead)
+        if best.swings and ahead == HALF_WAY and not solve.deadline.passed:
             ahead = POINTS_OF_GAUSS
-            best = again(best, effort, ahead)
+            best = solve_level(best, ahead)
         if not best.is_credible or best.t_end > before * (1.0 - _FALLS * tolerance):
             break
     return best
@@ -264,16 +280,18 @@ def improve_joint_paths(
 def _better(
     program: Program,
     solve: SolverSession,
+    effort: PathEffort,
     intervals: int,
     best: BetterPaths,
-    effort: PathEffort,
     ahead: tuple[float, ...],
 ) -> BetterPaths:
     """Solve over the path from the best joint paths, and keep what is faster."""
-    places = max(effort.stations, int(_PLACES_AN_INTERVAL * intervals))
+    places = max(effort.limit_places, int(_PLACES_AN_INTERVAL * intervals))
     stations = places // len(ahead)
-    pairs = zip(program.phases, best.timings, strict=True)
-    phases = [PathPhase(*pair, intervals, stations, ahead) for pair in pairs]
+    phases = [
+        PathPhase(phase, own, intervals, stations, ahead)
+        for phase, own in zip(program.phases, best.timings, strict=True)
+    ]
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)
     reports = (*best.reports, report)
@@ -300,7 +318,7 @@ def _better(
     return replace(
         found,
         is_credible=abs(missed) < _CREDIBLE,
-        swings=missed > _SWINGS,
+        swings=report.violation < _CREDIBLE and _SWINGS < missed < 1.0,
         is_held_back=slack <= HELD_BACK,
     )
 
@@ -340,11 +358,12 @@ def lay_splines(
     began = time.perf_counter()
     found = []
     for phase, own in zip(program.phases, timings, strict=True):
-        how = tolerance, points, deadline
-        followed = None if own is None else follow(phase, own, *how)
+        if own is None:
+            return None
+        followed = follow(phase, own, tolerance, points, deadline)
         if followed is None:
             return None
-        found.append(_follow_again(followed, *how))
+        found.append(_follow_again(followed, tolerance, points, deadline))
     finer = program.with_phases([own.phase for own in found])
     x = np.concatenate([own.x for own in found])
     violation = max(own.laid.violation for own in found)

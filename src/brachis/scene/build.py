@@ -74,7 +74,8 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         and not _may_touch(solids[first], solids[second], links, disabled)
     ]
     within = [second < len(own) for _, second in pairs]
-    scene = Scene(solids, joints, placements, np.reshape(pairs, (-1, 2)).astype(int))
+    numbers = np.reshape(pairs, (-1, 2)).astype(int)
+    scene = Scene(solids, joints, placements, numbers, len(own))
     return scene.with_pairs(_find_hazards(scene, np.array(within), robot, tree, task))
 
 

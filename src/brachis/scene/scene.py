@@ -6,7 +6,7 @@ two nearest points.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -63,12 +63,15 @@ class Scene:
     placements : (S, 4, 4) ndarray
         Of each in the frame of its joint, or in the world.
     pairs : (P, 2) int ndarray
+    own : int
+        How many of the solids, in front, are the robot's own.
     """
 
     solids: tuple[Solid, ...]
     joints: np.ndarray
     placements: np.ndarray
     pairs: np.ndarray
+    own: int
 
     def names(self, pair: int) -> str:
         """Name both solids of a pair."""
@@ -77,7 +80,7 @@ class Scene:
 
     def with_pairs(self, chosen: np.ndarray) -> Scene:
         """Return the scene with some of its pairs, by number."""
-        return Scene(self.solids, self.joints, self.placements, self.pairs[chosen])
+        return replace(self, pairs=self.pairs[chosen])
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out cached objects of Coal."""
@@ -148,7 +151,11 @@ class Scene:
 
     def find_closest(self, placed: Placed) -> ClosePairs:
         """Find the pair in each posture that is closest."""
-        found = self.find_close(placed, np.inf)
+        bounds = self.bounds(placed)
+        every = np.arange(len(bounds))
+        one = self.measure(placed, every, bounds.argmin(axis=1))
+        posture, pair = np.nonzero(bounds <= one.distance[:, None])
+        found = self.measure(placed, posture, pair)
         order = np.lexsort((found.distance, found.posture))
         first = np.unique(found.posture[order], return_index=True)[1]
         return found.only(order[first])

@@ -73,22 +73,30 @@ def build_solids(body: SceneBody) -> Iterator[Solid]:
     if body.urdf is None:
         yield _build_solid(body)
         return
-    where = f"scene: {body.name}"
+    where = f"scene: {body.name}: {body.urdf}"
     path = Path(body.urdf)
-    text = read_text(path, where=f"{where}.urdf", folder=Path.cwd())
-    tree = read_tree(text, str(path))
+    tree = read_tree(read_text(path, where=where, folder=Path.cwd()), where)
     placed = {tree.downward[0]: placement_matrix(body.placement)}
     for link in tree.downward[1:]:
         joint = tree.joints[tree.above[link]]
         if joint.get("type") != "fixed":
             raise TaskError(
-                "a cell of a scene stands still",
+                "a joint of the cell moves",
                 where=where,
                 found=f"joint {joint.get('name')!r} of type {joint.get('type')}",
                 allowed="fixed joints",
+                hint="Fix the joint, or leave out what it moves",
             )
         placed[link] = placed[end_of(joint, "parent")] @ origin_of(joint, "origin")
-    for solid in read_solids(tree, path.absolute().parent, {}):
+    solids = list(read_solids(tree, path.absolute().parent, {}))
+    if not solids:
+        raise TaskError(
+            "the cell has no collision geometry",
+            where=where,
+            found="no <collision>",
+            allowed="a URDF with <collision> elements",
+        )
+    for solid in solids:
         placement = placed[str(solid.link)] @ solid.placement
         name = f"{body.name}: {solid.name}"
         yield Solid(name, body.link, solid.geometry, placement)

@@ -351,7 +351,7 @@ def explain_no_motion(
 def _explain_dead_ends(
     task: Task, dead_ends: Mapping[str, DeadEnd], more: str
 ) -> Failure:
-    """Say where the lattice ends that has the longest way."""
+    """Say where the lattice ends that reached farthest."""
     name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
     own = name if name == ALL_POSTURES else f"redundant joints {name}"
     others = f" ({own}; the furthest of {len(dead_ends)} lattices)"
@@ -371,8 +371,8 @@ def explain_time_limit(
 ) -> Failure:
     """Say that the time was up, and what was not completed; where a lattice ended, if one did."""
     if dead_ends:
-        limit = f"{task.search.time_limit:g} s"
-        more = f". Not every lattice was searched within {limit}: raise search.time_limit to search them all"
+        limit = f"within the time limit of {task.search.time_limit:g} s"
+        more = f". Not all was done {limit}: {'; '.join(not_completed)}: raise search.time_limit"
         return _explain_dead_ends(task, dead_ends, more)
     return Failure(
         f"no motion was found within the time limit of {task.search.time_limit:g} s: {'; '.join(not_completed)}",

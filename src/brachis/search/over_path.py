@@ -106,7 +106,10 @@ def improve_guess(
 
 
 def _centre(better: BetterGuess) -> BetterGuess:
-    """Lay the same chart around the better joint path: the search for a posture then begins beside it."""
+    """Lay the same chart around the better joint path: the search for a posture then begins beside it.
+
+    Its coordinates stay, and so do the timings that were found.
+    """
     start = better.start
     chart = start.joint_map
     assert isinstance(chart, ChartMap)
@@ -114,10 +117,13 @@ def _centre(better: BetterGuess) -> BetterGuess:
     q = chart.postures(start.joint_path)
     if not np.isfinite(q).all():
         return better
-    centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
-    start = dataclasses.replace(start, joint_map=centred)
     grids = [phase.grid for phase in better.program.phases]
-    program = program_over(start.problem, start.maps_by_leg(), grids)
+    try:
+        centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
+        start = dataclasses.replace(start, joint_map=centred)
+        program = program_over(start.problem, start.maps_by_leg(), grids)
+    except UnreachableError:
+        return better
     return dataclasses.replace(better, start=start, program=program)
 
 

@@ -51,6 +51,8 @@ _COMPARED = 49
 """Even times, or places, at which motions of a phase are compared."""
 _SAME_LATER = 4e-3
 """Part of the end time by which a rough answer may be later, and be the same motion."""
+_GAINS_MORE = 0.998
+"""Factor by which another candidate may gain more by better knots than those so far."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 
@@ -244,11 +246,10 @@ class Search:
             failure = explain_speeds(starts, are_tried=True)
         if failure is None and (self.interrupted or self._is_cut_short()):
             self.interrupted = True
-            has_joint_path = any(each.start for each in self.candidates)
             failure = explain_time_limit(
                 self._problem.task,
                 self.not_completed(),
-                {} if has_joint_path else self._dead_ends,
+                {} if starts else self._dead_ends,
             )
         return failure or explain_no_motion(
             self._problem,
@@ -377,7 +378,7 @@ class Search:
             return
         if not candidate.keeps_knots:
             # Better knots shorten a motion: others may gain a little more by them than any one so far.
-            gain = 0.998 * candidate.t_end / candidate.coarse
+            gain = _GAINS_MORE * candidate.t_end / candidate.coarse
             self._gain = min(self._gain, gain)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
             self.best = candidate

@@ -86,7 +86,7 @@ def _improve(
         return hopeless
     problem = start.problem
     (backend,) = solvers_for(solvers_of(problem)[0])
-    session = SolverSession(backend, SolverOptions(), deadline)
+    session = SolverSession(backend, SolverOptions(time_limit=np.inf), deadline)
     try:
         maps = start.maps_by_leg()
         program = program_of(problem, maps, [breaks_of(problem)] * len(maps))

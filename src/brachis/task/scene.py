@@ -84,7 +84,7 @@ class SceneBody(Model):
 
     @property
     def size(self) -> float:
-        """Largest length that its shape states, m; 0 of a mesh."""
+        """Largest length that its shape states, m; 0 of a mesh and of a URDF."""
         shape = getattr(self, self.shape)
         if isinstance(shape, Round):
             return max(shape.radius, shape.length)

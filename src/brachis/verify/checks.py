@@ -74,8 +74,12 @@ def check_ends(given: Given) -> list[Check]:
             nearest = _move_onto(wanted, given.task_map, target)
             miss = trajectory.position(time) - nearest
             allowed = given.options.posture_tolerance
-            found = (miss[None], np.array([time]), "position", allowed)
-            checks.append(check_joints(given, f"{name} posture", *found))
+            at = np.array([time])
+            checks.append(
+                check_joints(
+                    given, f"{name} posture", miss[None], at, "position", allowed
+                )
+            )
         if boundary.periodic:
             continue
         if speed:
@@ -137,8 +141,9 @@ def check_splines(given: Given) -> list[Check]:
     joints = [names.index(name) for name in trajectory.redundant_joints]
     misses = np.zeros_like(states.q)
     misses[:, joints] = trajectory.redundant_spline(states.t) - states.q[:, joints]
-    found = (misses, states.t, "position", given.options.spline_tolerance)
-    return [check_joints(given, "redundant joints' splines", *found)]
+    allowed = given.options.spline_tolerance
+    name = "redundant joints' splines"
+    return [check_joints(given, name, misses, states.t, "position", allowed)]
 
 
 def check_continuity(given: Given) -> list[Check]:

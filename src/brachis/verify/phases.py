@@ -45,8 +45,8 @@ def check_stops(given: Given) -> list[Check]:
     derivatives = (states.qdot, states.qddot, states.qdddot / (1.0 + jerks))
     resting = zip(derivatives_at_rest(given), derivatives, strict=False)
     for (name, kind, allowed), values in resting:
-        found = (values, states.t, kind, allowed)
-        checks.append(check_joints(given, f"{name} at stops", *found))
+        title = f"{name} at stops"
+        checks.append(check_joints(given, title, values, states.t, kind, allowed))
     moved = [
         given.during(phase.begin, phase.end).states
         for leg in stops
@@ -55,8 +55,9 @@ def check_stops(given: Given) -> list[Check]:
     if moved:
         speeds = np.concatenate([each.qdot for each in moved])
         times = np.concatenate([each.t for each in moved])
-        found = (speeds, times, "velocity", options.rest_velocity_tolerance)
-        checks.append(check_joints(given, "velocity in dwells", *found))
+        allowed = options.rest_velocity_tolerance
+        title = "velocity in dwells"
+        checks.append(check_joints(given, title, speeds, times, "velocity", allowed))
     return checks
 
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @of_motion
 def plot_motion(trajectory: Trajectory) -> Figure:
-    """Plot q, dq/dt, s and the tool's speed in panels over one time axis; joints in rad and in m are apart.
+    """Plot q, dq/dt, s, the tool's speed and the smallest distance of bodies over one time axis.
 
     Parameters
     ----------

@@ -167,9 +167,9 @@ class Row:
     largest : callable or None
         Of trajectory and samples: the largest values that the task allows, (K,).
     smallest : callable or None
-        Of the trajectory: the smallest value that the task allows.
+        Takes the trajectory: the smallest value that the task allows.
     name : str
-        Of the curve.
+        Name of the curve, where there is one.
     ends : (float or None, float or None)
         See `Panel`.
     """

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     Layer = list[viser.SceneNodeHandle]
 
+_RED = (200, 30, 30)
+"""Colour of the line between the closest bodies."""
 LAYERS = (
     "robot",
     "skeleton",
@@ -78,8 +80,9 @@ class Scene:
         self._draw_path()
         self._draw_trace()
         self.cell = self._draw_ground()
-        self._distances = scene_of(self._robot, trajectory.task)
-        if self._distances is not None and len(self._distances.pairs):
+        self._cell = scene_of(self._robot, trajectory.task)
+        self._chain = Chain.of(self._robot.model)
+        if self._cell is not None and len(self._cell.pairs):
             self._draw_closest()
         else:
             del self.layers["closest pair"]
@@ -107,7 +110,7 @@ class Scene:
         line = self._api.add_line_segments(
             "/closest/line",
             np.zeros((1, 2, 3)),
-            (200, 30, 30),
+            _RED,
             thickness=3.0,
             thickness_units="screen",
         )
@@ -116,14 +119,15 @@ class Scene:
 
     def _show_closest(self, q: np.ndarray) -> None:
         """Move the line to the closest bodies in a posture, (n,), and write their distance."""
-        scene = self._distances
-        assert scene is not None
-        found = scene.find_closest(Chain.of(self._robot.model).place(q[None]))
+        cell = self._cell
         line, label = self.layers["closest pair"]
+        if cell is None or not line.visible:
+            return
+        found = cell.find_closest(self._chain.place(q[None]))
         line.points = found.points
         label.position = found.points[0].mean(axis=0)
         distance = 1e3 * found.distance[0]
-        label.text = f"{scene.names(found.pair[0])}: {distance:.1f} mm"
+        label.text = f"{cell.names(found.pair[0])}: {distance:.1f} mm"
 
     def _frame(self, name: str, part: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""

@@ -28,8 +28,7 @@ def scene_meshes(trajectory: Trajectory) -> Meshes:
     meshes: Meshes = {}
     if found is None:
         return meshes
-    own = len(found.solids) - len(task.scene)
-    for number, solid in enumerate(found.solids[own:], own):
+    for number, solid in enumerate(found.solids[found.own :], found.own):
         mesh = _mesh_of(solid)
         mesh.apply_transform(found.placements[number])
         meshes.setdefault(int(found.joints[number]), []).append(mesh)
