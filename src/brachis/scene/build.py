@@ -105,12 +105,16 @@ def _find_hazards(
 
     Links that a joint joins may touch, and so may those that overlap in every one of many random postures.
     """
+    own = np.flatnonzero(within)
+    others = np.flatnonzero(~within)
+    if not task.collisions.self_collision:
+        return others
     joined = {
         frozenset((end_of(joint, "parent"), end_of(joint, "child")))
         for joint in tree.joints.values()
     }
     links = [
-        frozenset(scene.solids[i].link or "" for i in pair) for pair in scene.pairs
+        frozenset(scene.solids[i].link or "" for i in pair) for pair in scene.pairs[own]
     ]
     are_joined = np.array([pair in joined for pair in links], dtype=bool)
     limits = robot.limits
@@ -118,12 +122,10 @@ def _find_hazards(
     low = np.where(np.isfinite(limits.position_lower), limits.position_lower, -half)
     high = np.where(np.isfinite(limits.position_upper), limits.position_upper, half)
     q = np.random.default_rng(0).uniform(low, high, (_POSTURES, robot.n))
-    close = scene.find_close(Chain.of(robot.model).place(q), 0.0)
-    counts = np.bincount(close.pair, minlength=len(scene.pairs))
-    dropped = within & (are_joined | (counts == _POSTURES))
-    if not task.collisions.self_collision:
-        dropped |= within
-    return np.flatnonzero(~dropped)
+    close = scene.with_pairs(own).find_close(Chain.of(robot.model).place(q), 0.0)
+    counts = np.bincount(close.pair, minlength=len(own))
+    kept = own[~are_joined & (counts < _POSTURES)]
+    return np.sort(np.concatenate([kept, others]))
 
 
 def _read_srdf(srdf: str | None) -> list[tuple[str, str]]:
