@@ -98,7 +98,7 @@ def test_a_motion_along_a_branch_boundary_is_verified_too():
     result = brachis.plan(robot(), task("j3", intervals="auto"))
     assert result.verified
     assert result.t_end < 2.335
-    assert len(result.trajectory.times) < 2000
+    assert len(result.trajectory.times) < 1500
 
 
 def test_intervals_are_refined_where_the_motion_switches(solved):

@@ -64,11 +64,12 @@ def test_slopes_agree_with_differences(programs):
 def test_answers_are_as_fast_as_their_timings(programs):
     found, result = programs
     intervals = [len(program.phases[0].breaks) - 1 for program, _ in found]
-    # It ends with the level that gains less than twice the tolerance.
-    assert {16, 32} <= set(intervals) <= {16, 32, 64, 128, 256}
+    # It ends with the level that gains less than the tolerance.
+    assert {16, 32, 64} <= set(intervals) <= {16, 32, 64, 128, 256}
     for (program, x), count in zip(found, intervals, strict=True):
         timing = retiming.least_time(program.timings(x, 4000))
-        assert timing == pytest.approx(program.objective(x), rel=0.3 / count)
+        nearly = 1e-2 if count == 16 else 2e-3
+        assert timing == pytest.approx(program.objective(x), rel=nearly)
     # Splines may be slower by the tolerance.
     assert result.t_end == pytest.approx(timing, rel=1e-3)
 

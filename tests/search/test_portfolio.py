@@ -19,7 +19,7 @@ import brachis
 from brachis.apps.plots import plot_candidates
 from brachis.common import tolerances
 from brachis.common.deadline import Deadline
-from brachis.errors import PlanningError, TaskError, UnknownNameError
+from brachis.errors import PathError, PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.optimise.backends import child_process, uno
 from brachis.problem.problem import Problem, decompositions_of
@@ -593,3 +593,21 @@ def test_no_processes_are_started_where_little_time_is_left():
         == min(2, os.cpu_count() or 1)
     )
     assert process_count(2, Deadline.after(1.0)) == 1
+
+
+def test_a_search_without_time_says_where_its_lattices_ended(robot, clock):
+    tool = robot.tool_placement(START).translation
+    post = brachis.Cylinder(0.1, 1.0, name="post", position=[tool[0] - 0.6, tool[1], 0])
+    calls = clock.jump(schedule, "_guess_on_some_branches", at=1)
+    with pytest.raises(PathError, match=r"post .*search\.time_limit") as refused:
+        brachis.plan(
+            robot,
+            start=START,
+            task_space=["x", "y"],
+            path=[brachis.Line(by=[-1.2, 0.0])],
+            scene=[post],
+            collisions={"self_collision": False},
+        )
+    assert len(calls) == 1
+    first, last = refused.value.s_interval
+    assert first < 0.5 < last

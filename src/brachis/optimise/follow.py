@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from brachis.common.arrays import spread
+from brachis.common.arrays import interpolate_columns, spread
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.limits import Limit, Moments
@@ -146,6 +146,7 @@ def follow(
         is_last = is_last or number == _MESHES
         allowed = np.inf if is_last else tolerance
         laid = _hold_limits(phase, own, timing, breaks, allowed, deadline)
+        laid = _look_at_postures(phase, laid)
         if best is None or laid.is_better_than(best):
             best = laid
         is_fast = laid.slower < tolerance
@@ -233,6 +234,25 @@ def _as_phase(phase: Phase, motion: Motion, points: int) -> tuple[Phase, np.ndar
     return finer, finer.variables_from(motion)
 
 
+def _look_at_postures(phase: Phase, laid: Laid) -> Laid:
+    """Find out how far splines are outside of limits on postures, where their other limits are known."""
+    if not np.isfinite(laid.violation):
+        return laid
+    motion = laid.motion
+    t = spread(np.unique(motion.knots), _LOOKS[-1]) * motion.t_end
+    try:
+        state = phase.joint_map.state(*motion.at(t), t=t)
+    except UnreachableError:
+        return replace(laid, outside=np.inf)
+    still = Moments.at_rest(state.q)
+    beyond = [
+        limit.violation(limit.values(still)).max()
+        for limit in phase.limits
+        if is_of_postures(limit)
+    ]
+    return replace(laid, outside=max(beyond, default=0.0))
+
+
 def _hold_limits(
     phase: Phase,
     own: PhaseTiming,
@@ -242,34 +262,6 @@ def _hold_limits(
     deadline: Deadline,
 ) -> Laid:
     """Lay splines until the limits hold, or until they are slower by more than a part `allowed` of the time."""
-    best = _narrow_until_they_hold(phase, own, fastest, breaks, allowed, deadline)
-    if not np.isfinite(best.violation):
-        return best
-    t = spread(np.unique(best.motion.knots), _LOOKS[-1]) * best.motion.t_end
-    try:
-        state = phase.joint_map.state(*best.motion.at(t), t=t)
-    except UnreachableError:
-        return replace(best, outside=np.inf)
-    still = Moments.at_rest(state.q)
-    beyond = [
-        limit.violation(limit.values(still)).max()
-        for limit in phase.limits
-        if is_of_postures(limit)
-    ]
-    return replace(best, outside=max(beyond, default=0.0))
-
-
-def _narrow_until_they_hold(
-    phase: Phase,
-    own: PhaseTiming,
-    fastest: Timing,
-    breaks: np.ndarray,
-    allowed: float,
-    deadline: Deadline,
-) -> Laid:
-    """Lay splines, and narrow the limits that a longer time relieves where they exceed them; see `_hold_limits`."""
-    from scipy.interpolate import interp1d
-
     most_acceleration = largest_acceleration(fastest)
     limits = [
         limit
@@ -286,12 +278,12 @@ def _narrow_until_they_hold(
     for _ in range(_ROUNDS):
         t_norm = np.union1d(spread(breaks, looks), timing.times / timing.t_end)
         t = t_norm * motion.t_end
-        near = None if known is None else known(t_norm)
+        near = None if known is None else interpolate_columns(t_norm, *known)
         try:
             state = phase.joint_map.state(*motion.at(t), t=t, near=near)
         except UnreachableError:
             return best
-        known = interp1d(t_norm, state.q, axis=0)
+        known = (t_norm, state.q)
         beyond = {
             limit: limit.violation(limit.values(state)).clip(0.0) for limit in limits
         }

@@ -45,8 +45,6 @@ _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
 _ENOUGH = 5e-5
 """Violation of them that is small enough."""
-_FALLS = 2.0
-"""A level gains less than the one before by this factor, about."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -272,7 +270,7 @@ def improve_joint_paths(
         if best.swings and ahead == HALF_WAY and not solve.deadline.passed:
             ahead = POINTS_OF_GAUSS
             best = solve_level(best, ahead)
-        if not best.is_credible or best.t_end > before * (1.0 - _FALLS * tolerance):
+        if not best.is_credible or best.t_end > before * (1.0 - tolerance):
             break
     return best
 

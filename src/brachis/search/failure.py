@@ -367,10 +367,13 @@ def _explain_dead_ends(
 
 
 def explain_time_limit(
-    task: Task, not_completed: Sequence[str], dead_ends: Mapping[str, DeadEnd]
+    task: Task,
+    not_completed: Sequence[str],
+    candidates: Sequence[Candidate],
+    dead_ends: Mapping[str, DeadEnd],
 ) -> Failure:
-    """Say that the time was up, and what was not completed; where a lattice ended, if one did."""
-    if dead_ends:
+    """Say that the time was up, and what was not completed; where lattices ended, if none has a joint path."""
+    if dead_ends and not _has_joint_path(candidates):
         limit = f"within the time limit of {task.search.time_limit:g} s"
         more = f". Not all was done {limit}: {'; '.join(not_completed)}: raise search.time_limit"
         return _explain_dead_ends(task, dead_ends, more)

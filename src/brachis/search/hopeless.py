@@ -1,4 +1,4 @@
-"""Refuse what no motion along the known joint paths can hold: means of loads, and speeds.
+"""Refuse what no motion along the known joint paths can hold: limits on postures, means of loads, and speeds.
 
 Speeds are given for parts of the path and for its ends. Without friction, where the limits allow a motion and the arm
 can hold its postures, they allow the same motion at a lower speed: (u, x) lies between it and rest (see
@@ -24,7 +24,8 @@ import numpy as np
 from brachis.errors import Remedy
 from brachis.limits import Limit, Moments
 from brachis.optimise.candidate import InitialGuess
-from brachis.problem.feasibility import load_remedies
+from brachis.optimise.phase import is_of_postures
+from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
 from brachis.search.phase_plane import (
@@ -71,6 +72,66 @@ def _has_friction(problem: Problem) -> np.ndarray:
     """Tell which joints have friction, (n,) bool."""
     friction = problem.robot.friction
     return np.asarray(friction.viscous + friction.coulomb > 0.0)
+
+
+class Beyond(NamedTuple):
+    """A limit that the arm exceeds at rest along a joint path: the largest violation, and what to say of it."""
+
+    violation: float
+    failure: Failure
+
+
+def explain_beyond(
+    problem: Problem, limit: Limit, s: np.ndarray, q: np.ndarray
+) -> Beyond | None:
+    """Tell where, and by how much, the arm at rest is beyond a limit along a joint path; None: nowhere.
+
+    Parameters
+    ----------
+    problem : Problem
+    limit : Limit
+    s : (S,) ndarray
+        Path coordinates, ascending.
+    q : (S, n) ndarray
+        Postures there, rad or m.
+    """
+    values, beyond = beyond_at_rest(limit, q, problem.task.refinement.tolerance)
+    station, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    worst = float(beyond[station, column])
+    if worst <= 0.0:
+        return None
+    where = s[beyond[:, column] > 0.0]
+    label = limit.labels[column]
+    found, allowed = in_figures(limit, int(column), float(values[station, column]))
+    failure = Failure(
+        f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
+        phase="path",
+        s_interval=(float(where[0]), float(where[-1])),
+        where="path",
+        found=f"{found}{label.after} at s = {s[station]:.3g}",
+        needed=f"{allowed}{label.after}",
+        hint="Move the path",
+        remedies=load_remedies(problem.robot, limit, int(column), 1.0 + worst),
+    )
+    return Beyond(worst, failure)
+
+
+def explain_postures(starts: Sequence[InitialGuess]) -> Failure | None:
+    """Tell which limit on postures stands in the way, if all joint paths exceed one: along the nearest of them."""
+    nearest: list[Beyond] = []
+    for start in starts:
+        q = postures_along(start, _S)
+        if q is None:
+            continue
+        of_postures = filter(is_of_postures, start.problem.limits)
+        found = [explain_beyond(start.problem, limit, _S, q) for limit in of_postures]
+        exceeded = [each for each in found if each is not None]
+        if not exceeded:
+            return None
+        nearest.append(max(exceeded, key=lambda each: each.violation))
+    if not nearest:
+        return None
+    return min(nearest, key=lambda each: each.violation).failure
 
 
 class _Load(NamedTuple):

@@ -37,7 +37,7 @@ from brachis.search.failure import (
     explain_time_limit,
 )
 from brachis.search.given_motion import GIVEN, given_guess
-from brachis.search.hopeless import explain_holding, explain_speeds
+from brachis.search.hopeless import explain_holding, explain_postures, explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.search.schedule import Batch, batches
@@ -243,13 +243,15 @@ class Search:
         starts = [each.start for each in self.candidates if each.start is not None]
         failure = explain_holding(starts)
         if failure is None and starts:
-            failure = explain_speeds(starts, are_tried=True)
+            failure = explain_postures(starts)
+            failure = failure or explain_speeds(starts, are_tried=True)
         if failure is None and (self.interrupted or self._is_cut_short()):
             self.interrupted = True
             failure = explain_time_limit(
                 self._problem.task,
                 self.not_completed(),
-                {} if starts else self._dead_ends,
+                self.candidates,
+                self._dead_ends,
             )
         return failure or explain_no_motion(
             self._problem,

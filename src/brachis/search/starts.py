@@ -27,13 +27,11 @@ from brachis.kinematics import (
 )
 from brachis.limits import Limit, Role
 from brachis.optimise.candidate import InitialGuess
-from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.closed_form_lattice import ClosedFormLattice, cell_sizes
 from brachis.search.differential_ik import differential_ik_paths
-from brachis.search.failure import Failure
-from brachis.search.hopeless import refuse_hopeless
+from brachis.search.hopeless import explain_beyond, refuse_hopeless
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
 from brachis.search.phase_plane import (
@@ -400,7 +398,9 @@ def joint_space_start(problem: Problem) -> InitialGuess:
         # In motion an arm may pass postures that it cannot hold.
         is_needed = not is_passed or limit.longer_time != "relieves"
         if limit.at_rest != "nothing" and is_needed:
-            _refuse_beyond(problem, limit, s, q)
+            beyond = explain_beyond(problem, limit, s, q)
+            if beyond is not None:
+                raise beyond.failure.error()
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if not is_passed:
         return InitialGuess(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
@@ -412,32 +412,6 @@ def joint_space_start(problem: Problem) -> InitialGuess:
     return InitialGuess(
         problem, joint_map, motion, estimate, FAMILY, FAMILY, durations=durations
     )
-
-
-def _refuse_beyond(
-    problem: Problem, limit: Limit, s: np.ndarray, q: np.ndarray
-) -> None:
-    """Refuse a path along which the arm at rest is beyond a limit."""
-    values, beyond = beyond_at_rest(limit, q, problem.task.refinement.tolerance)
-    station, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
-    worst = float(beyond[station, column])
-    if worst <= 0.0:
-        return
-    where = s[beyond[:, column] > 0.0]
-    label = limit.labels[column]
-    found, allowed = in_figures(limit, int(column), float(values[station, column]))
-    remedies = load_remedies(problem.robot, limit, int(column), 1.0 + worst)
-    failure = Failure(
-        f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
-        phase="path",
-        s_interval=(float(where[0]), float(where[-1])),
-        where="path",
-        found=f"{found}{label.after} at s = {s[station]:.3g}",
-        needed=f"{allowed}{label.after}",
-        hint="Move the path",
-        remedies=remedies,
-    )
-    raise failure.error()
 
 
 def first_maps(

@@ -28,17 +28,17 @@ if TYPE_CHECKING:
     import viser
     from viser import uplot
 
-# Pixels of a plot, and of what is left, right, above and below of the curves in it.
-_HEIGHT = 165
-_LEFT = 40
-_RIGHT = 12
-_ABOVE = 6
-_BELOW = 44
-_LABEL = 16  # of the part below
-# Pixels that viser leaves free around a plot; a test measures them.
-_OUTSIDE_LEFT = 9.5
-_OUTSIDE = 18.5  # on both sides together
-_OUTSIDE_BELOW = 12
+_PIXELS = {
+    "height": 165,  # of a plot
+    "left": 40,  # of the curves in it, and so on
+    "right": 12,
+    "above": 6,
+    "below": 44,
+    "label": 16,  # of the part below
+    "outside left": 9.5,  # what viser leaves free around a plot; a test measures it
+    "outside": 18.5,  # on both sides together
+    "outside below": 12,
+}
 _FONT = "11px sans-serif"
 
 
@@ -94,17 +94,17 @@ class Chart:
             axes=(
                 {
                     "font": _FONT,
-                    "size": _BELOW - _LABEL,
+                    "size": _PIXELS["below"] - _PIXELS["label"],
                     "label": "time (s)",
-                    "labelSize": _LABEL,
+                    "labelSize": _PIXELS["label"],
                     "labelFont": _FONT,
                 },
-                {"font": _FONT, "size": _LEFT},
+                {"font": _FONT, "size": _PIXELS["left"]},
             ),
             legend={"show": False},
             cursor={"drag": {"x": False, "y": False, "setScale": False}},
-            height=_HEIGHT,
-            padding=(_ABOVE, _RIGHT, 0, 0),
+            height=_PIXELS["height"],
+            padding=(_PIXELS["above"], _PIXELS["right"], 0, 0),
         )
         self._line = gui.add_html(_line(0.0))
 
@@ -128,11 +128,11 @@ def _series(
 
 def _line(part: float) -> str:
     """Line over the plot above it, at a part of its width; a plot whose data are replaced so often would blink."""
-    before = _OUTSIDE_LEFT + _LEFT
-    around = _OUTSIDE + _LEFT + _RIGHT
+    before = _PIXELS["outside left"] + _PIXELS["left"]
+    around = _PIXELS["outside"] + _PIXELS["left"] + _PIXELS["right"]
     left = f"calc({before}px + {part:.5f} * (100% - {around}px))"
-    bottom = _BELOW + _OUTSIDE_BELOW
-    height = _HEIGHT - _ABOVE - _BELOW
+    bottom = _PIXELS["below"] + _PIXELS["outside below"]
+    height = _PIXELS["height"] - _PIXELS["above"] - _PIXELS["below"]
     place = f"left:{left};bottom:{bottom}px;height:{height}px"
     style_now = f"position:absolute;z-index:5;width:1.5px;background:#D00000;{place}"
     return (

@@ -1,0 +1,66 @@
+"""What a search says of bodies in the way of all joint paths that it knows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import PathError
+from brachis.kinematics import JointSpaceMap
+from brachis.optimise.candidate import InitialGuess
+from brachis.problem.problem import Problem
+from brachis.robot.from_task import robot_for
+from brachis.search.hopeless import explain_postures
+from brachis.task import load_task
+
+SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
+FIRST = [0.5, -1.5, 0.5]
+LAST = [1.1, -1.5, 0.5]
+
+
+def guess(*posts):
+    """Make a guess that turns the first joint, past posts at some of its angles."""
+    robot = brachis.Robot.from_urdf(SCARA)
+    middles = [robot.tool_placement([angle, *FIRST[1:]]) for angle in posts]
+    scene = [
+        {
+            "name": f"post {k}",
+            "cylinder": {"radius": 0.05, "length": 1.0},
+            "position": middle.translation.tolist(),
+        }
+        for k, middle in enumerate(middles)
+    ]
+    task = load_task(
+        {
+            "brachis": 1,
+            "robot": {"urdf": str(SCARA)},
+            "start": {"joints": FIRST},
+            "task_space": "joints",
+            "path": [{"spline": {"through": [LAST]}}],
+            "scene": scene,
+            "collisions": {"self_collision": False},
+        }
+    )
+    problem = Problem.of(robot_for(None, task.robot), task)
+    s = np.linspace(0.0, 1.0, 11)[:, None]
+    joint_map = JointSpaceMap(problem.robot, problem.path)
+    return InitialGuess(problem, joint_map, s, np.inf, "path of joints", "")
+
+
+def test_the_nearest_of_joint_paths_that_all_hit_something_is_explained():
+    failure = explain_postures([guess(0.8, 0.95), guess(0.8)])
+    first, last = failure.s_interval
+    assert "post 0" in failure.cause
+    assert 0.3 < first < 0.5 < last < 0.7
+    assert " m at s = 0." in failure.found
+    with pytest.raises(PathError, match="post 0"):
+        raise failure.error()
+
+
+def test_nothing_is_explained_where_one_joint_path_is_free():
+    beside = guess(2.5)
+    assert explain_postures([guess(0.8), beside]) is None
+    assert explain_postures([]) is None
