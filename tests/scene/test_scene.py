@@ -269,6 +269,24 @@ def test_only_pairs_that_come_close_are_kept():
     assert limit.restrict_to(q[:0]) is None
 
 
+def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
+    given = task()
+    robot = robot_for(None, given.robot)
+    limit = build_clearance(robot, given)
+    q = postures(robot)
+    distances = limit.values(Moments.at_rest(q))
+    apart = np.argmax(distances.min(axis=1))
+    added = limit.keep_inside(q[[apart]]).lower - limit.lower
+    room = distances[apart] - limit.lower
+    np.testing.assert_allclose(added, np.clip(room, 0.0, limit.inset), atol=1e-12)
+    close = np.argmin(distances.min(axis=1))
+    column = np.argmin(distances[close])
+    assert distances[close, column] < limit.lower[column]
+    narrower = limit.keep_inside(q[[apart, close]])
+    assert narrower.lower[column] == limit.lower[column]
+    assert added.max() == pytest.approx(limit.inset)
+
+
 @pytest.mark.parametrize(
     ("body", "says"),
     [

@@ -86,8 +86,8 @@ def interpolate(
     UnreachableError
         The motion leaves the branch between the breaks.
     """
-    # Four pieces in the longest interval; shorter ones have fewer: rounding shows in the jerk of short pieces.
-    steps = np.ceil(4 * np.diff(breaks) / np.diff(breaks).max()).astype(int)
+    # Two pieces in the longest interval; shorter ones have one: rounding shows in the jerk of short pieces.
+    steps = np.ceil(2 * np.diff(breaks) / np.diff(breaks).max()).astype(int)
     pieces = [
         np.linspace(a, b, n, endpoint=False)
         for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)

@@ -235,7 +235,7 @@ class Description:
         Violation of a value that is beyond its bound by 1 (see the module).
     inset : (c,) ndarray or float
         By how much joint paths keep inside the bounds of a limit on postures, as a violation: splines leave them
-        by a little.
+        by a little. 0 where that is not known.
     refusal : str
         What a message says of an arm at rest beyond the limit, after "the ... limit".
     """
@@ -251,7 +251,7 @@ class Description:
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     violation_scale: np.ndarray | float = 1.0
-    inset: np.ndarray | float = 1e-3
+    inset: np.ndarray | float = 0.0
     refusal: str = "is exceeded at rest"
 
     @property
@@ -318,6 +318,17 @@ class Limit(Description, ABC):
             other.lower = self.lower - step
         if bound.side != "lower":
             other.upper = self.upper + step
+        return other
+
+    def keep_inside(self, ends: np.ndarray) -> Self:
+        """Return the limit with bounds that are narrower by its inset, as far as postures, (K, n), leave room."""
+        ends = ends[np.isfinite(ends).all(axis=1)]
+        beyond = self.violation(self.values(Moments.at_rest(ends)))
+        room = -beyond.max(axis=0, initial=-np.inf)
+        by = np.clip(room, 0.0, self.inset) / self.violation_scale
+        other = copy.copy(self)
+        other.lower = self.lower + by
+        other.upper = self.upper - by
         return other
 
     def violation(self, values: np.ndarray) -> np.ndarray:

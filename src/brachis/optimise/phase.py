@@ -12,7 +12,6 @@ Slopes of the limits by y and its derivatives come from the `evaluator`.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -174,11 +173,18 @@ class Phase:
         return [limit for limit in restricted if limit is not None]
 
     def restrict_to(self, curves: np.ndarray) -> Phase:
-        """Return the same phase with `limits_near` curves, (S, c)."""
+        """Return the same phase with `limits_near` curves, (S, c).
+
+        Where postures are free, limits on them are narrowed by their inset: splines are laid along the motion later.
+        """
         limits = self.limits_near(curves)
-        pairs = itertools.zip_longest(limits, self.limits)
-        is_same = all(own is other for own, other in pairs)
-        return self if is_same else self.with_limits(limits)
+        if self.joint_map.r:
+            ends = self.joint_map.postures(curves[[0, -1]])
+            limits = [
+                limit.keep_inside(ends) if is_of_postures(limit) else limit
+                for limit in limits
+            ]
+        return self.with_limits(limits)
 
     def with_margin(self, margin: float) -> Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""

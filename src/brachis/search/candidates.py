@@ -198,12 +198,16 @@ def _finish_over_path(
     least = np.inf
     if other.usable:
         adapted = adapt_mesh(adapted, session, spline, options)
-        timings = time_phases(adapted.program, adapted.x)
+        pairs = zip(adapted.program.phases, program.phases, strict=True)
+        whole = adapted.program.with_phases(
+            own.with_limits(first.limits) for own, first in pairs
+        )
+        timings = time_phases(whole, adapted.x)
         least = least_time(timings)
     if done is None and found.t_end < least:
         done = plan_timing(candidate, program, found.timings, reports, options)
     elif other.usable:
-        done = plan_timing(other, adapted.program, timings, adapted.reports, options)
+        done = plan_timing(other, whole, timings, adapted.reports, options)
     if done is not None and (done.is_settled or not other.usable):
         return done
     session = dataclasses.replace(session, deadline=options.deadline)

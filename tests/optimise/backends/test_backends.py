@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import brachis
 from brachis.errors import UnknownNameError, UnreachableError
 from brachis.optimise.backends import (
     AUTO_ORDER,
@@ -20,6 +25,7 @@ from brachis.optimise.backends import (
 from brachis.optimise.backends.monitor import SolveMonitor
 from support.programs import bounded, corner, curved, disc, impossible
 
+ROOT = Path(__file__).parents[3]
 OPTIONS = SolverOptions()
 MULTIPLIERS = ("uno", "ipopt")
 
@@ -268,3 +274,27 @@ def test_bounds_that_are_not_numbers(name):
         name, dataclasses.replace(disc(), upper=np.array([np.nan])), [4.0, 0.5]
     )
     assert report.status is SolveStatus.EVALUATION_ERROR
+
+
+PLAN = """
+import brachis
+line = brachis.load_task("examples/01_scara_line.yaml")
+if {others_first}:
+    brachis.plan(line, redundant_joints=["j1"], intervals=10)
+print(repr(brachis.plan(line, redundant_joints=["j3"], intervals=20).t_end))
+"""
+
+
+def test_an_answer_does_not_depend_on_what_the_process_solved_before():
+    def plan(others_first):
+        done = subprocess.run(
+            [sys.executable, "-c", PLAN.format(others_first=others_first)],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(Path(brachis.__file__).parents[1])},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout
+
+    assert plan(others_first=True) == plan(others_first=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ _STOPPED = {
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
+    _solve_first_problem()
     with monitor:
         for radius, scaled in _RESTARTS:
             units = _units(monitor.problem, x) if scaled else np.ones(len(x))
@@ -60,6 +62,39 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     message = f"{ending.lower()}, {found.lower()}"
     multipliers = np.array(result.constraint_dual_solution)
     return monitor.report(NAME, status, x, multipliers, message)
+
+
+@cache
+def _solve_first_problem() -> None:
+    """Minimise x^2, once in a process.
+
+    Rounding within Uno depends on the first problem that a process has solved: without this one, answers would
+    differ with what was planned before them.
+    """
+    import unopy
+
+    def write_slope(point: np.ndarray, out: np.ndarray) -> None:
+        out[:] = 2.0 * np.array(point)
+
+    model = unopy.Model(
+        unopy.PROBLEM_NONLINEAR, 1, [-1.0], [1.0], unopy.ZERO_BASED_INDEXING
+    )
+    model.set_objective(unopy.MINIMIZE, lambda point: float(point[0] ** 2), write_slope)
+    model.set_initial_primal_iterate([0.5])
+    _backend({}).optimize(model)
+
+
+def _backend(settings: dict[str, Any]) -> Any:
+    """Uno's own solver with settings, silent."""
+    import unopy
+
+    backend = unopy.UnoSolver()
+    backend.set_preset("filtersqp")
+    backend.set_logger_stream(io.StringIO())  # Uno would print to standard output
+    silent = {"logger": "SILENT", "print_solution": False}
+    for key, value in (silent | settings).items():
+        backend.set_option(key, value)
+    return backend
 
 
 def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
@@ -148,19 +183,13 @@ def _run(
         scale(monitor.jacobian, units[problem.jacobian_columns]),
     )
     model.set_initial_primal_iterate((x / units).tolist())
-    backend = unopy.UnoSolver()
-    backend.set_preset("filtersqp")
-    backend.set_logger_stream(io.StringIO())  # Uno would print to standard output
     settings = {
-        "logger": "SILENT",
-        "print_solution": False,
         "primal_tolerance": options.tolerance,
         "dual_tolerance": options.tolerance,
         "TR_radius": radius,
         "max_iterations": options.max_iterations,
         "time_limit": float(options.time_limit),
     }
-    for key, value in settings.items():
-        backend.set_option(key, value)
+    backend = _backend(settings)
     backend.set_termination_callback(terminate)
     return backend.optimize(model)
