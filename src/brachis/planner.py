@@ -41,9 +41,16 @@ from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
 from brachis.search import Search, first_maps, try_remedies
 from brachis.search.processes import ignore, process_count, run_in_processes
-from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
+from brachis.task import (
+    Source,
+    Task,
+    TaskKeywords,
+    Tolerances,
+    check_keywords,
+    task_with,
+)
 from brachis.timing import SlowTimingWarning, find_timing_gap
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import Motion, Trajectory, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
@@ -55,6 +62,8 @@ _OWN_KEYWORDS = (
     "progress",
     "check_advice",
 )
+_EXACT_SHARE = 0.5
+"""Part of the time in which a motion without tolerances is looked for."""
 
 
 def plan(
@@ -161,14 +170,14 @@ def plan(
                 asked.path_start,
             )
             remarks += report_issues(places, strict=asked.strict, stacklevel=3)
-            decompositions = decompositions_of(problem, families)
-            check_within_reach(problem.task_map, problem.path)
-
-            search = Search(problem, decompositions, deadline, report)
+            search = _open_search(problem, families, deadline, report)
+            exact = None
+            if known is None:
+                exact = _plan_exactly(
+                    robot, asked, families, own_limits, deadline, report
+                )
             with search.end_early():
-                for batch in search.find_starts(known):
-                    search.solve_candidates(batch)
-                    search.refine_and_verify(batch)
+                search.run(known, exact)
             best = search.best
             if best is None:
                 raise search.explain().error()
@@ -218,6 +227,42 @@ def plan(
             warnings=remarks,
             timing_gap=gap,
         )
+
+
+def _open_search(
+    problem: Problem,
+    families: Sequence[ik.Family],
+    deadline: Deadline,
+    report: Listener,
+) -> Search:
+    """Open the search for a problem whose path is within reach."""
+    decompositions = decompositions_of(problem, families)
+    check_within_reach(problem.task_map, problem.path)
+    return Search(problem, decompositions, deadline, report)
+
+
+def _plan_exactly(
+    robot: Robot,
+    task: Task,
+    families: Sequence[ik.Family],
+    own_limits: Sequence[LimitModel],
+    deadline: Deadline,
+    report: Listener,
+) -> Trajectory | None:
+    """Plan for a tool without its tolerances, if it has any: fewer joints are redundant, and the search is short."""
+    if task.tolerances == Tolerances():
+        return None
+    report("planning for a tool that stays exactly on the path")
+    soon = deadline.part(_EXACT_SHARE)
+    task = task.model_copy(update={"tolerances": Tolerances()})
+    try:
+        problem = Problem.of(robot, task, own_limits)
+        search = _open_search(problem, families, soon, report)
+        search.run()
+    except BrachisError:  # the tolerances are needed
+        return None
+    found = search.best if search.is_satisfied else None
+    return None if found is None else found.trajectory
 
 
 def _read(

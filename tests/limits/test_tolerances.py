@@ -9,9 +9,10 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import TaskError
+from brachis.errors import PathError, TaskError
 from brachis.limits import Moments, limits_of
 from brachis.robot import bind
+from brachis.search.given_motion import EXACT, GIVEN
 from brachis.task import Tolerances, load_task
 from support.spatial import START, rail_arm
 
@@ -177,6 +178,35 @@ def test_a_tool_that_may_lean_is_faster_and_stays_within_its_range(leaning):
     assert lead.max() <= 10.001
     assert np.abs(axis[:, 1]).max() < 1e-6
     np.testing.assert_allclose(np.radians(lead), q[:, -1], atol=1e-6)
+
+
+def test_a_plan_starts_from_the_motion_without_tolerances(leaning):
+    plain, result = leaning
+    assert result.candidate.origin == EXACT
+    again = brachis.plan(result.task, start_from=plain)
+    assert again.candidate.origin == GIVEN
+    assert again.t_end == pytest.approx(result.t_end, rel=1e-9)
+    found = brachis.plan(result.task, effort="exhaustive")
+    assert len(found.candidates) > 1
+    assert found.t_end <= result.t_end
+
+
+def test_a_path_that_needs_its_tolerances_is_searched():
+    line = {
+        "path": [brachis.Line(by=[0.24, 0.0, 0.0])],
+        "start": [0.0, 0.4, 1.3, 0.0, np.pi / 2 - 0.13, 0.0],
+        "locked_joints": {"rail": 0.0},
+        "task_space": "pose",
+        "intervals": 10,
+        "rest": "velocity",
+        "least_motion": False,
+    }
+    with pytest.raises(PathError, match="out of reach from s = 0"):
+        brachis.plan("tx90l_rail", **line, check_advice=False)
+    found = brachis.plan("tx90l_rail", tolerances={"position": {"x": 0.02}}, **line)
+    assert found.verified
+    assert found.candidate.origin.startswith("lattice")
+    assert found.not_completed == ()
 
 
 def test_the_verification_sees_a_tool_that_leaves_its_range(leaning):

@@ -31,10 +31,14 @@ from brachis.search.timed import solvers_of
 from brachis.trajectory import Trajectory
 
 GIVEN = "given motion"
+EXACT = "motion without tolerances"
 
 
 def given_guess(
-    problem: Problem, decompositions: Sequence[Decomposition], motion: Trajectory
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    motion: Trajectory,
+    origin: str = GIVEN,
 ) -> InitialGuess | str:
     """Make an initial guess of a known motion.
 
@@ -43,15 +47,18 @@ def given_guess(
     problem : Problem
     decompositions : sequence of Decomposition
     motion : Trajectory
+        Its tool may have other tolerances, or none.
+    origin : str, optional
 
     Returns
     -------
     InitialGuess or str
         For the solver that is tried first; or why the motion cannot be used, in plain words.
     """
-    joints = problem.robot.joint_names
-    if motion.joint_names != joints:
-        return f"its joints are {', '.join(motion.joint_names)}, the robot's {', '.join(joints)}"
+    joints = problem.robot.urdf_joints
+    others = motion.robot.urdf_joints
+    if others != joints:
+        return f"its joints are {', '.join(others)}, the robot's {', '.join(joints)}"
     # The postures over s, and on every leg the time law.
     splits = [leg.end for leg in problem.legs[:-1]]
     t = np.linspace(0.0, motion.t_end, 4001)
@@ -67,7 +74,7 @@ def given_guess(
     s = np.concatenate(parts)
     try:
         joint_map, curves, family = _in_coordinates(
-            problem, decompositions, motion, s, motion.position(t)
+            problem, decompositions, motion, s, _positions(problem, motion, t)
         )
         if not np.isfinite(joint_map.postures(curves)).all():
             return "its postures cannot be brought onto the path"
@@ -78,11 +85,23 @@ def given_guess(
         joint_map,
         curves,
         motion.t_end,
-        GIVEN,
+        origin,
         family,
         solvers_of(problem)[0],
         durations=tuple(np.diff(ends).tolist()),
     )
+
+
+def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:
+    """Positions at times, (K, n), of the problem's joints; a tool without the same tolerance stays on the path."""
+    robot = problem.robot
+    known = dict(zip(motion.joint_names, motion.position(t).T, strict=True))
+    still = robot.posture(np.zeros(len(robot.urdf_joints)), "start")
+    columns = [
+        known.get(name, np.full(len(t), value))
+        for name, value in zip(robot.joint_names, still, strict=True)
+    ]
+    return np.column_stack(columns)
 
 
 def _in_coordinates(
@@ -123,13 +142,7 @@ def _lay_chart(
     problem: Problem, motion: Trajectory, s: np.ndarray, q: np.ndarray
 ) -> ChartMap:
     """Lay a chart around postures, with the motion's own rows if they are transversal along them."""
-    robot = problem.robot
-    joints = [robot.joint_names.index(name) for name in motion.redundant_joints]
-    rows = None
-    if len(motion.chart_rows):
-        rows = ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
-    elif len(joints) == robot.n - problem.task_map.m:
-        rows = ChartRows.constant(np.eye(robot.n)[joints])
+    rows = _rows_of(problem, motion)
     if rows is not None:
         newton = Newton(problem.task_map)
         scaled = rows.at(s)[0] * newton.scales
@@ -137,3 +150,16 @@ def _lay_chart(
         if transversality(scaled, newton.self_motions(q)).min() < SELECTABLE:
             rows = None
     return chart_around(problem.task_map, problem.path, s, q, rows)
+
+
+def _rows_of(problem: Problem, motion: Trajectory) -> ChartRows | None:
+    """Rows of a motion in the problem's joints; None where it has none."""
+    robot = problem.robot
+    if motion.joint_names != robot.joint_names:
+        return None
+    if len(motion.chart_rows):
+        return ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
+    joints = [robot.joint_names.index(name) for name in motion.redundant_joints]
+    if len(joints) != robot.n - problem.task_map.m:
+        return None
+    return ChartRows.constant(np.eye(robot.n)[joints])

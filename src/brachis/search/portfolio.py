@@ -1,8 +1,8 @@
 """The search: initial guesses from lattices, solved coarsely, ranked, the best refined and verified.
 
-1. `Search.find_starts`: lattices give initial guesses, batch by batch (see `schedule`).
-2. `Search.solve_candidates` solves them at the first collocation points. Candidates that agree are merged.
-3. `Search.refine_and_verify` goes through the others in the order of their end times as long as they may beat the best
+1. Lattices give initial guesses, batch by batch (see `schedule`).
+2. They are solved at the first collocation points. Candidates that agree are merged.
+3. The others are refined and verified in the order of their end times as long as they may beat the best
    verified one: refinement adds rows, so that over the same knots and in the same coordinates the coarse end time of an
    optimum bounds its refined one from below. In charts, where the coordinates may still be changed, coarse end times
    are compared with each other.
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
@@ -36,7 +37,7 @@ from brachis.search.failure import (
     explain_no_motion,
     explain_time_limit,
 )
-from brachis.search.given_motion import GIVEN, given_guess
+from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.hopeless import explain_holding, explain_postures, explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import ignore, process_count, run_in_processes
@@ -113,13 +114,22 @@ class Search:
             return -np.inf, candidate.t_end
         return candidate.verification.worst_ratio - 1.0, candidate.t_end
 
-    def find_starts(self, given: Trajectory | None = None) -> Iterator[Batch]:
-        """Yield batches of initial guesses while they are worth solving.
+    def run(
+        self,
+        given: Trajectory | None = None,
+        exact: Trajectory | None = None,
+        most: int | None = None,
+    ) -> None:
+        """Find starts, solve, refine and verify, batch by batch.
 
         Parameters
         ----------
         given : Trajectory, optional
             A motion that is tried alone at first; nothing else is if it leads to a verified motion.
+        exact : Trajectory, optional
+            A motion of the same task without tolerances, tried in the same way; an exhaustive search goes on.
+        most : int, optional
+            Number of batches after which the search ends.
 
         Raises
         ------
@@ -128,14 +138,22 @@ class Search:
         PlanningError
             A speed, or a mean of a load, is far out of reach.
         """
+        starts = self._find_starts(given, exact)
+        for batch in itertools.islice(starts, most):
+            self._solve(batch)
+            self._refine_and_verify(batch)
+
+    def _find_starts(
+        self, given: Trajectory | None, exact: Trajectory | None
+    ) -> Iterator[Batch]:
+        """Yield batches of initial guesses while they are worth solving."""
         if given is not None:
-            guess = given_guess(self._problem, self._decompositions, given)
-            if isinstance(guess, InitialGuess):
-                yield Batch((guess,), 1)
-                guess = "it led to no verified plan"
-            self._given_motion = guess
-            if self.is_satisfied:
-                return
+            yield from self._start_from(given, GIVEN)
+        elif exact is not None:
+            yield from self._start_from(exact, EXACT)
+        goes_on = given is None and self._problem.task.search.effort == "exhaustive"
+        if self.is_satisfied and not goes_on:
+            return
         is_first_fallback = True
         for batch in batches(
             self._problem, self._decompositions, self._deadline, self._listener
@@ -154,7 +172,16 @@ class Search:
                 self._refuse_what_is_out_of_reach()
             yield batch
 
-    def solve_candidates(self, batch: Batch) -> None:
+    def _start_from(self, motion: Trajectory, origin: str) -> Iterator[Batch]:
+        """Yield the guess from a known motion, if it can be used; put down why a given one led to nothing."""
+        guess = given_guess(self._problem, self._decompositions, motion, origin)
+        if isinstance(guess, InitialGuess):
+            yield Batch((guess,), 1)
+            guess = "it led to no verified plan"
+        if origin == GIVEN:
+            self._given_motion = guess
+
+    def _solve(self, batch: Batch) -> None:
         """Solve the guesses of a batch coarsely, and rank those that differ."""
         first = self._add_starts(batch)
         limit = self._deadline
@@ -187,7 +214,7 @@ class Search:
                 known.append(candidate)
                 self._waiting.append(number)
 
-    def refine_and_verify(self, batch: Batch) -> None:
+    def _refine_and_verify(self, batch: Batch) -> None:
         """Refine and verify the candidates of a batch in the order of their end times while they may be the fastest."""
         jobs = self._jobs
         left = batch.refined

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -108,9 +107,7 @@ def is_planned(
     problem = Problem.of(robot, task, own_limits)
     search = Search(problem, decompositions_of(problem, families), deadline, ignore)
     with search.end_early():
-        for batch in itertools.islice(search.find_starts(), most):
-            search.solve_candidates(batch)
-            search.refine_and_verify(batch)
+        search.run(most=most)
     if search.best is not None and search.best.verified:
         return True
     return None if most or problem.robot.n > problem.task_map.m else False
