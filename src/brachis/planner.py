@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import time
 import warnings
@@ -20,8 +21,9 @@ from brachis.common.arguments import check_callable, check_list, count
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, report_progress
 from brachis.errors import BrachisError, InputError, write_count
+from brachis.optimise.candidate import Candidate
 from brachis.optimise.layout import SHORTEST_TIME
-from brachis.optimise.least_motion import find_least_motion
+from brachis.optimise.least_motion import LeastMotion, find_least_motion
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import breaks_of, program_of
 from brachis.problem.plausibility import (
@@ -40,6 +42,7 @@ from brachis.robot.plausibility import report_issues
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
 from brachis.search import Search, first_maps, try_remedies
+from brachis.search.given_motion import with_tolerances
 from brachis.search.processes import ignore, process_count, run_in_processes
 from brachis.task import (
     Source,
@@ -50,7 +53,7 @@ from brachis.task import (
     task_with,
 )
 from brachis.timing import SlowTimingWarning, find_timing_gap
-from brachis.trajectory import Motion, Trajectory, motion_of
+from brachis.trajectory import Motion, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
@@ -172,10 +175,8 @@ def plan(
             remarks += report_issues(places, strict=asked.strict, stacklevel=3)
             search = _open_search(problem, families, deadline, report)
             exact = None
-            if known is None:
-                exact = _plan_exactly(
-                    robot, asked, families, own_limits, deadline, report
-                )
+            if known is None and asked.tolerances != Tolerances():
+                exact = _plan_exactly(problem, robot, families, deadline, report)
             with search.end_early():
                 search.run(known, exact)
             best = search.best
@@ -183,11 +184,8 @@ def plan(
                 raise search.explain().error()
             searched = time.perf_counter()
 
-            smoothed = None
-            if asked.search.least_motion:
-                report("looking for the smoothest motion that is as fast")
-                left = Deadline(0.0) if search.interrupted else deadline
-                smoothed = find_least_motion(best, left, report)
+            left = Deadline(0.0) if search.interrupted else deadline
+            smoothed = _find_smoother(best, problem, left, report)
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=asked.strict, stacklevel=3)
@@ -242,27 +240,41 @@ def _open_search(
 
 
 def _plan_exactly(
+    problem: Problem,
     robot: Robot,
-    task: Task,
     families: Sequence[ik.Family],
-    own_limits: Sequence[LimitModel],
     deadline: Deadline,
     report: Listener,
-) -> Trajectory | None:
-    """Plan for a tool without its tolerances, if it has any: fewer joints are redundant, and the search is short."""
-    if task.tolerances == Tolerances():
-        return None
+) -> Candidate | None:
+    """Plan for a tool that stays on the path: fewer joints are redundant, and the search is short."""
     report("planning for a tool that stays exactly on the path")
-    soon = deadline.part(_EXACT_SHARE)
-    task = task.model_copy(update={"tolerances": Tolerances()})
+    task = problem.task.model_copy(update={"tolerances": Tolerances()})
     try:
-        problem = Problem.of(robot, task, own_limits)
-        search = _open_search(problem, families, soon, report)
+        exact = Problem.of(robot, task, problem.user_limits)
+        soon = deadline.part(_EXACT_SHARE)
+        search = _open_search(exact, families, soon, report)
         search.run()
     except BrachisError:  # the tolerances are needed
         return None
-    found = search.best if search.is_satisfied else None
-    return None if found is None else found.trajectory
+    if not search.is_satisfied:
+        return None
+    assert search.best is not None
+    best = dataclasses.replace(search.best, origin="without tolerances")
+    planned = with_tolerances(best, problem)
+    return planned if planned.verified else None
+
+
+def _find_smoother(
+    best: Candidate, problem: Problem, deadline: Deadline, report: Listener
+) -> LeastMotion | None:
+    """Find the smoothest motion that is as fast, if the task asks for it."""
+    if not problem.task.search.least_motion:
+        return None
+    report("looking for the smoothest motion that is as fast")
+    found = find_least_motion(best, deadline, report)
+    assert best.start is not None
+    is_exact = best.start.problem.robot.n != problem.robot.n
+    return with_tolerances(found, problem) if is_exact else found
 
 
 def _read(

@@ -191,6 +191,27 @@ def test_a_plan_starts_from_the_motion_without_tolerances(leaning):
     assert found.t_end <= result.t_end
 
 
+def test_tolerances_that_gain_nothing_leave_the_tool_on_the_path():
+    line = {
+        "path": [brachis.Line(by=[0.0, 0.5, 0.0])],
+        "start": [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0],
+        "task_space": "pose",
+        "intervals": 10,
+        "effort": "single",
+    }
+    plain = brachis.plan("iiwa14", **line)
+    tiny = {"orientation": {"roll": 1e-4}}
+    result = brachis.plan("iiwa14", tolerances=tiny, **line)
+    assert result.verified
+    assert result.t_end == pytest.approx(plain.t_end, rel=1e-9)
+    assert result.candidate.origin == "without tolerances"
+    assert result.least_motion.verification.passed
+    assert result.trajectory.joint_names == (*plain.trajectory.joint_names, "tool_roll")
+    assert not result.trajectory.position([0.0, 0.3])[:, -1].any()
+    keys = {check.name for check in result.verification.checks}
+    assert "tool range ratio" in keys
+
+
 def test_a_path_that_needs_its_tolerances_is_searched():
     line = {
         "path": [brachis.Line(by=[0.24, 0.0, 0.0])],

@@ -6,8 +6,10 @@ the time law. So limits, splines, coordinates and the path may be others than wh
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,7 +23,8 @@ from brachis.kinematics import (
     chart_around,
     transversality,
 )
-from brachis.optimise.candidate import InitialGuess, PathMap
+from brachis.optimise.candidate import Candidate, InitialGuess, PathMap
+from brachis.optimise.least_motion import LeastMotion
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.candidates import SELECTABLE
@@ -29,9 +32,12 @@ from brachis.search.schedule import has_charts
 from brachis.search.starts import FAMILY, bring_onto_path
 from brachis.search.timed import solvers_of
 from brachis.trajectory import Trajectory
+from brachis.verify import verify_trajectory
 
 GIVEN = "given motion"
 EXACT = "motion without tolerances"
+"""The origin of a guess."""
+Planned = TypeVar("Planned", Candidate, LeastMotion)
 
 
 def given_guess(
@@ -90,6 +96,35 @@ def given_guess(
         solvers_of(problem)[0],
         durations=tuple(np.diff(ends).tolist()),
     )
+
+
+def with_tolerances(planned: Planned, problem: Problem) -> Planned:
+    """Return a plan without tolerances as one of a problem with them, in which the tool stays on the path."""
+    motion = planned.trajectory
+    assert motion is not None
+    robot = problem.robot
+    columns = [robot.joint_names.index(name) for name in motion.joint_names]
+
+    def widen(values: np.ndarray) -> np.ndarray:
+        wider = np.zeros((*values.shape[:-1], robot.n))
+        wider[..., columns] = values
+        return wider
+
+    rows = motion.chart_rows
+    if rows.size:
+        rows = np.concatenate([widen(rows[..., :-1]), rows[..., -1:]], axis=-1)
+    motion = dataclasses.replace(
+        motion,
+        task=problem.task,
+        robot=robot,
+        q=_positions(problem, motion, motion.times),
+        qdot=widen(motion.qdot),
+        qddot=widen(motion.qddot),
+        qddot_before=widen(motion.qddot_before),
+        chart_rows=rows,
+    )
+    verification = verify_trajectory(motion, own_limits=problem.user_limits)
+    return dataclasses.replace(planned, trajectory=motion, verification=verification)
 
 
 def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:
@@ -155,11 +190,10 @@ def _lay_chart(
 def _rows_of(problem: Problem, motion: Trajectory) -> ChartRows | None:
     """Rows of a motion in the problem's joints; None where it has none."""
     robot = problem.robot
-    if motion.joint_names != robot.joint_names:
-        return None
+    r = robot.n - problem.task_map.m
+    joints = [motion.joint_names.index(name) for name in motion.redundant_joints]
+    rows = ChartRows.constant(np.eye(motion.robot.n)[joints])
     if len(motion.chart_rows):
-        return ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
-    joints = [robot.joint_names.index(name) for name in motion.redundant_joints]
-    if len(joints) != robot.n - problem.task_map.m:
-        return None
-    return ChartRows.constant(np.eye(robot.n)[joints])
+        rows = ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
+    is_same = motion.joint_names == robot.joint_names
+    return rows if is_same and rows.r == r else None

@@ -117,7 +117,7 @@ class Search:
     def run(
         self,
         given: Trajectory | None = None,
-        exact: Trajectory | None = None,
+        exact: Candidate | None = None,
         most: int | None = None,
     ) -> None:
         """Find starts, solve, refine and verify, batch by batch.
@@ -126,8 +126,9 @@ class Search:
         ----------
         given : Trajectory, optional
             A motion that is tried alone at first; nothing else is if it leads to a verified motion.
-        exact : Trajectory, optional
-            A motion of the same task without tolerances, tried in the same way; an exhaustive search goes on.
+        exact : Candidate, optional
+            A verified plan of the same task without tolerances. It is the plan unless a faster one is found, first near
+            it, and, if there is none or the search is exhaustive, elsewhere.
         most : int, optional
             Number of batches after which the search ends.
 
@@ -144,15 +145,18 @@ class Search:
             self._refine_and_verify(batch)
 
     def _find_starts(
-        self, given: Trajectory | None, exact: Trajectory | None
+        self, given: Trajectory | None, exact: Candidate | None
     ) -> Iterator[Batch]:
         """Yield batches of initial guesses while they are worth solving."""
         if given is not None:
             yield from self._start_from(given, GIVEN)
         elif exact is not None:
-            yield from self._start_from(exact, EXACT)
+            self.candidates.append(exact)
+            self.best = exact
+            assert exact.trajectory is not None
+            yield from self._start_from(exact.trajectory, EXACT)
         goes_on = given is None and self._problem.task.search.effort == "exhaustive"
-        if self.is_satisfied and not goes_on:
+        if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
         for batch in batches(
