@@ -3,9 +3,9 @@
 Usage: python benchmarks/scenes.py [--blocked] [--robot NAME] [--seed 0] [--count 10] [--save]
 
 A scene begins as a task of `mixed_cases`, with a joint path that is known to do it. The task is planned quickly
-without obstacles. One obstacle then stands where a link of the plan passes, and keeps clear of the known joint path; up to
-seven more stand anywhere, and keep clear of it too. So the plan without obstacles collides, and a motion is known that
-does not. The known motion is timed by the phase plane: no plan should take longer.
+without obstacles. One obstacle then stands where a link of the plan passes, and keeps clear of the known joint path;
+up to seven more stand anywhere, and keep clear of it too. So the plan without obstacles collides, and a motion is known
+that does not. The known motion is timed by the phase plane: no plan should take longer.
 
 With --blocked an obstacle stands on the path itself, as large as the way from the tool frame to the last body of the
 arm: no posture there is free. The refusal should name this obstacle, and a place where it is.
