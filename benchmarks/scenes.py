@@ -66,12 +66,11 @@ def obstacle(
 
 
 def distance_to(
-    task: Task, q: np.ndarray, body: dict[str, object]
+    robot: brachis.Robot, task: Task, q: np.ndarray, body: dict[str, object]
 ) -> tuple[float, Scene]:
     """Least distance of a body from the robot in postures, (K, n), m, and the scene with it alone."""
-    own = load_task({**task.to_dict(), "scene": [body]})
-    robot = robot_for(None, own.robot)
-    scene = scene_of(robot, own)
+    alone = {"scene": [body], "collisions.self_collision": False}
+    scene = scene_of(robot, load_task(task, changes=alone))
     assert scene is not None
     last = len(scene.solids) - 1
     scene = scene.with_pairs(np.flatnonzero((scene.pairs == last).any(axis=1)))
@@ -105,7 +104,9 @@ def draw(
     bodies: list[dict[str, object]] = []
     wanted = int(rng.integers(1, 9))
     reach = 1.5 * np.abs(robot.tool_placements(known)[0]).max()
-    for attempt in range(200):
+    for attempt in range(150):
+        if not bodies and on_path and attempt == 60:
+            break
         if not bodies and on_path:
             posture = planned[rng.integers(len(planned))]
             data = next(iter(robot.place_joints(posture[None])))
@@ -118,19 +119,21 @@ def draw(
         if tall:
             centre[2] = 0.0
         point = obstacle(rng, centre, 1e-3, tall=tall)
-        radius = min(distance_to(task, known, point)[0] - clearance, SIZES[1])
+        radius = min(distance_to(robot, task, known, point)[0] - clearance, SIZES[1])
         if radius < SIZES[0]:
             continue
         body = obstacle(rng, centre, radius, tall=tall)
-        if distance_to(task, known, body)[0] < task.collisions.clearance:
+        if distance_to(robot, task, known, body)[0] < task.collisions.clearance:
             continue
-        if not bodies and on_path and distance_to(task, planned, body)[0] > -0.01:
+        if (
+            not bodies
+            and on_path
+            and distance_to(robot, task, planned, body)[0] > -0.01
+        ):
             continue
         bodies.append(body)
         if len(bodies) == wanted:
-            return bodies
-        if attempt > 150 and bodies:
-            return bodies
+            break
     return bodies or None
 
 
@@ -177,7 +180,10 @@ def plan_scene(
     rng = np.random.default_rng([seed, number, ROBOTS.index(robot)])
     bare = robot_for(None, task.robot)
     arm = known[:, : bare.n]  # without a free roll
-    if distance_to(task, arm, {"sphere": 0.01, "position": [50.0, 0.0, 0.0]})[0] < 1.0:
+    if (
+        distance_to(bare, task, arm, {"sphere": 0.01, "position": [50.0, 0.0, 0.0]})[0]
+        < 1.0
+    ):
         return None
     try:
         free = brachis.plan(load_task(task, changes=QUICK), strict=False)
@@ -224,14 +230,14 @@ def block(
             centre[2] = 0.0
         point = obstacle(rng, centre, 1e-3, tall=True) if tall else {"sphere": 1e-3}
         point["position"] = centre.tolist()
-        to_arm = distance_to(task, known[number : number + 1], point)[0] + 1e-3
+        to_arm = distance_to(robot, task, known[number : number + 1], point)[0] + 1e-3
         radius = max(to_arm + 0.03, SIZES[0])
         body = {**point, "name": "blocker"}
         if tall:
             body["cylinder"] = {"radius": radius, "length": 4.0}
         else:
             body["sphere"] = radius
-        ends = [distance_to(task, known[[end]], body)[0] for end in (0, -1)]
+        ends = [distance_to(robot, task, known[[end]], body)[0] for end in (0, -1)]
         if min(ends) < clearance + SPARE:
             continue
         away = np.linalg.norm(
