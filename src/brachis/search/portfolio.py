@@ -26,7 +26,7 @@ import numpy as np
 from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.errors import UnreachableError, write_count
+from brachis.errors import write_count
 from brachis.optimise.backends import SolveStatus
 from brachis.optimise.candidate import Candidate, InitialGuess, coordinates
 from brachis.problem.problem import Decomposition, Problem
@@ -41,6 +41,7 @@ from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.hopeless import explain_holding, explain_postures, explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import ignore, process_count, run_in_processes
+from brachis.search.same_motion import is_same_motion
 from brachis.search.schedule import Batch, batches
 from brachis.trajectory import Trajectory
 
@@ -48,10 +49,6 @@ NOT_TRIED = "not tried: the search ended"
 """Status of a candidate for which there was no time."""
 SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""
-_COMPARED = 49
-"""Even times, or places, at which motions of a phase are compared."""
-_SAME_LATER = 4e-3
-"""Part of the end time by which a rough answer may be later, and be the same motion."""
 _GAINS_MORE = 0.998
 """Factor by which another candidate may gain more by better knots than those so far."""
 _COARSE_SHARE = 0.6
@@ -445,43 +442,6 @@ def _solve_in_time(
 def round_end_time(time: float) -> float:
     """Leave out the digits in which processes differ, so that these do not choose."""
     return float(f"{time:.6g}")
-
-
-def is_same_motion(first: Candidate, second: Candidate) -> bool:
-    """Tell whether a solved candidate is the same motion as another, and not faster."""
-    # Splines of different measures of self-motion have different end times for the same motion, and some are rough.
-    is_rough = first.in_chart or first.is_over_path
-    slower = _SAME_LATER if is_rough else tolerances.END_TIME
-    difference = first.coarse / second.coarse - 1.0
-    if (
-        first.redundant_joints != second.redundant_joints
-        or first.branch != second.branch
-        or not -tolerances.GAIN <= difference <= slower
-    ):
-        return False
-    try:
-        pair = _postures_of(first), _postures_of(second)
-    except UnreachableError:
-        return False
-    return bool(np.abs(pair[0] - pair[1]).max() < 0.1)  # rad or m
-
-
-def _postures_of(candidate: Candidate) -> np.ndarray:
-    """Take postures at even times of every phase, or at even places of the path, (P, n), of a solved candidate.
-
-    Raises UnreachableError where it leaves its joint map.
-    """
-    start = candidate.start
-    program = candidate.program
-    assert start is not None and program is not None
-    if candidate.is_over_path:
-        return start.postures_at_places(_COMPARED * len(start.problem.legs))
-    motions = program.motions(candidate.reports[-1].x)
-    found = []
-    for phase, motion in zip(program.phases, motions, strict=True):
-        t = np.linspace(0.0, motion.t_end, _COMPARED)
-        found.append(phase.joint_map.state(*motion.at(t), t=t).q)
-    return np.concatenate(found)
 
 
 WORDS = ("joints", "branch", "origin")
