@@ -35,8 +35,8 @@ from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
 GIVEN = "given motion"
-EXACT = "motion without tolerances"
-"""The origin of a guess."""
+EXACT = "from the plan without tolerances"
+"""Origins of guesses."""
 Planned = TypeVar("Planned", Candidate, LeastMotion)
 
 
