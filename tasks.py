@@ -70,8 +70,14 @@ def prepare(extra: str) -> None:
         print(f"making a virtual environment in {ENVIRONMENT.name}", flush=True)
         venv.create(ENVIRONMENT, with_pip=True)
     stamp = ENVIRONMENT / f"installed-{extra.strip('.[]') or 'core'}"
-    project = ROOT / "pyproject.toml"
-    if stamp.exists() and stamp.stat().st_mtime > project.stat().st_mtime:
+    kernel = ROOT / "src/brachis/kernel"
+    sources = [
+        ROOT / "pyproject.toml",
+        *kernel.glob("*.[ch]"),
+        *kernel.glob("compile.py"),
+    ]
+    newest = max(source.stat().st_mtime for source in sources)
+    if stamp.exists() and stamp.stat().st_mtime > newest:
         return
     print(f"installing {extra}", flush=True)
     subprocess.run(

@@ -25,6 +25,7 @@ SOURCE = Path(__file__).parents[1] / "src/brachis"
 ORDER = (
     "errors",
     "common",
+    "kernel",
     "task",
     "robot",
     "scene",

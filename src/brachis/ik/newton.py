@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 
 from brachis.ik.screws import ChainGeometry
 from brachis.robot import TaskMap
@@ -39,25 +38,14 @@ class Newton:
         self, task_map: TaskMap, geometry: ChainGeometry | None = None
     ) -> None:
         self._task_map = task_map
-        self._geometry = geometry or ChainGeometry.of(task_map.robot)
+        self._chain = task_map.robot.chain if geometry is None else geometry.chain
         self.scales = task_map.robot.scales
 
     def task_coordinates(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Task coordinates (K, c) and task Jacobian (K, m, n) in postures (K, n)."""
-        screws = self._geometry.screws_at(q)
-        twists = screws.jacobian_columns(range(self._geometry.n))
-        if self._task_map.frame is pin.ReferenceFrame.LOCAL:
-            parts = np.split(twists, 2)
-            twists = np.concatenate(
-                [
-                    np.einsum("iak,ink->ank", screws.tool_rotation, part)
-                    for part in parts
-                ]
-            )
-        values = self._task_map.of_placements(
-            screws.tool_position.T, np.moveaxis(screws.tool_rotation, 2, 0)
-        )
-        return values, self._task_map.jacobian(np.swapaxes(twists, 1, 2))
+        *placements, twists = self._task_map.place(self._chain, q)
+        values = self._task_map.of_placements(*placements)
+        return values, self._task_map.jacobian(twists)
 
     def solve(
         self,

@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import pinocchio as pin
 
 from brachis.common.arrays import cross
 from brachis.ik.vectors import apply, apply_inverse, cosine_roots, determinants, dot
+from brachis.kernel import Chain
 from brachis.robot import Robot
 
 
@@ -253,20 +253,25 @@ class ChainGeometry:
     @classmethod
     def of(cls, robot: Robot) -> ChainGeometry:
         """Read the screws off the world Jacobian at the zero posture: columns (v, w), a point is w x v."""
-        zero = np.zeros(robot.n)
-        data = robot.model.createData()
-        columns = pin.computeJointJacobians(robot.model, data, zero).reshape(6, robot.n)
-        linear = columns[:3].T
-        angular = columns[3:].T
-        revolute = np.linalg.norm(angular, axis=1) > 0.5
-        placement = robot.tool_placement(zero)
+        chain = robot.chain
         return cls(
             joint_names=robot.joint_names,
-            revolute=revolute,
-            axes=np.where(revolute[:, None], angular, linear),
-            points=np.where(revolute[:, None], np.cross(angular, linear), 0.0),
-            tool_position=np.array(placement.translation),
-            tool_rotation=np.array(placement.rotation),
+            revolute=chain.revolute,
+            axes=chain.axes,
+            points=chain.points,
+            tool_position=chain.tool_position,
+            tool_rotation=chain.tool_rotation,
+        )
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The chain as the compiled kernel takes it, without bodies."""
+        return Chain(
+            revolute=self.revolute,
+            axes=self.axes,
+            points=self.points,
+            tool_position=self.tool_position,
+            tool_rotation=self.tool_rotation,
         )
 
     @property

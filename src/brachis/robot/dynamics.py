@@ -1,4 +1,4 @@
-"""Joint torques of a batch of states and their exact derivatives, through Pinocchio."""
+"""Joint torques of a batch of states and their exact derivatives."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-import pinocchio as pin
 
 from brachis.robot.robot import Robot
 
@@ -87,43 +86,26 @@ def rigid_torque(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
     """Joint torques of K states without friction and armature; parameters as for `torque`."""
-    model = robot.model
-    data = model.createData()
-    rigid = np.empty_like(q)
-    for k in range(len(q)):
-        rigid[k] = pin.rnea(model, data, q[k], qdot[k], qddot[k])
-    return rigid
+    return robot.chain.torques(q, qdot, qddot)
 
 
 def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Mass matrices with armature, (K, n, n), of K postures (K, n)."""
-    model = robot.model
-    data = model.createData()
-    matrices = np.empty((len(q), robot.n, robot.n))
-    for k in range(len(q)):
-        matrices[k] = pin.crba(model, data, q[k])
-    return _with_armature(robot, matrices)
+    matrices = robot.chain.mass_matrices(q)
+    _diagonals(matrices)[:] += robot.friction.armature
+    return matrices
 
 
 def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    model = robot.model
-    data = model.createData()
-    by_q, by_qdot, by_qddot = np.empty((3, len(q), robot.n, robot.n))
-    for k in range(len(q)):
-        by_q[k], by_qdot[k], by_qddot[k] = pin.computeRNEADerivatives(
-            model, data, q[k], qdot[k], qddot[k]
-        )
-    diagonal = np.arange(robot.n)
-    by_qdot[:, diagonal, diagonal] += robot.friction.velocity_derivative(qdot)
-    return TorqueDerivatives(by_q, by_qdot, _with_armature(robot, by_qddot))
+    by_q, by_qdot, by_qddot = robot.chain.torque_derivatives(q, qdot, qddot)
+    _diagonals(by_qdot)[:] += robot.friction.velocity_derivative(qdot)
+    _diagonals(by_qddot)[:] += robot.friction.armature
+    return TorqueDerivatives(by_q, by_qdot, by_qddot)
 
 
-def _with_armature(robot: Robot, matrices: np.ndarray) -> np.ndarray:
-    """Complete mass matrices, (K, n, n), of which Pinocchio may fill the upper triangle alone, and add the armature."""
-    complete = np.triu(matrices) + np.swapaxes(np.triu(matrices, 1), 1, 2)
-    diagonal = np.arange(robot.n)
-    complete[:, diagonal, diagonal] += robot.friction.armature
-    return complete
+def _diagonals(matrices: np.ndarray) -> np.ndarray:
+    """Diagonals, (K, n), of matrices, (K, n, n), to be written to."""
+    return np.einsum("kii->ki", matrices)

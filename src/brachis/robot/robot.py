@@ -15,6 +15,8 @@ import pinocchio as pin
 from brachis.common.arguments import check_keywords
 from brachis.common.summary import Summary
 from brachis.errors import InputError, TaskError, UnknownNameError
+from brachis.kernel import Chain
+from brachis.robot.chain import chain_of
 from brachis.robot.friction import Friction
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import (
@@ -421,6 +423,11 @@ class Robot(Summary):
                 allowed=f"finite numbers, within {FARTHEST:g} rad or m of zero",
             )
         return q
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The chain as the compiled kernel takes it."""
+        return chain_of(self.model, self.frame_id)
 
     def place_joints(self, q: np.ndarray) -> Iterator[pin.Data]:
         """Yield Pinocchio's placements of all joints and of the tool frame in postures (K, n), one after the other.

@@ -28,6 +28,7 @@ from functools import cached_property
 
 import numpy as np
 
+from brachis import kernel
 from brachis.limits import Limit
 from brachis.timing.joint_path import JointPath, Passage, Timing
 
@@ -49,8 +50,6 @@ _AGREE = 1e-6
 """Change of the time, as a part of it, with which linearisations end."""
 _HELD_BACK = 0.8
 """Part of what a limit leaves at rest that may be taken."""
-_PAIRS = 4_000_000
-"""Pairs of rows that are compared at once."""
 
 
 Narrower = np.ndarray | float
@@ -195,12 +194,12 @@ class PhasePlane:
         # Half-way x is x + step u, seen from the station before.
         step = self._steps[:, None]
         slope, lower, upper = _as_lines(a + step * b, b, low, high)
-        self._floor, ceiling = _bounds_of_pairs(slope, lower, upper)
+        self._floor, ceiling = kernel.bounds_of_pairs(slope, lower, upper, _TINY)
         highest = self._levels.min(axis=1, initial=np.inf)
         ceilings = [np.append(ceiling, np.inf), highest]
         # The rows at the stations themselves keep u from swinging between its neighbours.
         lines = _as_lines(*map(self._at_stations, (a, b, low, high)))
-        ceilings.append(_bounds_of_pairs(*lines)[1])
+        ceilings.append(kernel.bounds_of_pairs(*lines, _TINY)[1])
         self._ceiling = np.min(ceilings, axis=0)
         # x + 2 step u is x at the next station.
         self._factor = 1.0 + 2.0 * step * slope
@@ -335,16 +334,7 @@ class PhasePlane:
         low, high = reach
         if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
             return None
-        x = first
-        found = [x]
-        rows = zip(self._factor.tolist(), self._most.tolist(), strict=True)
-        for (factors, mosts), lowest, highest in zip(
-            rows, low[1:], high[1:], strict=True
-        ):
-            reached = [f * x + m for f, m in zip(factors, mosts, strict=True)]
-            x = max(min([highest, *reached]), lowest)
-            found.append(x)
-        squares = np.array(found)
+        squares = kernel.go_forwards(self._factor, self._most, (low, high), first)
         if not squares.max() > 0.0:
             return None
         # Between stations nothing stops; a station where the grid says so is an artefact of its width.
@@ -352,37 +342,13 @@ class PhasePlane:
         squares[1:-1] = np.maximum(squares[1:-1], slowest)
         return np.sqrt(squares)
 
-    def _go_backwards(self, last: float) -> tuple[list[float], list[float]] | None:
+    def _go_backwards(self, last: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Find the intervals of x, (P,), from which the end can be reached with x = `last`; None if one is empty."""
         if last > self._ceiling[-1] * (1.0 + _ROUNDING):
             return None
-        rises = self._factor > _TINY
-        inverse = 1.0 / np.where(rises, self._factor, 1.0)
-        # The least x at the next station is not above its highest one, nor the largest below its lowest one.
-        least = np.where(rises, self._least, -np.inf)
-        most = np.where(rises, self._most, np.inf)
-        is_held = bool((self._most >= 0.0).all() and not self._floor.any())
-        low = last
-        high = last
-        lows = [low]
-        highs = [high]
-        rows = zip(least.tolist(), most.tolist(), inverse.tolist(), strict=True)
-        levels = zip(self._floor.tolist(), self._ceiling[:-1].tolist(), strict=True)
-        # Plain numbers: arrays of a few rows cost more than what they hold.
-        for (down, up, factor), (floor, ceiling) in reversed(
-            [*zip(rows, levels, strict=True)]
-        ):
-            found = [(high - own) * by for own, by in zip(down, factor, strict=True)]
-            high = min([ceiling, *found])
-            if low > 0.0 or not is_held:
-                found = [(low - own) * by for own, by in zip(up, factor, strict=True)]
-                low = max([floor, *found])
-            if low > high * (1.0 + _ROUNDING) or high < 0.0:
-                return None
-            high = max(high, low)
-            lows.append(low)
-            highs.append(high)
-        return lows[::-1], highs[::-1]
+        steps = (self._factor, self._least, self._most)
+        levels = (self._floor, self._ceiling[:-1])
+        return kernel.go_backwards(steps, levels, last, flat=_TINY, rounding=_ROUNDING)
 
     def speed_factor(
         self, rate: np.ndarray, acceleration: np.ndarray
@@ -462,29 +428,3 @@ def _as_lines(
     a = np.where(np.abs(a) < _TINY, _TINY, a)
     ends = low / a, high / a
     return -b / a, np.minimum(*ends), np.maximum(*ends)
-
-
-def _bounds_of_pairs(
-    slope: np.ndarray, lower: np.ndarray, upper: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Find the least and the largest x, (P,), at which no lower line, (P, c), is above an upper one."""
-    count, rows = slope.shape
-    floor = np.zeros(count)
-    ceiling = np.full(count, np.inf)
-    if not rows:
-        return floor, ceiling
-    step = max(1, _PAIRS // rows**2)
-    for first in range(0, count, step):
-        part = slice(first, first + step)
-        tilt = slope[part, :, None] - slope[part, None]
-        clearance = upper[part, None] - lower[part, :, None]
-        is_tilted = np.abs(tilt) > _TINY
-        meet = np.divide(clearance, tilt, out=np.zeros_like(tilt), where=is_tilted)
-        above = np.where(tilt > _TINY, meet, np.inf).min(axis=(1, 2))
-        below = np.where(tilt < -_TINY, meet, -np.inf).max(axis=(1, 2))
-        ceiling[part] = above
-        floor[part] = np.maximum(below, 0.0)
-        # Parallel lines that leave nothing between them.
-        is_empty = (~is_tilted & (clearance < 0.0)).any(axis=(1, 2))
-        ceiling[part][is_empty] = -1.0
-    return floor, ceiling

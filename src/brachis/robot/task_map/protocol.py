@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from brachis.common.summary import Summary
 from brachis.errors import InputError
+from brachis.kernel import Chain
 from brachis.robot.robot import Robot
 from brachis.task import ToolPose
 
@@ -91,15 +92,6 @@ class TaskMap(Summary, ABC):
         """World axes (0, 1, 2) of the position rows; none in a space of joints."""
         return tuple(AXES.index(row) for row in self.rows if row in AXES)
 
-    @cached_property
-    def _data(self) -> pin.Data:
-        """Pinocchio's workspace."""
-        return self.robot.model.createData()
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave the workspace behind."""
-        return {name: value for name, value in vars(self).items() if name != "_data"}
-
     @property
     def m(self) -> int:
         """Number of rows."""
@@ -150,15 +142,14 @@ class TaskMap(Summary, ABC):
 
     def twists(self, q: np.ndarray) -> np.ndarray:
         """Columns (6, K, n) of the tool frame's Jacobian at K postures (K, n): linear, then angular velocity."""
-        model = self.robot.model
-        data = self._data
-        frame = self.robot.frame_id
-        columns = np.empty((len(q), 6, self.robot.n))
-        for k in range(len(q)):
-            columns[k].flat = pin.computeFrameJacobian(
-                model, data, q[k], frame, self.frame
-            )  # (6,) for one joint
-        return np.moveaxis(columns, 1, 0)
+        return self.place(self.robot.chain, q)[2]
+
+    def place(
+        self, chain: Chain, q: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Place the tool of a chain at K postures, and find its `twists`; see `Chain.tool`."""
+        in_tool_axes = self.frame is pin.ReferenceFrame.LOCAL
+        return chain.tool(q, in_tool_axes=in_tool_axes)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """Rows (m, ...) of the task velocity that twists (6, ...) of the tool make; a space of joints has none."""

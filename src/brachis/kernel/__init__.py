@@ -1,0 +1,10 @@
+"""The compiled kernel: what is computed at every point of every motion, in C.
+
+Pinocchio builds the model and is the reference: the tests compare the kernel with it. See `docs/mathematics.md` for the
+formulas.
+"""
+
+from brachis.kernel.chain import Chain
+from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
+
+__all__ = ["Chain", "bounds_of_pairs", "go_backwards", "go_forwards"]

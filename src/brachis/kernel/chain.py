@@ -1,0 +1,158 @@
+"""A serial chain of joints and rigid bodies: placement, Jacobian and dynamics at many postures in one call."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from brachis.kernel.library import address, as_doubles, load
+
+
+class _Chain(ctypes.Structure):
+    """`chain` of chain.h."""
+
+    _fields_ = [
+        ("joints", ctypes.c_long),
+        *(
+            (name, ctypes.c_void_p)
+            for name in (
+                "turns",
+                "axes",
+                "points",
+                "tool_position",
+                "tool_rotation",
+                "masses",
+                "centers",
+                "inertias",
+                "gravity",
+            )
+        ),
+    ]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A serial chain at its zero posture, in the world frame.
+
+    Attributes
+    ----------
+    revolute : (n,) bool ndarray
+        Other joints are prismatic.
+    axes : (n, 3) ndarray
+        Unit vectors.
+    points : (n, 3) ndarray
+        A point on each axis, m.
+    tool_position : (3,) ndarray
+        m.
+    tool_rotation : (3, 3) ndarray
+    masses : (n,) ndarray, optional
+        Of the body behind each joint, kg; bodies are of no use to placements.
+    centers : (n, 3) ndarray, optional
+        Of mass, m.
+    inertias : (n, 6) ndarray, optional
+        About the centers of mass, kg m^2: xx, xy, xz, yy, yz, zz.
+    gravity : (3,) ndarray, optional
+        m/s^2.
+    """
+
+    revolute: np.ndarray
+    axes: np.ndarray
+    points: np.ndarray
+    tool_position: np.ndarray
+    tool_rotation: np.ndarray
+    masses: np.ndarray | float = 0.0
+    centers: np.ndarray | float = 0.0
+    inertias: np.ndarray | float = 0.0
+    gravity: np.ndarray | float = 0.0
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.revolute)
+
+    @cached_property
+    def _numbers(self) -> list[np.ndarray]:
+        """What the library reads: contiguous, and kept as long as this object."""
+        n = self.n
+        return [
+            as_doubles(self.revolute, (n,)),
+            as_doubles(self.axes, (n, 3)),
+            as_doubles(self.points, (n, 3)),
+            as_doubles(self.tool_position, (3,)),
+            as_doubles(self.tool_rotation, (3, 3)),
+            as_doubles(self.masses, (n,)),
+            as_doubles(self.centers, (n, 3)),
+            as_doubles(self.inertias, (n, 6)),
+            as_doubles(self.gravity, (3,)),
+        ]
+
+    @cached_property
+    def _structure(self) -> _Chain:
+        return _Chain(self.n, *(address(own) for own in self._numbers))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave addresses behind."""
+        return {name: value for name, value in vars(self).items() if name[0] != "_"}
+
+    def torques(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+        """Torques, (K, n), Nm or N, of the rigid bodies in K states, (K, n) each."""
+        found = np.empty(q.shape)
+        self._call("brachis_torques", (q, qdot, qddot), found)
+        return found
+
+    def torque_derivatives(
+        self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Differentiate `torques` by q, qdot and qddot, (K, n, n) each: row joint torque, column joint."""
+        by_q, by_qdot, by_qddot = np.empty((3, len(q), self.n, self.n))
+        states = (q, qdot, qddot)
+        self._call("brachis_torque_derivatives", states, by_q, by_qdot, by_qddot)
+        return by_q, by_qdot, by_qddot
+
+    def mass_matrices(self, q: np.ndarray) -> np.ndarray:
+        """Mass matrices, (K, n, n), of K postures, (K, n)."""
+        found = np.empty((len(q), self.n, self.n))
+        self._call("brachis_mass_matrices", (q,), found)
+        return found
+
+    def tool(
+        self, q: np.ndarray, *, in_tool_axes: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Place the tool at K postures, (K, n).
+
+        Returns
+        -------
+        positions : (K, 3) ndarray
+            m.
+        rotations : (K, 3, 3) ndarray
+        twists : (6, K, n) ndarray
+            Columns of the Jacobian: linear, then angular velocity at the tool's origin, along the tool's axes or the
+            world's.
+        """
+        count = len(q)
+        positions = np.empty((count, 3))
+        rotations = np.empty((count, 3, 3))
+        twists = np.empty((6, count, self.n))
+        found = (positions, rotations, twists)
+        self._call("brachis_tool", (q,), ctypes.c_int(in_tool_axes), *found)
+        return found
+
+    def _call(
+        self,
+        name: str,
+        states: tuple[np.ndarray, ...],
+        *others: np.ndarray | ctypes.c_int,
+    ) -> None:
+        """Call a function of the library with postures, rates or accelerations, (K, n) each, and where it writes."""
+        count = len(states[0])
+        kept = [as_doubles(own, (count, self.n)) for own in states]
+        given = [
+            address(own) if isinstance(own, np.ndarray) else own
+            for own in (*kept, *others)
+        ]
+        function = getattr(load(), name)
+        function.restype = None
+        function(ctypes.byref(self._structure), ctypes.c_long(count), *given)

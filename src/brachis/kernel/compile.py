@@ -1,0 +1,100 @@
+"""Compile the kernel.
+
+    python src/brachis/kernel/compile.py
+
+Installing the package does the same. It takes the C compiler of the machine (`CC`, or `cc`), and where there is none
+that of the package ziglang. Only the standard library is needed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+FOLDER = Path(__file__).resolve().parent
+VARIANTS = {"baseline": (), "avx2": ("-mavx2",)}
+"""Names of the libraries, and what they may use of the processor."""
+# No contraction: all variants give the same digits.
+_FLAGS = ("-O3", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno")
+_QUIET = ("-Wno-psabi",)
+
+
+def library_path(variant: str) -> Path:
+    """Return where the library of a variant is, or is to be."""
+    return FOLDER / f"kernel_{variant}.so"
+
+
+def source_digest() -> str:
+    """Return a digest of the C source, by which a library is known to belong to it."""
+    digest = hashlib.sha256()
+    for file in sorted([*FOLDER.glob("*.h"), *FOLDER.glob("*.c")]):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def find_compiler() -> list[str] | None:
+    """Return the command of the machine's C compiler; None if it has none."""
+    stated = os.environ.get("CC")
+    if stated:
+        return shlex.split(stated)
+    for name in ("cc", "gcc", "clang"):
+        if shutil.which(name):
+            return [name]
+    return None
+
+
+def compile_kernel() -> list[Path]:
+    """Compile every variant that this kind of machine has.
+
+    Returns
+    -------
+    list of path
+        The libraries, beside this file.
+
+    Raises
+    ------
+    RuntimeError
+        There is no C compiler, or it fails.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        if importlib.util.find_spec("ziglang") is None:
+            raise RuntimeError(
+                "no C compiler was found: looked for $CC, cc, gcc, clang and the package ziglang; "
+                "try: python -m pip install ziglang"
+            )
+        compiler = [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
+    digest = source_digest()
+    sources = [str(file) for file in sorted(FOLDER.glob("*.c"))]
+    made = []
+    for variant, own in VARIANTS.items():
+        if own and platform.machine().lower() not in ("x86_64", "amd64"):
+            continue
+        library = library_path(variant)
+        # Made aside and moved: who loads it meanwhile finds the old one or the new one.
+        aside = library.with_suffix(f".{os.getpid()}.tmp")
+        command = [*compiler, *_FLAGS, *own, *_QUIET, f'-DSOURCE="{digest}"', *sources]
+        run = subprocess.run(  # noqa: S603
+            [*command, "-o", str(aside), "-lm"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if run.returncode:
+            raise RuntimeError(
+                f"the C compiler fails: {shlex.join(command)}\n{run.stderr.strip()}"
+            )
+        aside.replace(library)
+        made.append(library)
+    return made
+
+
+if __name__ == "__main__":
+    compile_kernel()

@@ -1,0 +1,61 @@
+"""Load the compiled library."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brachis.kernel.compile import library_path, source_digest
+
+_REMEDY = "compile it: python -m pip install --editable . in the folder of the project"
+
+
+@cache
+def load() -> ctypes.CDLL:
+    """Load the library for this processor.
+
+    Raises
+    ------
+    ImportError
+        It was not compiled, or belongs to other source.
+    """
+    baseline = _open(library_path("baseline"))
+    faster = library_path("avx2")
+    if baseline.brachis_has_avx2() and faster.exists():
+        return _open(faster)
+    return baseline
+
+
+def _open(path: Path) -> ctypes.CDLL:
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise ImportError(
+            f"the compiled part of brachis is missing, or is of another kind of machine: {error}; {_REMEDY}"
+        ) from error
+    library.brachis_source.restype = ctypes.c_char_p
+    found = library.brachis_source().decode()
+    if found != source_digest():
+        raise ImportError(
+            f"the compiled part of brachis, {path.name}, was made of other source than this; {_REMEDY}"
+        )
+    return library
+
+
+def address(values: np.ndarray) -> ctypes.c_void_p:
+    """Return where the numbers of a contiguous array of doubles begin."""
+    assert values.dtype == np.float64
+    assert values.flags.c_contiguous
+    return ctypes.c_void_p(values.ctypes.data)
+
+
+def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return an array as contiguous doubles of this shape."""
+    found = np.ascontiguousarray(values, dtype=np.float64)
+    if found.shape != shape:
+        found = np.ascontiguousarray(np.broadcast_to(found, shape))
+    return found

@@ -1,0 +1,82 @@
+/* Numbers of several postures side by side, and vectors of them.
+
+A pack holds one number of each of LANES postures. Compilers turn its arithmetic into vector instructions, or into plain
+ones where the machine has none; the answers are the same to the last digit. */
+
+#ifndef BRACHIS_PACK_H
+#define BRACHIS_PACK_H
+
+#include <math.h>
+
+enum { LANES = 4 };
+typedef double pack __attribute__((vector_size(8 * LANES)));
+
+typedef struct {
+    pack x, y, z;
+} vec;
+
+static inline pack all(double value)
+{
+    return (pack){value, value, value, value};
+}
+
+static inline pack sines(pack a)
+{
+    return (pack){sin(a[0]), sin(a[1]), sin(a[2]), sin(a[3])};
+}
+
+static inline pack cosines(pack a)
+{
+    return (pack){cos(a[0]), cos(a[1]), cos(a[2]), cos(a[3])};
+}
+
+static inline vec constant(const double *a)
+{
+    return (vec){all(a[0]), all(a[1]), all(a[2])};
+}
+
+static inline vec add(vec a, vec b)
+{
+    return (vec){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+static inline vec subtract(vec a, vec b)
+{
+    return (vec){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+static inline vec scale(vec a, pack factor)
+{
+    return (vec){a.x * factor, a.y * factor, a.z * factor};
+}
+
+static inline pack dot(vec a, vec b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+static inline vec cross(vec a, vec b)
+{
+    return (vec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/* One column of LANES rows of a table, (rows, columns), from `row` on; beyond its end the last row again. */
+static inline pack gather(const double *table, long rows, long columns, long row, long column)
+{
+    pack found;
+    for (int lane = 0; lane < LANES; lane++) {
+        long own = row + lane < rows ? row + lane : rows - 1;
+        found[lane] = table[own * columns + column];
+    }
+    return found;
+}
+
+/* Write a pack into one column of a table; lanes beyond its end are dropped. */
+static inline void scatter(pack values, double *table, long rows, long columns, long row, long column)
+{
+    for (int lane = 0; lane < LANES && row + lane < rows; lane++) {
+        table[(row + lane) * columns + column] = values[lane];
+    }
+}
+
+#endif

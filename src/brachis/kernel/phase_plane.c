@@ -1,0 +1,85 @@
+/* Passes over the phase plane of a joint path: x = (dp/dt)^2 at P stations, and c rows between each two of them. */
+
+#include <math.h>
+
+static inline double smaller(double a, double b)
+{
+    return b < a ? b : a;
+}
+
+static inline double larger(double a, double b)
+{
+    return b > a ? b : a;
+}
+
+/* The least and the largest x, (P), at which no lower line `slope x + lower`, (P, c), is above an upper one. Slopes that
+differ by less than `parallel` are equal; -1 is the largest x where such lines leave nothing between them. */
+void brachis_bounds_of_pairs(
+    long places, long rows, const double *slope, const double *lower, const double *upper, double parallel,
+    double *least, double *most
+)
+{
+    for (long k = 0; k < places; k++, slope += rows, lower += rows, upper += rows) {
+        double floor = 0.0;
+        double ceiling = INFINITY;
+        int is_empty = 0;
+        for (long i = 0; i < rows; i++) {
+            for (long j = 0; j < rows; j++) {
+                double tilt = slope[i] - slope[j];
+                double clearance = upper[j] - lower[i];
+                if (tilt > parallel) {
+                    ceiling = smaller(ceiling, clearance / tilt);
+                } else if (tilt < -parallel) {
+                    floor = larger(floor, clearance / tilt);
+                } else {
+                    is_empty |= clearance < 0.0;
+                }
+            }
+        }
+        least[k] = floor;
+        most[k] = is_empty ? -1.0 : ceiling;
+    }
+}
+
+/* Intervals of x, (P), from which the end can be reached with x = `last`. The next x is `factor x + least` to
+`factor x + most` by each row, (P - 1, c), and x is `floor` to `ceiling`. Returns 0 if an interval is empty. */
+int brachis_go_backwards(
+    long places, long rows, const double *factor, const double *least, const double *most, const double *floor,
+    const double *ceiling, double last, double flat, double rounding, double *low, double *high
+)
+{
+    low[places - 1] = last;
+    high[places - 1] = last;
+    for (long k = places - 2; k >= 0; k--) {
+        double from = floor[k];
+        double to = ceiling[k];
+        const double *f = factor + k * rows;
+        for (long i = 0; i < rows; i++) {
+            /* Where the next x does not depend on this one a row says nothing of it. */
+            if (f[i] > flat) {
+                to = smaller(to, (high[k + 1] - least[k * rows + i]) / f[i]);
+                from = larger(from, (low[k + 1] - most[k * rows + i]) / f[i]);
+            }
+        }
+        if (!(from <= to * (1.0 + rounding)) || to < 0.0) {
+            return 0;
+        }
+        low[k] = from;
+        high[k] = larger(to, from);
+    }
+    return 1;
+}
+
+/* The largest x, (P), from `x[0]` on, within the intervals. */
+void brachis_go_forwards(
+    long places, long rows, const double *factor, const double *most, const double *low, const double *high, double *x
+)
+{
+    for (long k = 0; k + 1 < places; k++) {
+        double next = high[k + 1];
+        for (long i = 0; i < rows; i++) {
+            next = smaller(next, factor[k * rows + i] * x[k] + most[k * rows + i]);
+        }
+        x[k + 1] = larger(next, low[k + 1]);
+    }
+}

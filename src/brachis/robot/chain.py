@@ -1,0 +1,46 @@
+"""The chain of a model as the kernel takes it: at the zero posture, in the world frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.kernel import Chain
+
+
+def chain_of(model: pin.Model, tool_frame: int) -> Chain:
+    """Describe the joints, the bodies and a frame of a serial model at its zero posture.
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+    tool_frame : int
+        Index of the tool frame.
+    """
+    data = model.createData()
+    zero = np.zeros(model.nq)
+    columns = pin.computeJointJacobians(model, data, zero).reshape(6, model.nq)
+    linear = columns[:3].T
+    angular = columns[3:].T
+    revolute = np.linalg.norm(angular, axis=1) > 0.5
+    bodies = list(model.inertias)[1:]
+    placements = list(data.oMi)[1:]
+    turned = [
+        placed.rotation @ body.inertia @ placed.rotation.T
+        for body, placed in zip(bodies, placements, strict=True)
+    ]
+    centers = [
+        placed.act(body.lever) for body, placed in zip(bodies, placements, strict=True)
+    ]
+    tool = pin.updateFramePlacement(model, data, tool_frame)
+    return Chain(
+        revolute=revolute,
+        axes=np.where(revolute[:, None], angular, linear),
+        points=np.where(revolute[:, None], np.cross(angular, linear), 0.0),
+        tool_position=np.array(tool.translation),
+        tool_rotation=np.array(tool.rotation),
+        masses=np.array([body.mass for body in bodies]),
+        centers=np.array(centers),
+        inertias=np.array(turned)[:, *np.triu_indices(3)],
+        gravity=np.array(model.gravity.linear),
+    )

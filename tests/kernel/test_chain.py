@@ -1,0 +1,130 @@
+"""The kernel against Pinocchio, on random chains of revolute and prismatic joints."""
+
+import pickle
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from brachis.robot.chain import chain_of
+
+STATES = 11  # not a multiple of what is computed side by side
+
+
+def random_model(n: int, seed: int) -> tuple[pin.Model, int]:
+    """A serial chain of n joints with any axes, and the index of its tool frame."""
+    rng = np.random.default_rng(seed)
+    model = pin.Model()
+    model.gravity.linear = rng.normal(0.0, 9.0, 3)
+    parent = 0
+    for i in range(n):
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        turns = rng.random() < 0.7
+        kind = "Revolute" if turns else "Prismatic"
+        joint = getattr(pin, f"JointModel{kind}Unaligned")(axis)
+        parent = model.addJoint(parent, joint, pin.SE3.Random(), f"joint {i}")
+        model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Random())
+    frame = pin.Frame("tool", parent, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME)
+    return model, model.addFrame(frame)
+
+
+def agrees(found: np.ndarray, known: np.ndarray) -> bool:
+    scale = max(np.abs(known).max(), 1.0)
+    return bool(np.abs(found - known).max() < 1e-11 * scale)
+
+
+@pytest.fixture(params=[(n, seed) for n in range(1, 11) for seed in range(3)], ids=str)
+def case(request):
+    n, seed = request.param
+    pin.seed(seed)
+    model, frame = random_model(n, seed)
+    rng = np.random.default_rng(100 + seed)
+    states = rng.normal(0.0, 2.0, (3, STATES, n))
+    return model, frame, chain_of(model, frame), states
+
+
+def test_torques(case):
+    model, _, chain, (q, qdot, qddot) = case
+    data = model.createData()
+    known = [
+        pin.rnea(model, data, *state) for state in zip(q, qdot, qddot, strict=True)
+    ]
+    assert agrees(chain.torques(q, qdot, qddot), np.array(known))
+
+
+def test_torque_derivatives(case):
+    model, _, chain, (q, qdot, qddot) = case
+    data = model.createData()
+    found = chain.torque_derivatives(q, qdot, qddot)
+    for k in range(STATES):
+        known = pin.computeRNEADerivatives(model, data, q[k], qdot[k], qddot[k])
+        by_q, by_qdot, matrix = (np.array(part) for part in known)
+        upper = np.triu(matrix)
+        for own, other in zip(
+            found, (by_q, by_qdot, upper + np.triu(matrix, 1).T), strict=True
+        ):
+            assert agrees(own[k], other)
+
+
+def test_mass_matrices(case):
+    model, _, chain, (q, *_) = case
+    data = model.createData()
+    for matrix, posture in zip(chain.mass_matrices(q), q, strict=True):
+        upper = np.triu(pin.crba(model, data, posture))
+        assert agrees(matrix, upper + np.triu(upper, 1).T)
+
+
+@pytest.mark.parametrize("in_tool_axes", [True, False])
+def test_tool(case, in_tool_axes):
+    model, frame, chain, (q, *_) = case
+    axes = pin.LOCAL if in_tool_axes else pin.LOCAL_WORLD_ALIGNED
+    data = model.createData()
+    positions, rotations, twists = chain.tool(q, in_tool_axes=in_tool_axes)
+    for k in range(STATES):
+        columns = pin.computeFrameJacobian(model, data, q[k], frame, axes)
+        pin.framesForwardKinematics(model, data, q[k])
+        assert agrees(positions[k], data.oMf[frame].translation)
+        assert agrees(rotations[k], data.oMf[frame].rotation)
+        assert agrees(twists[:, k], columns.reshape(6, -1))
+
+
+def test_no_states(case):
+    chain = case[2]
+    none = np.empty((0, chain.n))
+    assert chain.torques(none, none, none).shape == (0, chain.n)
+    assert chain.tool(none, in_tool_axes=True)[2].shape == (6, 0, chain.n)
+
+
+def test_odd_arrays_are_read_as_they_are(case):
+    chain, (q, qdot, qddot) = case[2], case[3]
+    known = chain.torques(q, qdot, qddot)
+    columns = np.asfortranarray(q)
+    every_second = np.repeat(qdot, 2, axis=1)[:, ::2]
+    assert np.array_equal(chain.torques(columns, every_second, qddot), known)
+
+
+def test_what_is_not_finite_stays_in_its_state(case):
+    chain, (q, qdot, qddot) = case[2], case[3].copy()
+    known = chain.torques(q, qdot, qddot)
+    qdot[3] = np.nan
+    found = chain.torques(q, qdot, qddot)
+    assert np.isnan(found[3]).any()
+    assert np.array_equal(np.delete(found, 3, 0), np.delete(known, 3, 0))
+
+
+def test_a_chain_survives_pickling(case):
+    chain, (q, qdot, qddot) = case[2], case[3]
+    known = chain.torques(q, qdot, qddot)
+    again = pickle.loads(pickle.dumps(chain))  # noqa: S301
+    assert np.array_equal(again.torques(q, qdot, qddot), known)
+
+
+def test_masses_may_be_as_small_as_numbers_get():
+    model, frame = random_model(3, 0)
+    for i in range(1, 4):
+        model.inertias[i] = pin.Inertia(1e-300, np.zeros(3), 1e-300 * np.eye(3))
+    q = np.ones((1, 3))
+    found = chain_of(model, frame).torques(q, q, q)
+    assert np.isfinite(found).all()
+    assert np.abs(found).max() < 1e-290
