@@ -5,6 +5,7 @@ formulas.
 """
 
 from brachis.kernel.chain import Chain
+from brachis.kernel.halving import halve_intervals
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 
-__all__ = ["Chain", "bounds_of_pairs", "go_backwards", "go_forwards"]
+__all__ = ["Chain", "bounds_of_pairs", "go_backwards", "go_forwards", "halve_intervals"]

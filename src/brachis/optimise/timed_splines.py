@@ -7,11 +7,9 @@ rates, and are sharpened where these change smoothly: so no spline accelerates m
 
 from __future__ import annotations
 
-import heapq
-import itertools
-
 import numpy as np
 
+from brachis import kernel
 from brachis.common import tolerances
 from brachis.optimise.boundary import greville
 from brachis.optimise.motion import Motion
@@ -84,41 +82,20 @@ def breaks_for(
     jumps = np.where(is_switch, jumps, 0.0)
     ramps = timing.t_end / 24.0 * np.abs(np.diff(acceleration))
 
-    def loss(low: float, high: float) -> float:
-        first, last = np.searchsorted(t, [low, high])
-        first = max(first - 1, 0)
-        at = t[first : last + 1]
-        if len(at) < 3:
-            return 0.0
-        inside = values[first : last + 1]
-        part = (at - at[0]) / (at[-1] - at[0])
-        line = inside[0] + part[:, None] * (inside[-1] - inside[0])
-        off = np.abs(inside - line).max()
-        length = high - low
-        slowest = rate[first : last + 1].min()
-        late = ramps[first:last].max() * length
-        part_lost = late / slowest if late < slowest else 1.0
-        smooth = off - jumps[first:last].max() if len(at) >= _FEW else 0.0
-        return float(length * max(smooth, off * part_lost))
-
     pieces = max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL)
-    evenly = np.linspace(0.0, 1.0, pieces + 1)
-    queue = [(-loss(*pair), *pair) for pair in itertools.pairwise(evenly)]
-    heapq.heapify(queue)
-    done: list[float] = []
-    lost = -sum(item[0] for item in queue)
-    while lost > tolerance and queue and len(done) + len(queue) < most:
-        worst, low, high = heapq.heappop(queue)
-        lost += worst
-        if (high - low) * timing.t_end < SHORTEST:
-            done.append(low)
-            continue
-        middle = 0.5 * (low + high)
-        for part in ((low, middle), (middle, high)):
-            own = loss(*part)
-            lost += own
-            heapq.heappush(queue, (-own, *part))
-    begins = np.sort([*done, *(low for _, low, _ in queue)])
+    shortest = SHORTEST / timing.t_end
+    begins = kernel.halve_intervals(
+        t,
+        values,
+        rate,
+        jumps,
+        ramps,
+        few=_FEW,
+        pieces=pieces,
+        tolerance=tolerance,
+        shortest=shortest,
+        most=int(min(most, pieces + 2.0 / shortest)),
+    )
     return even_out(np.append(begins, 1.0))
 
 
