@@ -33,7 +33,7 @@ from committed import processor_time, save
 ROOT = Path(__file__).parents[1]
 PLACES = 10_000
 LENGTH = 0.5  # m
-WALKS = (5, 20, 100, 500)
+WALKS = (5, 20, 100, 500, 2000)
 SEAMS = range(10)
 CORNERS = (5.0, 1.0, 0.3, 0.1)  # mm
 COLUMNS = ("case", "found", "compared with", "difference", "processor time")

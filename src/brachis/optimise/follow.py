@@ -38,8 +38,8 @@ _GAINS = 0.9
 """Finer meshes are tried for speed as long as the last one was slower by less than this part of what it was before."""
 _BETTER = 0.5
 """A finer mesh is tried as long as the last one left less than this part of the violation of limits on postures."""
-_MOST_INTERVALS = 40_000
-"""Intervals of a phase: the verification looks at 8 instants in each, and at no more than 400,000."""
+_MOST_INTERVALS = 200_000
+"""Intervals of a phase: the verification looks at 8 instants in each, and at no more than 2,000,000."""
 _LOOKS = (4, 10)
 """Times in each interval at which limits are looked at: at first, and once they hold there."""
 _ROUNDS = 20
@@ -67,12 +67,15 @@ class Laid:
         Part of the time by which these knots make the motion slower, at least; infinite where limits cannot hold.
     outside : float
         Largest violation of a limit on postures, which a longer time does not relieve; infinite if it is not known.
+    is_cut : bool
+        Whether laying ended early, because the motion was slower than allowed.
     """
 
     motion: Motion
     violation: float = np.inf
     slower: float = np.inf
     outside: float = np.inf
+    is_cut: bool = False
 
     def is_better_than(self, other: Laid) -> bool:
         """Tell whether they exceed limits on postures less, or where both keep them, are faster."""
@@ -155,6 +158,8 @@ def follow(
             break
         # Over the last knots limits are narrowed until they hold, however slow that is.
         is_last = deadline.passed or not (is_fast or laid.slower < _GAINS * slower)
+        if is_last and not laid.is_cut:
+            break
         if is_last:
             continue
         slower = laid.slower
@@ -294,7 +299,7 @@ def _hold_limits(
             best = laid
         slower = motion.t_end / fastest.t_end - 1.0
         if slower > allowed:
-            return replace(best, slower=slower)
+            return replace(best, slower=slower, is_cut=True)
         if violation <= _ENOUGH and looks < closer:
             looks = closer
             best = replace(best, violation=np.inf)
@@ -328,8 +333,8 @@ def _between_stations(
 ) -> np.ndarray:
     """Lay lines above values, (K, c), over the knot intervals, and take them between stations, (P - 1, c)."""
     most = np.zeros((len(breaks) + 1, values.shape[1]))
-    np.maximum.at(most, np.searchsorted(breaks, t_norm, side="left"), values)
-    np.maximum.at(most, np.searchsorted(breaks, t_norm, side="right"), values)
+    _raise_to(most, np.searchsorted(breaks, t_norm, side="left"), values)
+    _raise_to(most, np.searchsorted(breaks, t_norm, side="right"), values)
     at_breaks = np.maximum(most[1:], most[:-1])
     t = timing.times / timing.t_end
     first = (np.searchsorted(breaks, t, side="right") - 1).clip(0, len(breaks) - 2)
@@ -337,5 +342,12 @@ def _between_stations(
     lines = (1.0 - part) * at_breaks[first] + part * at_breaks[first + 1]
     found = np.maximum(lines[1:], lines[:-1])
     station = (np.searchsorted(t, breaks, side="right") - 1).clip(0, len(found) - 1)
-    np.maximum.at(found, station, at_breaks)
+    _raise_to(found, station, at_breaks)
     return found
+
+
+def _raise_to(most: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
+    """Raise rows of a table, (R, c), to the largest of the values, (K, c), that belong to them; rows, (K,), ascend."""
+    first = np.flatnonzero(np.diff(rows, prepend=-1))
+    largest = np.maximum.reduceat(values, first)
+    most[rows[first]] = np.maximum(most[rows[first]], largest)

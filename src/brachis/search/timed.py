@@ -129,6 +129,8 @@ def plan_timing(
         return None
     finer, report = laid
     factor = 1.0
+    if options.tolerance < report.violation < _LONGEST:
+        factor += _MORE * report.violation
     worst = np.inf
     for number in itertools.count(1):
         own = SolvedProgram(

@@ -42,7 +42,7 @@ ARRAYS = (
 """Names of the arrays in the file; as in `Trajectory`."""
 _MOST = {
     "bytes": 128_000_000,  # of the file, and of what it holds unpacked
-    "nodes": 150_000,  # of a motion: they bound the time that its verification takes
+    "nodes": 500_000,  # of a motion: they bound the time that its verification takes
     "degree": 7,  # of splines, as in tasks
 }
 """Bounds on what a result file may hold."""

@@ -195,6 +195,17 @@ class MotionStates:
         first = np.append(True, ~again)[: len(piece)]
         piece = piece[first]
         u = u[first]
+        blocks = range(_AT_ONCE, max(len(piece), 1), _AT_ONCE)
+        parts = zip(np.split(piece, blocks), np.split(u, blocks), strict=True)
+        states = [cls._evaluate(pieces, *part) for part in parts]
+        rows = zip(*(vars(own).values() for own in states), strict=True)
+        return cls(*map(np.concatenate, rows))
+
+    @classmethod
+    def _evaluate(
+        cls, pieces: Pieces, piece: np.ndarray, u: np.ndarray
+    ) -> MotionStates:
+        """Evaluate pieces at places, ascending."""
         t = pieces.time(piece, u)
         q = pieces.positions(piece, u)
         qdot, qddot, qdddot = (
@@ -275,8 +286,12 @@ class Given:
         return replace(self, states=self.states.only(inside))
 
 
-MOST_INSTANTS = 400_000
-"""Instants at which a motion is checked before limits ask for more: some seconds' work, and 2 GB."""
+MOST_INSTANTS = 2_000_000
+"""Instants at which a motion is checked before limits ask for more: some ten seconds' work, and 3 GB."""
+_USUAL_INSTANTS = 200_000
+"""Instants in the knot intervals, unless each has the fewest."""
+_AT_ONCE = 50_000
+"""Instants that are evaluated at once."""
 _FEWEST = 8
 """Steps in a knot interval, no fewer, however many intervals there are; accelerations are polynomials within it."""
 _LEAST_STEPS = 3
@@ -319,7 +334,7 @@ def _spread(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> P
     middle = 0.5 * (edges[1:] + edges[:-1])
     interval = np.searchsorted(knots, middle).clip(1, len(knots) - 1)
     share = np.diff(edges) / np.diff(knots)[interval - 1]
-    each = np.clip(0.5 * MOST_INSTANTS / len(knots), _FEWEST, None)
+    each = np.clip(_USUAL_INSTANTS / len(knots), _FEWEST, None)
     by_interval = share * min(options.points_per_interval, each) - 1e-6  # less rounding
     travel = np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)
     by_travel = travel[first] * (high - low) / _TRAVEL

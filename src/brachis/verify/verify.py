@@ -63,7 +63,7 @@ def verify_trajectory(
     InputError
         `robot` has other joints than the trajectory; or the trajectory's task does not fit the robot: its postures
         (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`); or the motion would have to be
-        looked at at more than 400,000 instants.
+        looked at at more than 2,000,000 instants.
 
     Examples
     --------
