@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from brachis.kernel import rotation_vectors
 from brachis.robot.chain import chain_of
 
 STATES = 11  # not a multiple of what is computed side by side
@@ -128,3 +129,28 @@ def test_masses_may_be_as_small_as_numbers_get():
     found = chain_of(model, frame).torques(q, q, q)
     assert np.isfinite(found).all()
     assert np.abs(found).max() < 1e-290
+
+
+def test_rotation_vectors():
+    rng = np.random.default_rng(0)
+    axes = rng.normal(size=(400, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    angles = np.concatenate(
+        [
+            rng.uniform(0.0, np.pi, 200),
+            10.0 ** rng.uniform(-16, 0, 100),
+            np.pi - 10.0 ** rng.uniform(-12, 0, 100),
+        ]
+    )
+    vectors = axes * angles[:, None]
+    rotations = np.array([pin.exp3(vector) for vector in vectors])
+    found = rotation_vectors(rotations)
+    # Half a turn about an axis is one about the opposite axis, too.
+    is_half = angles > np.pi - 1e-7
+    signs = np.sign(np.sum(found * vectors, axis=1))[:, None]
+    assert np.abs(found - vectors)[~is_half].max() < 1e-13
+    assert np.abs(found * signs - vectors)[is_half].max() < 1e-13
+
+
+def test_no_rotation_is_no_vector():
+    assert np.array_equal(rotation_vectors(np.eye(3)[None]), np.zeros((1, 3)))

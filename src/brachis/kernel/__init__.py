@@ -7,5 +7,14 @@ formulas.
 from brachis.kernel.chain import Chain
 from brachis.kernel.halving import halve_intervals
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
+from brachis.kernel.tool import rotation_vectors, tool_derivatives
 
-__all__ = ["Chain", "bounds_of_pairs", "go_backwards", "go_forwards", "halve_intervals"]
+__all__ = [
+    "Chain",
+    "bounds_of_pairs",
+    "go_backwards",
+    "go_forwards",
+    "halve_intervals",
+    "rotation_vectors",
+    "tool_derivatives",
+]

@@ -137,14 +137,14 @@ class Chain:
         rotations = np.empty((count, 3, 3))
         twists = np.empty((6, count, self.n))
         found = (positions, rotations, twists)
-        self._call("brachis_tool", (q,), ctypes.c_int(in_tool_axes), *found)
+        self._call("brachis_tool", (q,), int(in_tool_axes), *found)
         return found
 
     def _call(
         self,
         name: str,
         states: tuple[np.ndarray, ...],
-        *others: np.ndarray | ctypes.c_int,
+        *others: np.ndarray | int,
     ) -> None:
         """Call a function of the library with postures, rates or accelerations, (K, n) each, and where it writes."""
         count = len(states[0])
@@ -153,6 +153,4 @@ class Chain:
             address(own) if isinstance(own, np.ndarray) else own
             for own in (*kept, *others)
         ]
-        function = getattr(load(), name)
-        function.restype = None
-        function(ctypes.byref(self._structure), ctypes.c_long(count), *given)
+        getattr(load(), name)(ctypes.addressof(self._structure), count, *given)

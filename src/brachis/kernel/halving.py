@@ -78,14 +78,12 @@ def halve_intervals(
     room = max(most, pieces) + 2
     heap = np.empty((room, 3))
     begins = np.empty(room)
-    halve = load().brachis_halve
-    halve.restype = ctypes.c_long
-    found = halve(
-        ctypes.byref(own),
-        ctypes.c_long(pieces),
-        ctypes.c_double(tolerance),
-        ctypes.c_double(shortest),
-        ctypes.c_long(most),
+    found = load().brachis_halve(
+        ctypes.addressof(own),
+        pieces,
+        tolerance,
+        shortest,
+        most,
         address(heap),
         address(begins),
     )

@@ -1,4 +1,4 @@
-"""Load the compiled library."""
+"""Load the compiled library, and call its functions."""
 
 from __future__ import annotations
 
@@ -12,6 +12,26 @@ import numpy as np
 from brachis.kernel.compile import library_path, source_digest
 
 _REMEDY = "compile it: python -m pip install --editable . in the folder of the project"
+_KINDS = {
+    "p": ctypes.c_void_p,
+    "l": ctypes.c_long,
+    "d": ctypes.c_double,
+    "i": ctypes.c_int,
+    "-": None,
+}
+_FUNCTIONS = {
+    "brachis_torques": "- plpppp",
+    "brachis_torque_derivatives": "- plpppppp",
+    "brachis_mass_matrices": "- plpp",
+    "brachis_tool": "- plpippp",
+    "brachis_tool_derivatives": "- llpppippp",
+    "brachis_logarithms": "- lpp",
+    "brachis_bounds_of_pairs": "- llpppdpp",
+    "brachis_go_backwards": "i llpppppdddpp",
+    "brachis_go_forwards": "- llppppp",
+    "brachis_halve": "l plddlpp",
+}
+"""What functions return and take: pointer, long, double, int, or nothing."""
 
 
 @cache
@@ -43,14 +63,18 @@ def _open(path: Path) -> ctypes.CDLL:
         raise ImportError(
             f"the compiled part of brachis, {path.name}, was made of other source than this; {_REMEDY}"
         )
+    for name, kinds in _FUNCTIONS.items():
+        function = getattr(library, name)
+        returned, taken = kinds.split()
+        function.restype = _KINDS[returned]
+        function.argtypes = [_KINDS[kind] for kind in taken]
     return library
 
 
-def address(values: np.ndarray) -> ctypes.c_void_p:
+def address(values: np.ndarray) -> int:
     """Return where the numbers of a contiguous array of doubles begin."""
-    assert values.dtype == np.float64
-    assert values.flags.c_contiguous
-    return ctypes.c_void_p(values.ctypes.data)
+    place, _ = values.__array_interface__["data"]
+    return int(place)
 
 
 def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-
 import numpy as np
 
 from brachis.kernel.library import address, as_doubles, load
@@ -29,9 +27,9 @@ def bounds_of_pairs(
     lines = [as_doubles(own, slope.shape) for own in (slope, lower, upper)]
     least, most = np.empty((2, len(slope)))
     load().brachis_bounds_of_pairs(
-        *_sizes(slope),
+        *slope.shape,
         *map(address, lines),
-        ctypes.c_double(parallel),
+        parallel,
         address(least),
         address(most),
     )
@@ -71,11 +69,13 @@ def go_backwards(
     ends = [as_doubles(own, shape[:1]) for own in levels]
     low, high = np.empty((2, shape[0] + 1))
     reached = load().brachis_go_backwards(
-        ctypes.c_long(shape[0] + 1),
-        ctypes.c_long(shape[1]),
+        shape[0] + 1,
+        shape[1],
         *map(address, rows),
         *map(address, ends),
-        *map(ctypes.c_double, (last, flat, rounding)),
+        last,
+        flat,
+        rounding,
         address(low),
         address(high),
     )
@@ -94,12 +94,8 @@ def go_forwards(
     x = np.empty_like(low)
     x[0] = first
     load().brachis_go_forwards(
-        ctypes.c_long(len(low)),
-        ctypes.c_long(factor.shape[1]),
+        len(low),
+        factor.shape[1],
         *map(address, (*rows, low, high, x)),
     )
     return x
-
-
-def _sizes(table: np.ndarray) -> tuple[ctypes.c_long, ctypes.c_long]:
-    return ctypes.c_long(table.shape[0]), ctypes.c_long(table.shape[1])

@@ -53,3 +53,124 @@ void brachis_tool(
         }
     }
 }
+
+/* Lie bracket [a, b]. */
+static inline twist bracket(twist a, twist b)
+{
+    return (twist){cross(a.w, b.w), add(cross(a.w, b.v), cross(a.v, b.w))};
+}
+
+static inline twist sum(twist a, twist b)
+{
+    return (twist){add(a.w, b.w), add(a.v, b.v)};
+}
+
+static inline twist times(twist a, pack factor)
+{
+    return (twist){scale(a.w, factor), scale(a.v, factor)};
+}
+
+/* How a motion changes as its axes turn with w. */
+static inline twist turned(vec w, twist a)
+{
+    return (twist){cross(w, a.w), cross(w, a.v)};
+}
+
+static inline twist read_twist(const double *table, long count, long n, long k, long i)
+{
+    pack parts[6];
+    for (int row = 0; row < 6; row++) {
+        parts[row] = gather(table + row * count * n, count, n, k, i);
+    }
+    return (twist){{parts[3], parts[4], parts[5]}, {parts[0], parts[1], parts[2]}};
+}
+
+static inline void write_twist(twist a, double *table, long count, long n, long k, long i)
+{
+    pack parts[6] = {a.v.x, a.v.y, a.v.z, a.w.x, a.w.y, a.w.z};
+    for (int row = 0; row < 6; row++) {
+        scatter(parts[row], table + row * count * n, count, n, k, i);
+    }
+}
+
+/* Derivatives, (6, K, n) each, of the tool's velocity V and acceleration a, from the columns J_i of its Jacobian and
+rates, (K, n). Joints after joint i carry its axis relative to the tool: in the tool's axes dJ_i/dq_k = [J_i, J_k] for
+i < k, else 0 (Murray, Li, Sastry 1994, chapter 3). With S_k and s_k the parts of V and a that come from the joints
+before joint k,
+
+    dV/dq_k = [S_k, J_k],    da/dq_k = [s_k, J_k] + [[S_k, J_k], V - S_k],    da/dqdot_k = 2 [S_k, J_k] + [J_k, V]
+
+In the world's axes the tool's turn with each joint, and a point of it has the acceleration a_v + w x v. */
+void brachis_tool_derivatives(
+    long count, long n, const double *twists, const double *qdot, const double *qddot, int in_tool_axes,
+    double *velocity_q, double *acceleration_q, double *acceleration_qdot
+)
+{
+    for (long k = 0; k < count; k += LANES) {
+        twist columns[n], before[n], parts[n], slopes[n];
+        twist V = {0};
+        twist a = {0};
+        for (long i = 0; i < n; i++) {
+            pack rate = gather(qdot, count, n, k, i);
+            columns[i] = read_twist(twists, count, n, k, i);
+            before[i] = V;
+            parts[i] = a;
+            slopes[i] = bracket(V, columns[i]);
+            V = sum(V, times(columns[i], rate));
+            a = sum(a, times(columns[i], gather(qddot, count, n, k, i)));
+            a = sum(a, times(slopes[i], rate));
+        }
+        twist classical = {a.w, add(a.v, cross(V.w, V.v))};
+        for (long i = 0; i < n; i++) {
+            twist after = sum(V, times(before[i], all(-1.0)));
+            twist by_q = sum(bracket(parts[i], columns[i]), bracket(slopes[i], after));
+            twist by_qdot = sum(times(slopes[i], all(2.0)), bracket(columns[i], V));
+            twist slope = slopes[i];
+            if (!in_tool_axes) {
+                vec w = columns[i].w;
+                by_qdot.v = add(by_qdot.v, add(cross(w, V.v), cross(V.w, columns[i].v)));
+                by_q.v = add(by_q.v, add(cross(slope.w, V.v), cross(V.w, slope.v)));
+                by_q = sum(by_q, turned(w, classical));
+                slope = sum(slope, turned(w, V));
+            }
+            write_twist(slope, velocity_q, count, n, k, i);
+            write_twist(by_q, acceleration_q, count, n, k, i);
+            write_twist(by_qdot, acceleration_qdot, count, n, k, i);
+        }
+    }
+}
+
+/* Rotation vectors, (K, 3), of rotation matrices, (K, 3, 3): by the quaternion, whose largest part is found first
+(S. W. Shepperd, Journal of Guidance and Control 1(3), 1978). */
+void brachis_logarithms(long count, const double *rotations, double *vectors)
+{
+    for (long k = 0; k < count; k++) {
+        const double *R = rotations + 9 * k;
+        double *vector = vectors + 3 * k;
+        double trace = R[0] + R[4] + R[8];
+        double parts[4] = {trace, R[0], R[4], R[8]};
+        int largest = 0;
+        for (int i = 1; i < 4; i++) {
+            largest = parts[i] > parts[largest] ? i : largest;
+        }
+        /* Four times the product of the largest part with every part. */
+        double x = R[7] - R[5];
+        double y = R[2] - R[6];
+        double z = R[3] - R[1];
+        double table[4][4] = {
+            {1.0 + trace, x, y, z},
+            {x, 1.0 + 2.0 * R[0] - trace, R[1] + R[3], R[2] + R[6]},
+            {y, R[1] + R[3], 1.0 + 2.0 * R[4] - trace, R[5] + R[7]},
+            {z, R[2] + R[6], R[5] + R[7], 1.0 + 2.0 * R[8] - trace},
+        };
+        const double *found = table[largest];
+        double sign = found[0] < 0.0 ? -1.0 : 1.0;
+        double size = sqrt(found[1] * found[1] + found[2] * found[2] + found[3] * found[3]);
+        double real = sign * found[0];
+        /* Half the angle over its sine. */
+        double factor = size > 1e-9 * real ? 2.0 * atan2(size, real) / size : 2.0 / real;
+        for (int i = 0; i < 3; i++) {
+            vector[i] = sign * factor * found[1 + i];
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from brachis.common.summary import Summary
 from brachis.errors import InputError
-from brachis.kernel import Chain
+from brachis.kernel import Chain, tool_derivatives
 from brachis.robot.robot import Robot
 from brachis.task import ToolPose
 
@@ -163,20 +163,14 @@ class TaskMap(Summary, ABC):
         """Velocity-dependent task acceleration Jdot qdot = V_q qdot, (K, m), from the `twists` at K postures."""
         return np.einsum("kmn,kn->km", self.velocity_slopes(twists, qdot), qdot)
 
-    @abstractmethod
     def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
         """V_q alone, (K, m, n), of K states from the `twists` at their postures."""
+        return self.derivatives(twists, qdot, np.zeros_like(qdot)).velocity_q
 
-    @abstractmethod
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
         """V_q, A_q and A_v of K states from the `twists` at their postures; see `twists`."""
-
-    def _of_rows(self, tool: TaskDerivatives) -> TaskDerivatives:
-        """Take the rows of this map from derivatives of twists, (6, K, n) each."""
-        return TaskDerivatives(
-            self.jacobian(tool.velocity_q),
-            self.jacobian(tool.acceleration_q),
-            self.jacobian(tool.acceleration_qdot),
-        )
+        in_tool_axes = self.frame is pin.ReferenceFrame.LOCAL
+        slopes = tool_derivatives(twists, qdot, qddot, in_tool_axes=in_tool_axes)
+        return TaskDerivatives(*map(self.jacobian, slopes))

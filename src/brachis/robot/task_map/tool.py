@@ -1,22 +1,4 @@
-"""The tool as task space: its pose, rows of its position in the world frame, or two such rows and yaw in their plane.
-
-Velocity and acceleration of the tool frame and their derivatives come from the columns of its Jacobian. The columns J_i
-are twists (v, w) at the tool frame's origin. Joints after joint i carry its axis relative to the tool, so that in the
-tool frame's own axes
-
-    dJ_i/dq_k = [J_i, J_k] for i < k, else 0,        [X, Y] = (w_X x v_Y + v_X x w_Y, w_X x w_Y).
-
-With V = J qdot, S_k the part of it that comes from the joints before joint k, a = J qddot + Jdot qdot and s_k its part:
-
-    s_k = sum_{i<k} (J_i qddot_i + [S_i, J_i] qdot_i)
-    dV/dq_k    = [S_k, J_k]
-    da/dqdot_k = 2 [S_k, J_k] + [J_k, V]
-    da/dq_k    = [s_k, J_k] + [[S_k, J_k], V - S_k]
-
-(R. M. Murray, Z. Li, S. S. Sastry, A Mathematical Introduction to Robotic Manipulation, 1994, chapter 3). They hold in
-any axes that stand still while the derivative is taken. Rows of the position use the world's axes: there the tool frame
-turns with w_k for each joint k, and the classical acceleration of its origin is a_v + w x v.
-"""
+"""The tool as task space: its pose, rows of its position in the world frame, or two such rows and yaw there."""
 
 from __future__ import annotations
 
@@ -27,48 +9,12 @@ from typing import ClassVar
 import numpy as np
 import pinocchio as pin
 
-from brachis.common.arrays import cross
 from brachis.errors import InputError
+from brachis.kernel import rotation_vectors
 from brachis.robot.joints import principal
-from brachis.robot.task_map.protocol import POSE_ROWS, TaskDerivatives, TaskMap
+from brachis.robot.task_map.protocol import POSE_ROWS, TaskMap
 from brachis.task import ToolPose
 from brachis.task.points.units import rotation_by
-
-
-def _derive(
-    twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, TaskDerivatives]:
-    """V and a, (6, K, 1), of K states (K, n), and their derivatives, (6, K, n), from the `twists` at their postures."""
-    before, velocity = _sums(twists * qdot)
-    velocity_q = _bracket(before, twists)
-    parts, acceleration = _sums(twists * qddot + velocity_q * qdot)
-    derivatives = TaskDerivatives(
-        velocity_q=velocity_q,
-        acceleration_q=_bracket(parts, twists)
-        + _bracket(velocity_q, velocity - before),
-        acceleration_qdot=2.0 * velocity_q + _bracket(twists, velocity),
-    )
-    return velocity, acceleration, derivatives
-
-
-def _turn(turning: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Rates (6, K, n) at which linear and angular parts (6, K, 1) change as their axes turn, at `turning` (3, K, n)."""
-    return np.concatenate([cross(turning, vectors[:3]), cross(turning, vectors[3:])])
-
-
-def _sums(parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Add parts (6, K, n) over the joints before each one, (6, K, n), and over all, (6, K, 1)."""
-    upto = np.cumsum(parts, axis=2)
-    return upto - parts, upto[:, :, -1:]
-
-
-def _bracket(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Lie bracket of twists (6, K, n or 1)."""
-    v = first[:3]
-    w = first[3:]
-    return np.concatenate(
-        [cross(w, second[:3]) + cross(v, second[3:]), cross(w, second[3:])]
-    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,23 +55,12 @@ class Pose(TaskMap):
         to = first[..., 3:].reshape(*shape, 3, 3)
         back = np.swapaxes(second[..., 3:].reshape(*shape, 3, 3), -1, -2)
         shift = np.einsum("...ij,...j->...i", back, first[..., :3] - second[..., :3])
-        turn = [pin.log3(part) for part in (back @ to).reshape(-1, 3, 3)]
-        return np.concatenate([shift, np.reshape(turn, (*shape, 3))], axis=-1)
+        turn = rotation_vectors((back @ to).reshape(-1, 3, 3))
+        return np.concatenate([shift, turn.reshape(*shape, 3)], axis=-1)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """Return the twists themselves."""
         return twists
-
-    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """Return dV/dq, (K, 6, n)."""
-        before, _ = _sums(twists * qdot)
-        return self.jacobian(_bracket(before, twists))
-
-    def derivatives(
-        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-    ) -> TaskDerivatives:
-        """Return dV/dq, da/dq and da/dqdot, each (K, 6, n)."""
-        return self._of_rows(_derive(twists, qdot, qddot)[2])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,31 +76,6 @@ class WorldRows(TaskMap):
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """Return the rows of the linear velocity."""
         return twists[list(self.axes)]
-
-    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """Return the slopes of the velocity in the world's axes, which stand still, (K, m, n)."""
-        before, velocity = _sums(twists * qdot)
-        return self.jacobian(_bracket(before, twists) + _turn(twists[3:], velocity))
-
-    def derivatives(
-        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-    ) -> TaskDerivatives:
-        """Return the derivatives of velocity and classical acceleration in the world's axes, (K, m, n) each."""
-        velocity, classical, tool = _derive(twists, qdot, qddot)
-        v = velocity[:3]
-        w = velocity[3:]
-        turning = twists[3:]
-        velocity_q = tool.velocity_q
-        tool.acceleration_qdot[:3] += cross(turning, v) + cross(w, twists[:3])
-        tool.acceleration_q[:3] += cross(velocity_q[3:], v) + cross(w, velocity_q[:3])
-        classical[:3] += cross(w, v)
-        return self._of_rows(
-            TaskDerivatives(
-                velocity_q=velocity_q + _turn(turning, velocity),
-                acceleration_q=tool.acceleration_q + _turn(turning, classical),
-                acceleration_qdot=tool.acceleration_qdot,
-            )
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,0 +1,47 @@
+"""Derivatives of the tool's motion, and rotation vectors; see `brachis.robot.task_map`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.kernel.library import address, as_doubles, load
+
+
+def tool_derivatives(
+    twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, *, in_tool_axes: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Differentiate the tool's velocity V = J qdot and its acceleration a = J qddot + Jdot qdot.
+
+    Parameters
+    ----------
+    twists : (6, K, n) ndarray
+        Columns of the Jacobian; see `Chain.tool`.
+    qdot, qddot : (K, n) ndarray
+    in_tool_axes : bool
+        Whether the twists are along the tool's axes; along the world's, a is the acceleration of the tool's origin.
+
+    Returns
+    -------
+    tuple of (6, K, n) ndarray
+        dV/dq, da/dq and da/dqdot.
+    """
+    _, count, n = twists.shape
+    kept = [
+        as_doubles(twists, twists.shape),
+        as_doubles(qdot, (count, n)),
+        as_doubles(qddot, (count, n)),
+    ]
+    found = np.empty((3, *twists.shape))
+    load().brachis_tool_derivatives(
+        count, n, *map(address, kept), in_tool_axes, *map(address, found)
+    )
+    return found[0], found[1], found[2]
+
+
+def rotation_vectors(rotations: np.ndarray) -> np.ndarray:
+    """Rotation vectors, (K, 3), rad, of rotation matrices, (K, 3, 3)."""
+    count = len(rotations)
+    kept = as_doubles(rotations, (count, 3, 3))
+    found = np.empty((count, 3))
+    load().brachis_logarithms(count, address(kept), address(found))
+    return found
