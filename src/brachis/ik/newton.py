@@ -2,8 +2,7 @@
 
     f(q) = z,  C q = c:        [J; C] dq = (z - f(q), c - C q)
 
-for a batch of K postures at once. Tool placement and Jacobian come from the screw axes of the chain, which move all
-postures of a batch together (`ChainGeometry.screws_at`).
+for a batch of K postures at once, in the kernel.
 
 Where only an answer beside the given posture will do, steps have to shrink by half: then the method converges there.
 P. Deuflhard, Newton methods for nonlinear problems, Springer 2004 (natural monotonicity test).
@@ -16,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.ik.screws import ChainGeometry
+from brachis.kernel import find_postures
 from brachis.robot import TaskMap
 
 
@@ -86,38 +86,17 @@ class Newton:
         (K, n) ndarray
             Angles in the turns into which the search leads; NaN where it does not converge.
         """
-        found = np.full(q.shape, np.nan)
-        left = np.flatnonzero(
-            np.isfinite(q).all(axis=1) & np.isfinite(levels).all(axis=1)
+        return find_postures(
+            self._chain,
+            self._task_map.prescribed,
+            targets,
+            q,
+            (rows, levels),
+            steps=steps,
+            tolerance=tolerance,
+            largest_step=largest_step,
+            beside=beside,
         )
-        q = q[left]
-        scale = np.ones(len(q))
-        if beside:
-            scale += np.abs(q).max(axis=1, initial=0.0)
-        longest = largest_step * scale
-        for _ in range(steps):
-            if not len(left):
-                break
-            values, jacobian = self.task_coordinates(q)
-            own = rows[left]
-            gap = self._task_map.difference(targets[left], values)
-            aside = levels[left] - np.einsum("kij,kj->ki", own, q)
-            miss = np.concatenate([gap, aside], axis=1)
-            step = solve_each(np.concatenate([jacobian, own], axis=1), miss)
-            size = np.abs(step).max(axis=1, initial=0.0)
-            met = np.abs(miss).max(axis=1, initial=0.0) < tolerance * scale
-            q = q + step * np.minimum(1.0, longest / np.maximum(size, longest))[:, None]
-            good = np.isfinite(q).all(axis=1)
-            if beside:
-                good &= size < longest
-                longest = 0.5 * size
-            found[left[met & good]] = q[met & good]
-            kept = good & ~met
-            left = left[kept]
-            q = q[kept]
-            scale = scale[kept]
-            longest = longest[kept]
-        return found
 
     def polish(
         self, targets: np.ndarray, q: np.ndarray, held: Sequence[int]

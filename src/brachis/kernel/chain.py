@@ -93,6 +93,11 @@ class Chain:
     def _structure(self) -> _Chain:
         return _Chain(self.n, *(address(own) for own in self._numbers))
 
+    @property
+    def address(self) -> int:
+        """Where the library finds the chain."""
+        return ctypes.addressof(self._structure)
+
     def __getstate__(self) -> dict[str, object]:
         """Leave addresses behind."""
         return {name: value for name, value in vars(self).items() if name[0] != "_"}
@@ -153,4 +158,4 @@ class Chain:
             address(own) if isinstance(own, np.ndarray) else own
             for own in (*kept, *others)
         ]
-        getattr(load(), name)(ctypes.addressof(self._structure), count, *given)
+        getattr(load(), name)(self.address, count, *given)

@@ -29,6 +29,7 @@ _FUNCTIONS = {
     "brachis_bounds_of_pairs": "- llpppdpp",
     "brachis_go_backwards": "i llpppppdddpp",
     "brachis_go_forwards": "- llppppp",
+    "brachis_newton": "- ppllpplpplddip",
     "brachis_halve": "l plddlpp",
 }
 """What functions return and take: pointer, long, double, int, or nothing."""

@@ -1,11 +1,22 @@
 /* Placement of the tool, the columns of its Jacobian, and their derivatives. */
 
-#include "chain.h"
+#include "tool.h"
 
-/* Turn a vector into the axes of the tool, whose rotation has these columns. */
-static inline vec into_tool(const vec *rotation, vec a)
+static inline twist read_twist(const double *table, long count, long n, long k, long i)
 {
-    return (vec){dot(rotation[0], a), dot(rotation[1], a), dot(rotation[2], a)};
+    pack parts[6];
+    for (int row = 0; row < 6; row++) {
+        parts[row] = gather(table + row * count * n, count, n, k, i);
+    }
+    return (twist){{parts[3], parts[4], parts[5]}, {parts[0], parts[1], parts[2]}};
+}
+
+static inline void write_twist(twist a, double *table, long count, long n, long k, long i)
+{
+    pack parts[6] = {a.v.x, a.v.y, a.v.z, a.w.x, a.w.y, a.w.z};
+    for (int row = 0; row < 6; row++) {
+        scatter(parts[row], table + row * count * n, count, n, k, i);
+    }
 }
 
 /* Positions, (K, 3), and rotations, (K, 3, 3), of the tool at K postures, (K, n), and the columns of its Jacobian,
@@ -16,40 +27,23 @@ void brachis_tool(
 )
 {
     long n = arm->joints;
-    long size = count * n;
     for (long k = 0; k < count; k += LANES) {
-        vec axes[n], points[n];
-        displacement placed = at_zero();
+        pack posture[n];
+        twist columns[n];
         for (long i = 0; i < n; i++) {
-            move_joint(arm, i, gather(q, count, n, k, i), &placed, &axes[i], &points[i]);
+            posture[i] = gather(q, count, n, k, i);
         }
-        vec tool = move_point(&placed, arm->tool_position);
-        vec rotation[3];
+        placement tool = place_tool(arm, posture, in_tool_axes, columns);
         for (int j = 0; j < 3; j++) {
-            const double *R = arm->tool_rotation;
-            rotation[j] = turn(&placed, (double[3]){R[j], R[3 + j], R[6 + j]});
-            scatter(rotation[j].x, rotations, count, 9, k, j);
-            scatter(rotation[j].y, rotations, count, 9, k, 3 + j);
-            scatter(rotation[j].z, rotations, count, 9, k, 6 + j);
+            scatter(tool.rotation[j].x, rotations, count, 9, k, j);
+            scatter(tool.rotation[j].y, rotations, count, 9, k, 3 + j);
+            scatter(tool.rotation[j].z, rotations, count, 9, k, 6 + j);
         }
-        scatter(tool.x, positions, count, 3, k, 0);
-        scatter(tool.y, positions, count, 3, k, 1);
-        scatter(tool.z, positions, count, 3, k, 2);
+        scatter(tool.position.x, positions, count, 3, k, 0);
+        scatter(tool.position.y, positions, count, 3, k, 1);
+        scatter(tool.position.z, positions, count, 3, k, 2);
         for (long i = 0; i < n; i++) {
-            vec linear = axes[i];
-            vec angular = constant((double[3]){0.0, 0.0, 0.0});
-            if (arm->turns[i] != 0.0) {
-                linear = cross(axes[i], subtract(tool, points[i]));
-                angular = axes[i];
-            }
-            if (in_tool_axes) {
-                linear = into_tool(rotation, linear);
-                angular = into_tool(rotation, angular);
-            }
-            pack parts[6] = {linear.x, linear.y, linear.z, angular.x, angular.y, angular.z};
-            for (int row = 0; row < 6; row++) {
-                scatter(parts[row], twists + row * size, count, n, k, i);
-            }
+            write_twist(columns[i], twists, count, n, k, i);
         }
     }
 }
@@ -74,23 +68,6 @@ static inline twist times(twist a, pack factor)
 static inline twist turned(vec w, twist a)
 {
     return (twist){cross(w, a.w), cross(w, a.v)};
-}
-
-static inline twist read_twist(const double *table, long count, long n, long k, long i)
-{
-    pack parts[6];
-    for (int row = 0; row < 6; row++) {
-        parts[row] = gather(table + row * count * n, count, n, k, i);
-    }
-    return (twist){{parts[3], parts[4], parts[5]}, {parts[0], parts[1], parts[2]}};
-}
-
-static inline void write_twist(twist a, double *table, long count, long n, long k, long i)
-{
-    pack parts[6] = {a.v.x, a.v.y, a.v.z, a.w.x, a.w.y, a.w.z};
-    for (int row = 0; row < 6; row++) {
-        scatter(parts[row], table + row * count * n, count, n, k, i);
-    }
 }
 
 /* Derivatives, (6, K, n) each, of the tool's velocity V and acceleration a, from the columns J_i of its Jacobian and
@@ -140,37 +117,10 @@ void brachis_tool_derivatives(
     }
 }
 
-/* Rotation vectors, (K, 3), of rotation matrices, (K, 3, 3): by the quaternion, whose largest part is found first
-(S. W. Shepperd, Journal of Guidance and Control 1(3), 1978). */
+/* Rotation vectors, (K, 3), of rotation matrices, (K, 3, 3). */
 void brachis_logarithms(long count, const double *rotations, double *vectors)
 {
     for (long k = 0; k < count; k++) {
-        const double *R = rotations + 9 * k;
-        double *vector = vectors + 3 * k;
-        double trace = R[0] + R[4] + R[8];
-        double parts[4] = {trace, R[0], R[4], R[8]};
-        int largest = 0;
-        for (int i = 1; i < 4; i++) {
-            largest = parts[i] > parts[largest] ? i : largest;
-        }
-        /* Four times the product of the largest part with every part. */
-        double x = R[7] - R[5];
-        double y = R[2] - R[6];
-        double z = R[3] - R[1];
-        double table[4][4] = {
-            {1.0 + trace, x, y, z},
-            {x, 1.0 + 2.0 * R[0] - trace, R[1] + R[3], R[2] + R[6]},
-            {y, R[1] + R[3], 1.0 + 2.0 * R[4] - trace, R[5] + R[7]},
-            {z, R[2] + R[6], R[5] + R[7], 1.0 + 2.0 * R[8] - trace},
-        };
-        const double *found = table[largest];
-        double sign = found[0] < 0.0 ? -1.0 : 1.0;
-        double size = sqrt(found[1] * found[1] + found[2] * found[2] + found[3] * found[3]);
-        double real = sign * found[0];
-        /* Half the angle over its sine. */
-        double factor = size > 1e-9 * real ? 2.0 * atan2(size, real) / size : 2.0 / real;
-        for (int i = 0; i < 3; i++) {
-            vector[i] = sign * factor * found[1 + i];
-        }
+        logarithm(rotations + 9 * k, vectors + 3 * k);
     }
 }

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from brachis.common.summary import Summary
 from brachis.errors import InputError
-from brachis.kernel import Chain, tool_derivatives
+from brachis.kernel import Chain, Prescribed, tool_derivatives
 from brachis.robot.robot import Robot
 from brachis.task import ToolPose
 
@@ -91,6 +91,11 @@ class TaskMap(Summary, ABC):
     def axes(self) -> tuple[int, ...]:
         """World axes (0, 1, 2) of the position rows; none in a space of joints."""
         return tuple(AXES.index(row) for row in self.rows if row in AXES)
+
+    @property
+    def prescribed(self) -> Prescribed:
+        """What of the tool is prescribed, as the kernel takes it; a space of joints has none."""
+        raise NotImplementedError
 
     @property
     def m(self) -> int:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
 
 from brachis.errors import InputError
-from brachis.kernel import rotation_vectors
+from brachis.kernel import Prescribed, rotation_vectors
 from brachis.robot.joints import principal
 from brachis.robot.task_map.protocol import POSE_ROWS, TaskMap
 from brachis.task import ToolPose
@@ -29,6 +30,11 @@ class Pose(TaskMap):
     frame: ClassVar[pin.ReferenceFrame] = pin.ReferenceFrame.LOCAL
 
     rows: tuple[str, ...] = POSE_ROWS
+
+    @cached_property
+    def prescribed(self) -> Prescribed:
+        """The pose."""
+        return Prescribed()
 
     def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
         """Return the coordinates, (12,), of a pose that a task states."""
@@ -69,6 +75,11 @@ class WorldRows(TaskMap):
 
     frame: ClassVar[pin.ReferenceFrame] = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
+    @cached_property
+    def prescribed(self) -> Prescribed:
+        """The rows of the position."""
+        return Prescribed(self.axes)
+
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return the rows of the positions, (K, m)."""
         return positions[:, list(self.axes)]
@@ -92,6 +103,11 @@ class RowsAndYaw(WorldRows):
     """
 
     tool_axis: int
+
+    @cached_property
+    def prescribed(self) -> Prescribed:
+        """The rows of the position, and yaw."""
+        return Prescribed(self.axes, self.tool_axis, self.sign)
 
     @property
     def sign(self) -> float:

@@ -1,0 +1,212 @@
+/* Newton's method for postures that meet a target, with linear conditions on the joints that make them unique. */
+
+#include <math.h>
+
+#include "tool.h"
+
+static const double TURN = 6.283185307179586;
+
+/* What is prescribed: the pose of the tool (`is_pose`), or `rows` of its position along the world's axes, and behind them,
+if `tool_axis` is not negative, yaw: the direction of this axis of the tool in the plane of the two rows. */
+typedef struct {
+    long is_pose;
+    long rows;
+    long axes[3];
+    long tool_axis;
+    double sign; /* of yaw about the world's third axis */
+} prescribed;
+
+static inline double lane_of(pack values, int lane)
+{
+    return values[lane];
+}
+
+/* Solve a linear system, (n, n) row by row with `right` behind each row, by elimination with pivots. */
+static void eliminate(long n, double *system, double *answer)
+{
+    long width = n + 1;
+    for (long column = 0; column < n; column++) {
+        long pivot = column;
+        for (long row = column + 1; row < n; row++) {
+            if (fabs(system[row * width + column]) > fabs(system[pivot * width + column])) {
+                pivot = row;
+            }
+        }
+        for (long i = column; i < width && pivot != column; i++) {
+            double kept = system[column * width + i];
+            system[column * width + i] = system[pivot * width + i];
+            system[pivot * width + i] = kept;
+        }
+        double inverse = 1.0 / system[column * width + column];
+        for (long row = column + 1; row < n; row++) {
+            double factor = system[row * width + column] * inverse;
+            for (long i = column + 1; i < width; i++) {
+                system[row * width + i] -= factor * system[column * width + i];
+            }
+        }
+    }
+    for (long row = n - 1; row >= 0; row--) {
+        double left = system[row * width + n];
+        for (long i = row + 1; i < n; i++) {
+            left -= system[row * width + i] * answer[i];
+        }
+        answer[row] = left / system[row * width + row];
+    }
+}
+
+/* Rows of the system of one lane: task Jacobian with what is missed, and the conditions. Returns how many are written. */
+static long write_task(
+    const prescribed *asked, const placement *tool, const twist *columns, long n, int lane, const double *target,
+    double *system
+)
+{
+    double position[3] = {
+        lane_of(tool->position.x, lane), lane_of(tool->position.y, lane), lane_of(tool->position.z, lane)};
+    double R[3][3]; /* columns */
+    for (int j = 0; j < 3; j++) {
+        R[j][0] = lane_of(tool->rotation[j].x, lane);
+        R[j][1] = lane_of(tool->rotation[j].y, lane);
+        R[j][2] = lane_of(tool->rotation[j].z, lane);
+    }
+    double miss[6] = {0};
+    long used[6] = {0, 1, 2, 3, 4, 5};
+    double signs[6] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
+    long count = 6;
+    if (asked->is_pose) {
+        double to[9];
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) {
+                miss[i] += R[i][j] * (target[j] - position[j]);
+                to[3 * i + j] = R[i][0] * target[3 + j] + R[i][1] * target[6 + j] + R[i][2] * target[9 + j];
+            }
+        }
+        logarithm(to, miss + 3);
+    } else {
+        count = asked->rows;
+        for (long i = 0; i < count; i++) {
+            used[i] = asked->axes[i];
+            miss[i] = target[i] - position[used[i]];
+        }
+        if (asked->tool_axis >= 0) {
+            const double *axis = R[asked->tool_axis];
+            double yaw = atan2(axis[asked->axes[1]], axis[asked->axes[0]]);
+            double off = target[count] - yaw;
+            miss[count] = off - TURN * floor(off / TURN + 0.5);
+            used[count] = 6 - asked->axes[0] - asked->axes[1];
+            signs[count] = asked->sign;
+            count++;
+        }
+    }
+    for (long row = 0; row < count; row++) {
+        double *own = system + row * (n + 1);
+        for (long i = 0; i < n; i++) {
+            const twist *c = &columns[i];
+            pack parts[6] = {c->v.x, c->v.y, c->v.z, c->w.x, c->w.y, c->w.z};
+            own[i] = signs[row] * lane_of(parts[used[row]], lane);
+        }
+        own[n] = miss[row];
+    }
+    return count;
+}
+
+static double largest_of(const double *values, long count)
+{
+    double largest = 0.0;
+    for (long i = 0; i < count; i++) {
+        if (!(fabs(values[i]) <= largest)) { /* also NaN */
+            largest = fabs(values[i]);
+        }
+    }
+    return largest;
+}
+
+static int all_finite(const double *values, long count)
+{
+    for (long i = 0; i < count; i++) {
+        if (!isfinite(values[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Find postures, (K, n), that meet targets, (K, c), and C q = levels with rows C, (K, r, n), from `starts`, (K, n); NaN where
+the method does not converge. A step is no longer than `largest_step`. `beside` gives a posture up whose steps do not
+halve; tolerance and largest step are then in proportion to its size where that is above 1. */
+void brachis_newton(
+    const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
+    const double *starts, long conditions, const double *rows, const double *levels, long steps, double tolerance,
+    double largest_step, int beside, double *found
+)
+{
+    long n = arm->joints;
+    for (long k = 0; k < count; k += LANES) {
+        double q[LANES][n];
+        double scales[LANES], longest[LANES];
+        int open[LANES];
+        int left = 0;
+        for (int lane = 0; lane < LANES; lane++) {
+            long own = k + lane < count ? k + lane : count - 1;
+            const double *level = levels + own * conditions;
+            open[lane] = k + lane < count && all_finite(starts + own * n, n) && all_finite(level, conditions);
+            left += open[lane];
+            for (long i = 0; i < n; i++) {
+                q[lane][i] = open[lane] ? starts[own * n + i] : 0.0;
+                if (k + lane < count) {
+                    found[own * n + i] = NAN;
+                }
+            }
+            scales[lane] = beside ? 1.0 + largest_of(q[lane], n) : 1.0;
+            longest[lane] = largest_step * scales[lane];
+        }
+        for (long number = 0; number < steps && left; number++) {
+            pack posture[n];
+            twist columns[n];
+            for (long i = 0; i < n; i++) {
+                posture[i] = (pack){q[0][i], q[1][i], q[2][i], q[3][i]};
+            }
+            placement tool = place_tool(arm, posture, asked->is_pose != 0, columns);
+            for (int lane = 0; lane < LANES; lane++) {
+                if (!open[lane]) {
+                    continue;
+                }
+                long own = k + lane;
+                double system[n * (n + 1)];
+                double step[n], misses[n];
+                long width = n + 1;
+                long m = write_task(asked, &tool, columns, n, lane, targets + own * coordinates, system);
+                for (long j = 0; j < conditions; j++) {
+                    const double *row = rows + (own * conditions + j) * n;
+                    double aside = levels[own * conditions + j];
+                    for (long i = 0; i < n; i++) {
+                        system[(m + j) * width + i] = row[i];
+                        aside -= row[i] * q[lane][i];
+                    }
+                    system[(m + j) * width + n] = aside;
+                }
+                for (long i = 0; i < n; i++) {
+                    misses[i] = system[i * width + n];
+                }
+                int met = largest_of(misses, n) < tolerance * scales[lane];
+                eliminate(n, system, step);
+                double size = largest_of(step, n);
+                double factor = size > longest[lane] ? longest[lane] / size : 1.0;
+                for (long i = 0; i < n; i++) {
+                    q[lane][i] += factor * step[i];
+                }
+                int good = all_finite(q[lane], n) && (!beside || size < longest[lane]);
+                longest[lane] = beside ? 0.5 * size : longest[lane];
+                for (long i = 0; i < n && met && good; i++) {
+                    found[own * n + i] = q[lane][i];
+                }
+                if (met || !good) {
+                    open[lane] = 0;
+                    left--;
+                    for (long i = 0; i < n; i++) {
+                        q[lane][i] = 0.0;
+                    }
+                }
+            }
+        }
+    }
+}

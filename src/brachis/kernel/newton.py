@@ -1,0 +1,101 @@
+"""Newton's method for postures; see `brachis.ik.newton`."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from brachis.kernel.chain import Chain
+from brachis.kernel.library import address, as_doubles, load
+
+
+class _Prescribed(ctypes.Structure):
+    """`prescribed` of newton.c."""
+
+    _fields_ = [
+        ("is_pose", ctypes.c_long),
+        ("rows", ctypes.c_long),
+        ("axes", ctypes.c_long * 3),
+        ("tool_axis", ctypes.c_long),
+        ("sign", ctypes.c_double),
+    ]
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """What of the tool is prescribed: its pose, or rows of its position and perhaps yaw.
+
+    Attributes
+    ----------
+    axes : tuple of int
+        World axes of the position rows; none for a pose.
+    tool_axis : int
+        Axis of the tool whose direction in the plane of the two rows is yaw; -1 without yaw.
+    sign : float
+        Of yaw about the world axis that is no row.
+    """
+
+    axes: tuple[int, ...] = ()
+    tool_axis: int = -1
+    sign: float = 1.0
+
+    @cached_property
+    def structure(self) -> _Prescribed:
+        """As the library takes it."""
+        axes = (ctypes.c_long * 3)(*self.axes)
+        count = len(self.axes)
+        return _Prescribed(not count, count, axes, self.tool_axis, self.sign)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave the structure behind."""
+        return {
+            name: value for name, value in vars(self).items() if name != "structure"
+        }
+
+
+def find_postures(
+    chain: Chain,
+    prescribed: Prescribed,
+    targets: np.ndarray,
+    starts: np.ndarray,
+    conditions: tuple[np.ndarray, np.ndarray],
+    *,
+    steps: int,
+    tolerance: float,
+    largest_step: float,
+    beside: bool,
+) -> np.ndarray:
+    """Find postures, (K, n), that meet targets, (K, c), under linear conditions: rows (K, r, n) and levels (K, r).
+
+    The others are as of `brachis.ik.newton.Newton.solve`.
+    """
+    rows, levels = conditions
+    count = len(starts)
+    given = [
+        as_doubles(targets, targets.shape),
+        as_doubles(starts, (count, chain.n)),
+        as_doubles(rows, rows.shape),
+        as_doubles(levels, levels.shape),
+    ]
+    targets_at, starts_at, rows_at, levels_at = map(address, given)
+    found = np.empty((count, chain.n))
+    load().brachis_newton(
+        chain.address,
+        ctypes.addressof(prescribed.structure),
+        count,
+        targets.shape[1],
+        targets_at,
+        starts_at,
+        rows.shape[1],
+        rows_at,
+        levels_at,
+        steps,
+        tolerance,
+        largest_step,
+        beside,
+        address(found),
+    )
+    return found
