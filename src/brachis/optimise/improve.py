@@ -17,12 +17,14 @@ from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
 from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.backends import (
+    Problem,
     Progress,
     Solver,
     SolverOptions,
     SolverReport,
     SolveStatus,
 )
+from brachis.optimise.near_rows import solve_near_rows
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
 from brachis.task import SolverSettings
@@ -278,12 +280,18 @@ class SolverSession:
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,)."""
-        left = self.deadline.within(self.options.time_limit).left
         # Only the time that is not given can get shorter.
         share = program.free_time(x) / program.end_time(x) or 1.0
         progress = share * self.options.progress
-        options = dataclasses.replace(self.options, time_limit=left, progress=progress)
-        report = self.backend.solve(program, x, options, self.progress)
+        until = self.deadline.within(self.options.time_limit)
+
+        def solve(problem: Problem, x: np.ndarray) -> SolverReport:
+            options = dataclasses.replace(
+                self.options, time_limit=until.left, progress=progress
+            )
+            return self.backend.solve(problem, x, options, self.progress)
+
+        report = solve_near_rows(program, x, solve)
         if report.status.usable or report.violation > self.acceptable:
             return report
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)

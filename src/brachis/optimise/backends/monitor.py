@@ -24,6 +24,8 @@ _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 
 
+_NEARLY = 1e-3
+"""Violation of rows up to which an iterate is nearly feasible."""
 Function = Callable[[np.ndarray], float | np.ndarray]
 """Of the variables of a problem."""
 
@@ -53,7 +55,7 @@ class SolveMonitor:
         self.exhausted = False
         self._evaluations = 0
         self.stagnated = False
-        self._feasible: list[float] = []
+        self._recent: list[float] = []
         self._feasible_below = 10.0 * options.tolerance
         self._progress = progress
         self._handler: Any = None
@@ -97,20 +99,20 @@ class SolveMonitor:
         return self.must_stop()
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
-        """Tell whether feasible iterates have the same objective for long; kept in `stagnated`.
+        """Tell whether iterates have been no faster for long; kept in `stagnated`.
 
         A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
-        within which a solver wanders without ever seeing its conditions of optimality hold.
+        within which a solver wanders without ever seeing its conditions of optimality hold. Iterates that exceed a row
+        by a little count as if they took so much longer, but the last one has to be feasible.
         """
-        self._feasible = (
-            [*self._feasible, objective]
-            if infeasibility <= self._feasible_below
-            else []
-        )
-        recent = self._feasible[-self.options.patience :]
-        is_long = len(recent) == self.options.patience
+        needed = objective * (1.0 + infeasibility)
+        self._recent = [*self._recent, needed] if infeasibility <= _NEARLY else []
+        patience = self.options.patience
+        before = self._recent[:-patience]
         least = self.options.progress * abs(objective)
-        self.stagnated = is_long and max(recent) - min(recent) <= least
+        gains = bool(before) and min(before) - min(self._recent[-patience:]) > least
+        is_feasible = infeasibility <= self._feasible_below
+        self.stagnated = bool(before) and is_feasible and not gains
         return self.stagnated
 
     def must_stop(self) -> bool:

@@ -1,0 +1,153 @@
+"""Solve a program with those of its rows alone that are near their bounds.
+
+From a motion that is nearly as fast as possible most limits stay far away: at a time one or two of them hold the motion
+back. A solver's effort grows with all rows that it is given. So it is given those near their bounds, and all are
+checked at its answer; those that are violated then are added, and it goes on from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.optimise.backends import FEASIBLE, Problem, SolverReport, SolveStatus, residual
+
+_NEAR = 0.2
+"""Distance from its bound up to which a row is near, as a part of the limit."""
+_VERTEX = 0.05
+"""At a fast motion about as many rows as variables are within this distance."""
+_WORTH = 0.6
+"""Part of the rows, no more, that may be near, if the others are left out."""
+_BEGIN = 0.15
+"""Violation at the first point, no more."""
+_END = 0.5
+"""Violation at an answer, no more: else it is another motion, and all rows are needed."""
+_ROUNDS = 4
+"""Solves with more and more rows, no more."""
+
+
+@dataclass(frozen=True)
+class NearRows:
+    """A program without some of its rows; a `Problem`.
+
+    Attributes
+    ----------
+    program : Problem
+    kept : (c',) int ndarray
+        Numbers of the rows that are left.
+    """
+
+    program: Problem
+    kept: np.ndarray
+
+    def __getattr__(self, name: str) -> Any:
+        """Take everything else from the program."""
+        if name.startswith("__") or name in ("program", "kept"):
+            raise AttributeError(name)
+        return getattr(self.program, name)
+
+    @cached_property
+    def _entries(self) -> np.ndarray:
+        """Entries of the Jacobian that are left."""
+        is_kept = np.zeros(len(self.program.lower), dtype=bool)
+        is_kept[self.kept] = True
+        return np.flatnonzero(is_kept[self.program.jacobian_rows])
+
+    @cached_property
+    def jacobian_rows(self) -> np.ndarray:
+        """Rows of these entries, counted anew."""
+        return np.searchsorted(self.kept, self.program.jacobian_rows[self._entries])
+
+    @cached_property
+    def jacobian_columns(self) -> np.ndarray:
+        """Their columns."""
+        return self.program.jacobian_columns[self._entries]
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower bounds of the rows."""
+        return self.program.lower[self.kept]
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds of the rows."""
+        return self.program.upper[self.kept]
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of the rows."""
+        return self.program.rows(x)[self.kept]
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the Jacobian."""
+        return self.program.jacobian(x)[self._entries]
+
+
+def solve_near_rows(
+    program: Problem,
+    x: np.ndarray,
+    solve: Callable[[Problem, np.ndarray], SolverReport],
+) -> SolverReport:
+    """Solve a program from a point, with the rows near their bounds where that is enough.
+
+    Parameters
+    ----------
+    program : Problem
+    x : (v,) ndarray
+    solve : callable
+        ``solve(problem, x)`` returns a `SolverReport`.
+
+    Returns
+    -------
+    SolverReport
+        Of the program with all its rows.
+    """
+    slack = _slack(program, x)
+    is_vertex = np.count_nonzero(slack < _VERTEX) >= 2.0 * len(x)
+    kept = np.flatnonzero(slack < _NEAR)
+    if not is_vertex or slack.min() < -_BEGIN or len(kept) > _WORTH * len(slack):
+        return solve(program, x)
+    reports: list[SolverReport] = []
+    for _ in range(_ROUNDS):
+        report = solve(NearRows(program, kept), x)
+        reports.append(report)
+        slack = _slack(program, report.x)
+        missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
+        is_over = report.status is SolveStatus.TIME_LIMIT
+        if is_over or (report.status.usable and not len(missing)):
+            return _complete(program, kept, reports)
+        if not report.status.usable or slack.min() < -_END:
+            break
+        kept = np.union1d(kept, np.flatnonzero(slack < _NEAR))
+        x = report.x
+    return _complete(program, np.arange(len(slack)), [*reports, solve(program, x)])
+
+
+def _slack(program: Problem, x: np.ndarray) -> np.ndarray:
+    """Distances of all rows from their nearer bound, (c,); negative beyond it, minus infinity where x has no rows."""
+    try:
+        rows = program.rows(x)
+    except UnreachableError:
+        return np.full(len(program.lower), -np.inf)
+    slack = np.minimum(rows - program.lower, program.upper - rows)
+    return np.nan_to_num(slack, nan=-np.inf)
+
+
+def _complete(
+    program: Problem, kept: np.ndarray, reports: Sequence[SolverReport]
+) -> SolverReport:
+    """Make the report of the whole program of the last one, with rows `kept`, and those before it."""
+    last = reports[-1]
+    multipliers = np.zeros(len(program.lower))
+    multipliers[kept] = last.multipliers
+    return replace(
+        last,
+        violation=residual(program, last.x),
+        multipliers=multipliers,
+        iterations=sum(own.iterations for own in reports),
+        wall_time=sum(own.wall_time for own in reports),
+    )
