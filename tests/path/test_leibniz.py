@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from brachis.common.arrays import with_like_signs
+from brachis.kernel import rotation_derivatives
 from brachis.path.pose import smallest
 from brachis.path.rotations import (
     angular_velocity,
     hat,
-    matrices,
     product,
     quaternion_derivatives,
     rotation_from,
@@ -60,7 +60,7 @@ QUATERNION[0, 0] = 4.0
 
 
 def rotation_at(sigma):
-    return matrices(unit(polynomial(QUATERNION, sigma)))
+    return rotation_derivatives(polynomial(QUATERNION, sigma))
 
 
 FUNCTIONS = {
@@ -103,7 +103,7 @@ def test_quaternions_have_the_scalar_first():
     rotations = Rotation.random(50, rng=6)
     quaternions = quaternions_of(rotation_of(rotations.as_matrix()))
     np.testing.assert_allclose(
-        matrices(quaternions[None])[0], rotations.as_matrix(), atol=1e-14
+        rotation_derivatives(quaternions[None])[0], rotations.as_matrix(), atol=1e-14
     )
     np.testing.assert_array_equal(quaternions_of(Rotation.identity()), [1, 0, 0, 0])
 
@@ -130,7 +130,7 @@ def test_quaternion_derivatives_give_the_matrix_back():
     rotation = rotation_at(SIGMA[2:3])[:, 0]
     quaternion = quaternion_derivatives(rotation)
     np.testing.assert_allclose(
-        matrices(quaternion), rotation, atol=1e-12 * np.abs(rotation).max()
+        rotation_derivatives(quaternion), rotation, atol=1e-12 * np.abs(rotation).max()
     )
 
 

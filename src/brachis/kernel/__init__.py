@@ -8,16 +8,19 @@ from brachis.kernel.chain import Chain
 from brachis.kernel.halving import halve_intervals
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
+from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
 
 __all__ = [
     "Chain",
     "Prescribed",
+    "body_twists",
     "bounds_of_pairs",
     "find_postures",
     "go_backwards",
     "go_forwards",
     "halve_intervals",
+    "rotation_derivatives",
     "rotation_vectors",
     "tool_derivatives",
 ]

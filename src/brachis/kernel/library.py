@@ -29,6 +29,8 @@ _FUNCTIONS = {
     "brachis_bounds_of_pairs": "- llpppdpp",
     "brachis_go_backwards": "i llpppppdddpp",
     "brachis_go_forwards": "- llppppp",
+    "brachis_rotations": "- llpp",
+    "brachis_body_twists": "- llpp",
     "brachis_newton": "- ppllpplpplddip",
     "brachis_halve": "l plddlpp",
 }

@@ -8,14 +8,18 @@ checked at its answer; those that are violated then are added, and it goes on fr
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.optimise.backends import FEASIBLE, Problem, SolverReport, SolveStatus, residual
+from brachis.optimise.backends import (
+    FEASIBLE,
+    Problem,
+    SolverReport,
+    SolveStatus,
+    residual,
+)
 
 _NEAR = 0.2
 """Distance from its bound up to which a row is near, as a part of the limit."""
@@ -31,60 +35,44 @@ _ROUNDS = 4
 """Solves with more and more rows, no more."""
 
 
-@dataclass(frozen=True)
 class NearRows:
     """A program without some of its rows; a `Problem`.
 
-    Attributes
+    Parameters
     ----------
     program : Problem
     kept : (c',) int ndarray
-        Numbers of the rows that are left.
+        Numbers of the rows that are left, ascending.
     """
 
-    program: Problem
-    kept: np.ndarray
+    def __init__(self, program: Problem, kept: np.ndarray) -> None:
+        self._program = program
+        self._kept = kept
+        is_kept = np.zeros(len(program.lower), dtype=bool)
+        is_kept[kept] = True
+        self._entries = np.flatnonzero(is_kept[program.jacobian_rows])
+        self.x_lower = program.x_lower
+        self.x_upper = program.x_upper
+        self.lower = program.lower[kept]
+        self.upper = program.upper[kept]
+        self.jacobian_rows = np.searchsorted(kept, program.jacobian_rows[self._entries])
+        self.jacobian_columns = program.jacobian_columns[self._entries]
 
-    def __getattr__(self, name: str) -> Any:
-        """Take everything else from the program."""
-        if name.startswith("__") or name in ("program", "kept"):
-            raise AttributeError(name)
-        return getattr(self.program, name)
+    def objective(self, x: np.ndarray) -> float:
+        """Objective of the program."""
+        return self._program.objective(x)
 
-    @cached_property
-    def _entries(self) -> np.ndarray:
-        """Entries of the Jacobian that are left."""
-        is_kept = np.zeros(len(self.program.lower), dtype=bool)
-        is_kept[self.kept] = True
-        return np.flatnonzero(is_kept[self.program.jacobian_rows])
-
-    @cached_property
-    def jacobian_rows(self) -> np.ndarray:
-        """Rows of these entries, counted anew."""
-        return np.searchsorted(self.kept, self.program.jacobian_rows[self._entries])
-
-    @cached_property
-    def jacobian_columns(self) -> np.ndarray:
-        """Their columns."""
-        return self.program.jacobian_columns[self._entries]
-
-    @property
-    def lower(self) -> np.ndarray:
-        """Lower bounds of the rows."""
-        return self.program.lower[self.kept]
-
-    @property
-    def upper(self) -> np.ndarray:
-        """Upper bounds of the rows."""
-        return self.program.upper[self.kept]
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the objective."""
+        return self._program.gradient(x)
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Values of the rows."""
-        return self.program.rows(x)[self.kept]
+        """Values of the rows that are left."""
+        return self._program.rows(x)[self._kept]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Entries of the Jacobian."""
-        return self.program.jacobian(x)[self._entries]
+        """Entries of the Jacobian that are left."""
+        return self._program.jacobian(x)[self._entries]
 
 
 def solve_near_rows(

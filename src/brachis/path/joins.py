@@ -11,8 +11,9 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import PathError
+from brachis.kernel import body_twists
 from brachis.path.context import place, stands_still
-from brachis.path.pose import POSITIONS, twist
+from brachis.path.pose import POSITIONS
 from brachis.path.protocol import Array, Curve
 from brachis.robot.task_map.protocol import joints_of, position_rows
 
@@ -224,7 +225,7 @@ def _turning_mismatch(
     unit : str
         Unit of sigma.
     """
-    old, new = (twist(one[:, None])[:, 0, POSITIONS:] for one in (before, after))
+    old, new = (body_twists(one[:, None])[:, 0, POSITIONS:] for one in (before, after))
     rate, new_rate = (float(np.linalg.norm(one[0])) for one in (old, new))
     jumps = np.linalg.norm(new - old, axis=1)
     large = jumps * length ** np.arange(3.0) > tolerances.WRITTEN * max(rate, 1.0)

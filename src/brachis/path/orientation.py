@@ -10,6 +10,7 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import PathError
+from brachis.kernel import rotation_derivatives
 from brachis.path.blends import septic
 from brachis.path.context import place
 from brachis.path.curves import ArcCurve, LineCurve
@@ -17,7 +18,6 @@ from brachis.path.pose import smallest
 from brachis.path.protocol import Array, Curve, Orientation
 from brachis.path.rotations import (
     hat,
-    matrices,
     product,
     rotation_from,
     rotation_of,
@@ -39,7 +39,7 @@ def _about_axis(
     """Return the rotation ``start exp(angle(sigma) hat(axis))``, about an axis in the tool frame, and derivatives."""
     sine, cosine = sine_cosine(angle.derivatives(sigma, order) / 2.0)
     quaternions = np.concatenate([cosine, sine * axis], axis=-1)
-    return start @ matrices(quaternions)
+    return start @ rotation_derivatives(quaternions)
 
 
 @dataclass(frozen=True, eq=False)

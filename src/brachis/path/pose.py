@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from brachis.common.arrays import spread
+from brachis.kernel import body_twists, rotation_derivatives
 from brachis.path.protocol import Array, Curve, MappedCurve, Orientation, PathSample
-from brachis.path.rotations import angular_velocity, matrices, product, unit
 from brachis.path.sequence import SequencePath
 
 POSITIONS = 3
@@ -29,7 +29,7 @@ class PosePath(SequencePath):
             Path coordinates.
         """
         derivatives = self.derivatives(s)
-        return PathSample(derivatives[0], *twist(derivatives))
+        return PathSample(derivatives[0], *body_twists(derivatives))
 
 
 def pose_curve(position: Curve, orientation: Orientation) -> MappedCurve:
@@ -56,7 +56,7 @@ def quaternion_curve(columns: Curve) -> MappedCurve:
 
 
 def _from_quaternions(_sigma: Array, columns: Array) -> Array:
-    rotation = matrices(unit(columns[..., POSITIONS:]))
+    rotation = rotation_derivatives(columns[..., POSITIONS:])
     return _coordinates(columns[..., :POSITIONS], rotation)
 
 
@@ -93,23 +93,6 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
     values = function(fine)
     best = int(np.argmin(values))
     return float(fine[best]), float(values[best])
-
-
-def twist(coordinates: Array) -> Array:
-    """Return the body twist of a pose and its derivatives, shape (order, K, 6).
-
-    With the position p and the rotation matrix R of the tool in the world frame it consists of the velocity
-    ``v = R^T p'`` and the angular velocity w of ``R^T R'``, both along the axes of the tool frame.
-
-    Parameters
-    ----------
-    coordinates : ndarray, shape (order + 1, K, 12)
-        Derivatives of the coordinates of the pose.
-    """
-    position = coordinates[..., :POSITIONS]
-    rotation = rotations(coordinates)
-    velocity = product(np.swapaxes(rotation, -1, -2), position[1:], "...ij,...j->...i")
-    return np.concatenate([velocity, angular_velocity(rotation)], axis=-1)
 
 
 def rotations(coordinates: Array) -> Array:

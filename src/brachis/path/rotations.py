@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis.kernel import body_twists
 from brachis.path.protocol import Array
 from brachis.task import Attitude
 from brachis.task.points.units import quaternions_of, rotation_by
@@ -79,15 +80,6 @@ def hat(vector: Array) -> Array:
     return np.tensordot(vector, _OF_AXES, axes=1)
 
 
-def matrices(quaternions: Array) -> Array:
-    """Return the derivatives of rotation matrices, (order + 1, ..., 3, 3), from quaternions, (order + 1, ..., 4)."""
-    products = product(quaternions, quaternions, "...i,...j->...ij")
-    of_vector = products[..., 1:, 1:]
-    diagonal = products[..., 0, 0] - np.trace(of_vector, axis1=-2, axis2=-1)
-    skew = hat(products[..., 0, 1:])
-    return 2.0 * (of_vector + skew) + diagonal[..., None, None] * np.eye(3)
-
-
 def quaternion_derivatives(rotation: Array) -> Array:
     """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a rotation matrix, (order + 1, 3, 3).
 
@@ -110,10 +102,9 @@ def angular_velocity(rotation: Array) -> Array:
     rotation : ndarray, shape (order + 1, ..., 3, 3)
         Derivatives of the rotation matrix R; the angular velocity is that of ``R^T R'``.
     """
-    skew = product(np.swapaxes(rotation, -1, -2), rotation[1:], "...ij,...jk->...ik")
-    one = [1, 2, 0]
-    other = [2, 0, 1]
-    return (skew[..., other, one] - skew[..., one, other]) / 2.0
+    flat = rotation.reshape(*rotation.shape[:-2], 9)
+    still = np.zeros((*flat.shape[:-1], 3))
+    return body_twists(np.concatenate([still, flat], axis=-1))[..., 3:]
 
 
 def rotation_of(matrix: Array) -> Rotation:

@@ -1,0 +1,42 @@
+"""Derivatives of rotation matrices and body twists along a path; see `brachis.path.rotations`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.kernel.library import address, as_doubles, load
+
+_MOST_ORDERS = 8
+
+
+def rotation_derivatives(quaternions: np.ndarray) -> np.ndarray:
+    """Differentiate the rotation matrices, (m, ..., 3, 3), of quaternions w, x, y, z of any length, (m, ..., 4)."""
+    orders, *places, _ = quaternions.shape
+    assert orders <= _MOST_ORDERS
+    kept = as_doubles(quaternions, quaternions.shape)
+    found = np.empty((orders, *places, 3, 3))
+    count = kept[0].size // 4
+    load().brachis_rotations(orders, count, address(kept), address(found))
+    return found
+
+
+def body_twists(poses: np.ndarray) -> np.ndarray:
+    """Differentiate poses.
+
+    Parameters
+    ----------
+    poses : (m, ..., 12) ndarray
+        Derivatives, from the value on, of the position and the rotation matrix row by row.
+
+    Returns
+    -------
+    (m - 1, ..., 6) ndarray
+        The body twist and its derivatives: linear, then angular velocity, along the axes of the turning frame.
+    """
+    orders, *places, _ = poses.shape
+    assert orders <= _MOST_ORDERS
+    kept = as_doubles(poses, poses.shape)
+    found = np.empty((orders - 1, *places, 6))
+    count = kept[0].size // 12
+    load().brachis_body_twists(orders, count, address(kept), address(found))
+    return found
