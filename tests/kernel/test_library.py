@@ -1,0 +1,64 @@
+"""The compiled library: where it is missing or belongs to other source, the message says so and what to do."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from brachis.kernel import compile as compiling
+from brachis.kernel import library
+
+
+def test_a_missing_library(tmp_path):
+    with pytest.raises(ImportError, match=r"missing.*compile it"):
+        library._open(tmp_path / "kernel_baseline.so")
+
+
+def test_a_file_that_is_no_library(tmp_path):
+    path = tmp_path / "kernel_baseline.so"
+    path.write_bytes(b"no library")
+    with pytest.raises(ImportError, match=r"missing.*compile it"):
+        library._open(path)
+
+
+def test_a_library_of_other_source(monkeypatch):
+    monkeypatch.setattr(library, "source_digest", lambda: "0123")
+    with pytest.raises(ImportError, match=r"other source.*compile it"):
+        library._open(compiling.library_path("baseline"))
+
+
+@pytest.mark.skipif(compiling.find_compiler() is None, reason="no C compiler")
+def test_all_variants_give_the_same_digits(tmp_path, monkeypatch):
+    for file in compiling.FOLDER.glob("*.[ch]"):
+        shutil.copy(file, tmp_path)
+    monkeypatch.setattr(compiling, "FOLDER", tmp_path)
+    made = [library._open(path) for path in compiling.compile_kernel()]
+    if not made[0].brachis_has_avx2():
+        pytest.skip("the processor has no other variant")
+    rng = np.random.default_rng(0)
+    quaternions = rng.normal(size=(4, 50, 4))
+    found = []
+    for own in made:
+        rotations = np.empty((4, 50, 9))
+        own.brachis_rotations(
+            4, 50, library.address(quaternions), library.address(rotations)
+        )
+        found.append(rotations)
+    assert all(np.array_equal(own, found[0]) for own in found)
+
+
+def test_a_failing_compiler_is_quoted(tmp_path, monkeypatch):
+    (tmp_path / "broken.c").write_text("this is no C")
+    monkeypatch.setattr(compiling, "FOLDER", tmp_path)
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(RuntimeError, match="the C compiler fails: false"):
+        compiling.compile_kernel()
+    assert not list(tmp_path.glob("*.tmp"))
+
+
+def test_no_compiler_at_all(monkeypatch):
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiling.shutil, "which", lambda _name: None)
+    monkeypatch.setattr(compiling.importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(RuntimeError, match=r"no C compiler.*pip install ziglang"):
+        compiling.compile_kernel()

@@ -1,0 +1,102 @@
+"""A solve that sees the rows near their bounds ends where one ends that sees all."""
+
+import numpy as np
+import pytest
+
+from brachis.optimise.backends import SolverOptions, SolveStatus, residual, solvers_for
+from brachis.optimise.near_rows import solve_near_rows
+
+COUNT = 600
+ANGLES = np.linspace(0.0, 2.0 * np.pi, COUNT, endpoint=False)
+
+
+class Disc:
+    """Go as far down as possible within the tangents of a circle; a third variable is square to it."""
+
+    x_lower = np.full(3, -10.0)
+    x_upper = np.full(3, 10.0)
+    lower = np.full(COUNT, -np.inf)
+    upper = np.ones(COUNT)
+    jacobian_rows = np.repeat(np.arange(COUNT), 2)
+    jacobian_columns = np.tile([0, 1], COUNT)
+
+    def objective(self, x):
+        return float(x[1] + x[2] ** 2)
+
+    def gradient(self, x):
+        return np.array([0.0, 1.0, 2.0 * x[2]])
+
+    def rows(self, x):
+        return np.cos(ANGLES) * x[0] + np.sin(ANGLES) * x[1]
+
+    def jacobian(self, _x):
+        return np.column_stack([np.cos(ANGLES), np.sin(ANGLES)]).ravel()
+
+
+class Counting:
+    """Solves with Uno, and notes how many rows it is given."""
+
+    def __init__(self):
+        self.rows = []
+
+    def __call__(self, problem, x):
+        self.rows.append(len(problem.lower))
+        (uno,) = solvers_for("uno")
+        return uno.solve(problem, x, SolverOptions(tolerance=1e-9), None)
+
+
+@pytest.fixture
+def solve():
+    return Counting()
+
+
+@pytest.mark.parametrize("angle", [-1.5, -1.3, -1.2])
+def test_few_rows_are_enough(solve, angle):
+    start = 0.999 * np.array([np.cos(angle), np.sin(angle), 0.0])
+    report = solve_near_rows(Disc(), start, solve)
+    assert max(solve.rows) < COUNT / 2
+    assert report.status is SolveStatus.OPTIMAL
+    assert report.objective == pytest.approx(-1.0, abs=1e-8)
+    assert report.violation == residual(Disc(), report.x) <= 1e-8
+
+
+def test_multipliers_belong_to_all_rows(solve):
+    report = solve_near_rows(Disc(), np.array([0.05, -0.99, 0.0]), solve)
+    assert report.multipliers.shape == (COUNT,)
+    matrix = Disc().jacobian(report.x).reshape(COUNT, 2)
+    np.testing.assert_allclose(report.multipliers @ matrix, [0.0, 1.0], atol=1e-6)
+
+
+def test_from_a_point_that_few_rows_hold_back_all_are_needed(solve):
+    report = solve_near_rows(Disc(), np.array([0.1, -0.2, 0.0]), solve)
+    assert solve.rows == [COUNT]
+    assert report.objective == pytest.approx(-1.0, abs=1e-8)
+
+
+def test_from_a_point_far_beyond_the_rows_all_are_needed(solve):
+    solve_near_rows(Disc(), np.array([0.0, -1.5, 0.0]), solve)
+    assert solve.rows == [COUNT]
+
+
+def test_rows_that_turn_out_to_be_violated_are_added(solve):
+    class Cut(Disc):
+        upper = np.append(np.ones(COUNT), 0.3)
+        lower = np.full(COUNT + 1, -np.inf)
+        jacobian_rows = np.append(Disc.jacobian_rows, COUNT)
+        jacobian_columns = np.append(Disc.jacobian_columns, 0)
+
+        def rows(self, x):
+            return np.append(super().rows(x), x[0])
+
+        def jacobian(self, x):
+            return np.append(super().jacobian(x), 1.0)
+
+        def objective(self, x):
+            return -float(x[0]) + float(x[2] ** 2)
+
+        def gradient(self, x):
+            return np.array([-1.0, 0.0, 2.0 * x[2]])
+
+    report = solve_near_rows(Cut(), np.array([-0.3, 0.95, 0.0]), solve)
+    assert report.x[0] == pytest.approx(0.3, abs=1e-8)
+    assert report.violation <= 1e-8
