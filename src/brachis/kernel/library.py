@@ -19,7 +19,7 @@ _KINDS = {
     "i": ctypes.c_int,
     "-": None,
 }
-_FUNCTIONS = {
+FUNCTIONS = {
     "brachis_torques": "- plpppp",
     "brachis_torque_derivatives": "- plpppppp",
     "brachis_mass_matrices": "- plpp",
@@ -66,7 +66,7 @@ def _open(path: Path) -> ctypes.CDLL:
         raise ImportError(
             f"the compiled part of brachis, {path.name}, was made of other source than this; {_REMEDY}"
         )
-    for name, kinds in _FUNCTIONS.items():
+    for name, kinds in FUNCTIONS.items():
         function = getattr(library, name)
         returned, taken = kinds.split()
         function.restype = _KINDS[returned]
