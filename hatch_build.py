@@ -42,5 +42,5 @@ def _platform_tag() -> str:
     """Return the tag of this kind of machine; on macOS of its own processor alone, for which the compiler compiles."""
     name = sysconfig.get_platform()
     if name.startswith("macosx"):
-        name = f"{name.rpartition('-')[0]}-{platform.machine()}"
+        name = f"macosx-11.0-{platform.machine()}"
     return name.replace("-", "_").replace(".", "_")

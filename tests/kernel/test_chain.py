@@ -154,3 +154,11 @@ def test_rotation_vectors():
 
 def test_no_rotation_is_no_vector():
     assert np.array_equal(rotation_vectors(np.eye(3)[None]), np.zeros((1, 3)))
+
+
+def test_arrays_of_another_shape_are_refused(case):
+    chain, (q, qdot, qddot) = case[2], case[3]
+    with pytest.raises(ValueError, match="an array has the shape"):
+        chain.torques(q[:, :1].repeat(chain.n + 1, axis=1), qdot, qddot)
+    with pytest.raises(ValueError, match="an array has the shape"):
+        chain.torques(q, qdot[:3], qddot)

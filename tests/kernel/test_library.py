@@ -5,25 +5,26 @@ import shutil
 import numpy as np
 import pytest
 
+import brachis
 from brachis.kernel import compile as compiling
 from brachis.kernel import library
 
 
 def test_a_missing_library(tmp_path):
-    with pytest.raises(ImportError, match=r"missing.*compile it"):
+    with pytest.raises(ImportError, match=r"missing.*compiles it"):
         library._open(tmp_path / "kernel_baseline.so")
 
 
 def test_a_file_that_is_no_library(tmp_path):
     path = tmp_path / "kernel_baseline.so"
     path.write_bytes(b"no library")
-    with pytest.raises(ImportError, match=r"missing.*compile it"):
+    with pytest.raises(ImportError, match=r"missing.*compiles it"):
         library._open(path)
 
 
 def test_a_library_of_other_source(monkeypatch):
     monkeypatch.setattr(library, "source_digest", lambda: "0123")
-    with pytest.raises(ImportError, match=r"other source.*compile it"):
+    with pytest.raises(ImportError, match=r"other source.*compiles it"):
         library._open(compiling.library_path("baseline"))
 
 
@@ -35,16 +36,15 @@ def test_all_variants_give_the_same_digits(tmp_path, monkeypatch):
     made = [library._open(path) for path in compiling.compile_kernel()]
     if not made[0].brachis_has_avx2():
         pytest.skip("the processor has no other variant")
-    rng = np.random.default_rng(0)
-    quaternions = rng.normal(size=(4, 50, 4))
+    chain = brachis.robots.iiwa14.chain
+    states = np.random.default_rng(0).normal(size=(3, 50, chain.n))
     found = []
     for own in made:
-        rotations = np.empty((4, 50, 9))
-        own.brachis_rotations(
-            4, 50, library.address(quaternions), library.address(rotations)
-        )
-        found.append(rotations)
-    assert all(np.array_equal(own, found[0]) for own in found)
+        monkeypatch.setattr("brachis.kernel.chain.load", lambda own=own: own)
+        parts = [*chain.torque_derivatives(*states), chain.torques(*states)]
+        parts += chain.tool(states[0], in_tool_axes=True)
+        found.append(np.concatenate([part.ravel() for part in parts]))
+    assert np.array_equal(found[0], found[-1])
 
 
 def test_a_failing_compiler_is_quoted(tmp_path, monkeypatch):
@@ -61,4 +61,10 @@ def test_no_compiler_at_all(monkeypatch):
     monkeypatch.setattr(compiling.shutil, "which", lambda _name: None)
     monkeypatch.setattr(compiling.importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(RuntimeError, match=r"no C compiler.*pip install ziglang"):
+        compiling.compile_kernel()
+
+
+def test_a_compiler_that_is_not_there(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(RuntimeError, match="the C compiler cannot be run"):
         compiling.compile_kernel()

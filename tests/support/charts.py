@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from scipy.linalg import null_space, orthogonal_procrustes
 
 from brachis.kinematics import ChartMap, ChartRows
@@ -36,7 +37,14 @@ def path_from(
 
 def jacobian(task_map: TaskMap, q: np.ndarray) -> np.ndarray:
     """Pinocchio's task Jacobian (K, m, n)."""
-    return task_map.jacobian(task_map.twists(q))
+    model = task_map.robot.model
+    data = model.createData()
+    tool = task_map.robot.frame_id
+    columns = [
+        pin.computeFrameJacobian(model, data, own, tool, task_map.frame) for own in q
+    ]
+    shape = (len(q), 6, model.nv)
+    return task_map.jacobian(np.moveaxis(np.reshape(columns, shape), 1, 0))
 
 
 def least_motion(

@@ -252,7 +252,7 @@ class ChainGeometry:
 
     @classmethod
     def of(cls, robot: Robot) -> ChainGeometry:
-        """Read the screws off the world Jacobian at the zero posture: columns (v, w), a point is w x v."""
+        """Take the screws of a robot's chain."""
         chain = robot.chain
         return cls(
             joint_names=robot.joint_names,

@@ -25,6 +25,22 @@ typedef struct {
     vec w, v;
 } twist;
 
+/* v x S, the Lie bracket */
+static inline twist cross_twists(twist v, twist S)
+{
+    return (twist){cross(v.w, S.w), add(cross(v.w, S.v), cross(v.v, S.w))};
+}
+
+static inline twist add_twists(twist a, twist b)
+{
+    return (twist){add(a.w, b.w), add(a.v, b.v)};
+}
+
+static inline twist scale_twist(twist a, pack factor)
+{
+    return (twist){scale(a.w, factor), scale(a.v, factor)};
+}
+
 /* Displacement from the zero posture: columns of the rotation, and shift. */
 typedef struct {
     vec x, y, z, shift;

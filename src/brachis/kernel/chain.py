@@ -33,7 +33,7 @@ class _Chain(ctypes.Structure):
     ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chain:
     """A serial chain at its zero posture, in the world frame.
 
@@ -63,10 +63,10 @@ class Chain:
     points: np.ndarray
     tool_position: np.ndarray
     tool_rotation: np.ndarray
-    masses: np.ndarray | float = 0.0
-    centers: np.ndarray | float = 0.0
-    inertias: np.ndarray | float = 0.0
-    gravity: np.ndarray | float = 0.0
+    masses: np.ndarray | None = None
+    centers: np.ndarray | None = None
+    inertias: np.ndarray | None = None
+    gravity: np.ndarray | None = None
 
     @property
     def n(self) -> int:
@@ -83,10 +83,10 @@ class Chain:
             as_doubles(self.points, (n, 3)),
             as_doubles(self.tool_position, (3,)),
             as_doubles(self.tool_rotation, (3, 3)),
-            as_doubles(self.masses, (n,)),
-            as_doubles(self.centers, (n, 3)),
-            as_doubles(self.inertias, (n, 6)),
-            as_doubles(self.gravity, (3,)),
+            _as_doubles_or_zero(self.masses, (n,)),
+            _as_doubles_or_zero(self.centers, (n, 3)),
+            _as_doubles_or_zero(self.inertias, (n, 6)),
+            _as_doubles_or_zero(self.gravity, (3,)),
         ]
 
     @cached_property
@@ -104,7 +104,7 @@ class Chain:
 
     def torques(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
         """Torques, (K, n), Nm or N, of the rigid bodies in K states, (K, n) each."""
-        found = np.empty(q.shape)
+        found = np.empty((len(q), self.n))
         self._call("brachis_torques", (q, qdot, qddot), found)
         return found
 
@@ -159,3 +159,9 @@ class Chain:
             for own in (*kept, *others)
         ]
         getattr(load(), name)(self.address, count, *given)
+
+
+def _as_doubles_or_zero(
+    values: np.ndarray | None, shape: tuple[int, ...]
+) -> np.ndarray:
+    return np.zeros(shape) if values is None else as_doubles(values, shape)

@@ -45,9 +45,21 @@ def find_compiler() -> list[str] | None:
     if stated:
         return shlex.split(stated)
     for name in ("cc", "gcc", "clang"):
-        if shutil.which(name):
+        if shutil.which(name) and _runs([name, "--version"]):
             return [name]
     return None
+
+
+def _runs(command: list[str]) -> bool:
+    """Tell whether a command can be run: macOS has a `cc` that only says how to install one."""
+    try:
+        return not _run(command).returncode
+    except OSError:
+        return False
+
+
+def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
 
 
 def compile_kernel() -> list[Path]:
@@ -81,12 +93,11 @@ def compile_kernel() -> list[Path]:
         # Made aside and moved: who loads it meanwhile finds the old one or the new one.
         aside = library.with_suffix(f".{os.getpid()}.tmp")
         command = [*compiler, *_FLAGS, *own, *_QUIET, f'-DSOURCE="{digest}"', *sources]
-        run = subprocess.run(  # noqa: S603
-            [*command, "-o", str(aside), "-lm"],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command += ["-o", str(aside), "-lm"]
+        try:
+            run = _run(command)
+        except OSError as error:
+            raise RuntimeError(f"the C compiler cannot be run: {error}") from error
         if run.returncode:
             raise RuntimeError(
                 f"the C compiler fails: {shlex.join(command)}\n{run.stderr.strip()}"

@@ -59,22 +59,6 @@ static inline twist axis_as_twist(const chain *arm, long i, vec axis, vec point)
     return (twist){axis, cross(point, axis)};
 }
 
-/* v x S */
-static inline twist cross_twists(twist v, twist S)
-{
-    return (twist){cross(v.w, S.w), add(cross(v.w, S.v), cross(v.v, S.w))};
-}
-
-static inline twist add_twists(twist a, twist b)
-{
-    return (twist){add(a.w, b.w), add(a.v, b.v)};
-}
-
-static inline twist scale_twist(twist a, pack factor)
-{
-    return (twist){scale(a.w, factor), scale(a.v, factor)};
-}
-
 /* S . (torque, force) */
 static inline pack pair(twist S, vec torque, vec force)
 {

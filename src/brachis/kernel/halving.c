@@ -7,7 +7,7 @@ acceleration jumps, and what a ramp in place of a jump costs, (M - 1). */
 typedef struct {
     long times, joints;
     const double *t, *accelerations, *rate, *jumps, *ramps;
-    long few; /* Times within an interval from which on it is known whether it is smooth. */
+    long few; /* Times within an interval that are needed to tell whether it is smooth. */
 } timing;
 
 typedef struct {
@@ -105,7 +105,7 @@ static void sink(interval *heap, long count)
 }
 
 /* Halve `pieces` equal intervals of 0 to 1 until they lose less than `tolerance` together, or are `most`. Those shorter
-than `shortest` stay as they are. `heap` has room for `most` intervals. Returns how many there are; `begins` is where they
+than `shortest` stay as they are. `heap` and `begins` have room for the larger of both numbers. Returns how many there are; `begins` is where they
 begin, in any order. */
 long brachis_halve(
     const timing *own, long pieces, double tolerance, double shortest, long most, interval *heap, double *begins

@@ -51,7 +51,7 @@ def halve_intervals(
     jumps, ramps : (M - 1,) ndarray
         How much of an acceleration jumps between two times, and what a ramp in its place costs a unit of length.
     few : int
-        Times within an interval from which on it is known whether it is smooth.
+        Times within an interval that are needed to tell whether it is smooth.
     pieces : int
         Equal intervals that are halved.
     tolerance : float

@@ -11,7 +11,7 @@ import numpy as np
 
 from brachis.kernel.compile import library_path, source_digest
 
-_REMEDY = "compile it: python -m pip install --editable . in the folder of the project"
+_REMEDY = "install brachis again, which compiles it; in a clone: python src/brachis/kernel/compile.py"
 _KINDS = {
     "p": ctypes.c_void_p,
     "l": ctypes.c_long,
@@ -81,8 +81,14 @@ def address(values: np.ndarray) -> int:
 
 
 def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an array as contiguous doubles of this shape."""
+    """Return an array of this shape as contiguous doubles.
+
+    Raises
+    ------
+    ValueError
+        It has another shape: the library would read beyond its end.
+    """
     found = np.ascontiguousarray(values, dtype=np.float64)
     if found.shape != shape:
-        found = np.ascontiguousarray(np.broadcast_to(found, shape))
+        raise ValueError(f"an array has the shape {found.shape}; needed: {shape}")
     return found

@@ -54,7 +54,7 @@ static void eliminate(long n, double *system, double *answer)
     }
 }
 
-/* Rows of the system of one lane: task Jacobian with what is missed, and the conditions. Returns how many are written. */
+/* First rows of the system of one lane: task Jacobian with what is missed. Returns how many they are. */
 static long write_task(
     const prescribed *asked, const placement *tool, const twist *columns, long n, int lane, const double *target,
     double *system
@@ -113,9 +113,10 @@ static double largest_of(const double *values, long count)
 {
     double largest = 0.0;
     for (long i = 0; i < count; i++) {
-        if (!(fabs(values[i]) <= largest)) { /* also NaN */
-            largest = fabs(values[i]);
+        if (isnan(values[i])) {
+            return values[i];
         }
+        largest = fmax(largest, fabs(values[i]));
     }
     return largest;
 }

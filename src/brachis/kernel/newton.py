@@ -42,6 +42,18 @@ class Prescribed:
     tool_axis: int = -1
     sign: float = 1.0
 
+    @property
+    def count(self) -> int:
+        """How many rows are prescribed."""
+        if not self.axes:
+            return 6
+        return len(self.axes) + (self.tool_axis >= 0)
+
+    @property
+    def coordinates(self) -> int:
+        """How many task coordinates they have: of a pose position and rotation matrix."""
+        return self.count if self.axes else 12
+
     @cached_property
     def structure(self) -> _Prescribed:
         """As the library takes it."""
@@ -74,11 +86,12 @@ def find_postures(
     """
     rows, levels = conditions
     count = len(starts)
+    free = chain.n - prescribed.count
     given = [
-        as_doubles(targets, targets.shape),
+        as_doubles(targets, (count, prescribed.coordinates)),
         as_doubles(starts, (count, chain.n)),
-        as_doubles(rows, rows.shape),
-        as_doubles(levels, levels.shape),
+        as_doubles(rows, (count, free, chain.n)),
+        as_doubles(levels, (count, free)),
     ]
     targets_at, starts_at, rows_at, levels_at = map(address, given)
     found = np.empty((count, chain.n))
@@ -86,10 +99,10 @@ def find_postures(
         chain.address,
         ctypes.addressof(prescribed.structure),
         count,
-        targets.shape[1],
+        prescribed.coordinates,
         targets_at,
         starts_at,
-        rows.shape[1],
+        free,
         rows_at,
         levels_at,
         steps,

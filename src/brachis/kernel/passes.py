@@ -55,7 +55,7 @@ def go_backwards(
     last : float
         x at the last station.
     flat : float
-        Factor below which the next x does not depend on this one.
+        Factor below which the next x does not rise with this one: such rows are left out.
     rounding : float
         Part of x by which rounding may leave an interval empty.
 
@@ -90,12 +90,13 @@ def go_forwards(
 ) -> np.ndarray:
     """Find the largest x, (P,), from the first station on, within intervals, (P,) each; see `go_backwards`."""
     rows = [as_doubles(own, factor.shape) for own in (factor, most)]
-    low, high = within
-    x = np.empty_like(low)
+    count = len(factor) + 1
+    ends = [as_doubles(own, (count,)) for own in within]
+    x = np.empty(count)
     x[0] = first
     load().brachis_go_forwards(
-        len(low),
+        count,
         factor.shape[1],
-        *map(address, (*rows, low, high, x)),
+        *map(address, (*rows, *ends, x)),
     )
     return x

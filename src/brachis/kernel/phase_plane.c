@@ -27,6 +27,7 @@ void brachis_bounds_of_pairs(
             for (long j = 0; j < rows; j++) {
                 double tilt = slope[i] - slope[j];
                 double clearance = upper[j] - lower[i];
+                is_empty |= isnan(clearance) || isnan(tilt);
                 if (tilt > parallel) {
                     ceiling = smaller(ceiling, clearance / tilt);
                 } else if (tilt < -parallel) {
@@ -55,7 +56,7 @@ int brachis_go_backwards(
         double to = ceiling[k];
         const double *f = factor + k * rows;
         for (long i = 0; i < rows; i++) {
-            /* Where the next x does not depend on this one a row says nothing of it. */
+            /* Where the next x does not rise with this one a row is left out. */
             if (f[i] > flat) {
                 to = smaller(to, (high[k + 1] - least[k * rows + i]) / f[i]);
                 from = larger(from, (low[k + 1] - most[k * rows + i]) / f[i]);

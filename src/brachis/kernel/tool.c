@@ -48,24 +48,8 @@ void brachis_tool(
     }
 }
 
-/* Lie bracket [a, b]. */
-static inline twist bracket(twist a, twist b)
-{
-    return (twist){cross(a.w, b.w), add(cross(a.w, b.v), cross(a.v, b.w))};
-}
-
-static inline twist sum(twist a, twist b)
-{
-    return (twist){add(a.w, b.w), add(a.v, b.v)};
-}
-
-static inline twist times(twist a, pack factor)
-{
-    return (twist){scale(a.w, factor), scale(a.v, factor)};
-}
-
 /* How a motion changes as its axes turn with w. */
-static inline twist turned(vec w, twist a)
+static inline twist turn_axes(vec w, twist a)
 {
     return (twist){cross(w, a.w), cross(w, a.v)};
 }
@@ -92,23 +76,23 @@ void brachis_tool_derivatives(
             columns[i] = read_twist(twists, count, n, k, i);
             before[i] = V;
             parts[i] = a;
-            slopes[i] = bracket(V, columns[i]);
-            V = sum(V, times(columns[i], rate));
-            a = sum(a, times(columns[i], gather(qddot, count, n, k, i)));
-            a = sum(a, times(slopes[i], rate));
+            slopes[i] = cross_twists(V, columns[i]);
+            V = add_twists(V, scale_twist(columns[i], rate));
+            a = add_twists(a, scale_twist(columns[i], gather(qddot, count, n, k, i)));
+            a = add_twists(a, scale_twist(slopes[i], rate));
         }
         twist classical = {a.w, add(a.v, cross(V.w, V.v))};
         for (long i = 0; i < n; i++) {
-            twist after = sum(V, times(before[i], all(-1.0)));
-            twist by_q = sum(bracket(parts[i], columns[i]), bracket(slopes[i], after));
-            twist by_qdot = sum(times(slopes[i], all(2.0)), bracket(columns[i], V));
+            twist after = add_twists(V, scale_twist(before[i], all(-1.0)));
+            twist by_q = add_twists(cross_twists(parts[i], columns[i]), cross_twists(slopes[i], after));
+            twist by_qdot = add_twists(scale_twist(slopes[i], all(2.0)), cross_twists(columns[i], V));
             twist slope = slopes[i];
             if (!in_tool_axes) {
                 vec w = columns[i].w;
                 by_qdot.v = add(by_qdot.v, add(cross(w, V.v), cross(V.w, columns[i].v)));
                 by_q.v = add(by_q.v, add(cross(slope.w, V.v), cross(V.w, slope.v)));
-                by_q = sum(by_q, turned(w, classical));
-                slope = sum(slope, turned(w, V));
+                by_q = add_twists(by_q, turn_axes(w, classical));
+                slope = add_twists(slope, turn_axes(w, V));
             }
             write_twist(slope, velocity_q, count, n, k, i);
             write_twist(by_q, acceleration_q, count, n, k, i);

@@ -72,7 +72,7 @@ static inline void logarithm(const double *R, double *vector)
     double sign = found[0] < 0.0 ? -1.0 : 1.0;
     double size = sqrt(found[1] * found[1] + found[2] * found[2] + found[3] * found[3]);
     double real = sign * found[0];
-    /* Half the angle over its sine. */
+    /* The angle over the length of the quaternion's vector. */
     double factor = size > 1e-9 * real ? 2.0 * atan2(size, real) / size : 2.0 / real;
     for (int i = 0; i < 3; i++) {
         vector[i] = sign * factor * found[1 + i];

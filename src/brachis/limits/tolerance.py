@@ -156,12 +156,12 @@ class RangeLimit(_Tolerance):
         )
 
     def values(self, motion: JointStates) -> np.ndarray:
-        rotations = self._robot.tool_placements(motion.q)[1]
+        rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]
         away = motion.q[:, self._columns]
         return np.asarray(np.einsum("kij,kj->ki", rotations, away) * self._scale)
 
     def partials(self, motion: JointStates) -> Partials:
-        rotations = self._robot.tool_placements(motion.q)[1]
+        rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]
         away = motion.q[:, self._columns]
         turning = self._pose.twists(motion.q)[3:]
         by_q = cross(turning, away.T[:, :, None])

@@ -21,8 +21,7 @@ class Evaluator:
     """Values and slopes of all limits along curves y(t).
 
     A phase constructs one, and asks it alone: for the rows of the program, their Jacobian, and the checks between
-    collocation points. A compiled evaluator can replace it. It needs `is_mean`, and `evaluate` with an answer that
-    has the members of `Evaluation`.
+    collocation points.
 
     Parameters
     ----------

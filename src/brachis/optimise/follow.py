@@ -158,6 +158,7 @@ def follow(
             break
         # Over the last knots limits are narrowed until they hold, however slow that is.
         is_last = deadline.passed or not (is_fast or laid.slower < _GAINS * slower)
+        # Over the same knots it would end in the same way, unless it was cut short.
         if is_last and not laid.is_cut:
             break
         if is_last:
@@ -204,7 +205,7 @@ def _knots(
     own: PhaseTiming,
     timing: Timing,
     tolerance: float,
-    most: float = np.inf,
+    most: int = _MOST_INTERVALS + 1,
 ) -> np.ndarray:
     """Choose knots, (N + 1,), over which splines follow a timing; see `breaks_for`."""
     ends = (phase.boundary.start, phase.boundary.end)

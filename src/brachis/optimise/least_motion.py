@@ -123,7 +123,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     soon = deadline.part(0.5)
     most = max(phase.variables for phase in program.phases)
     name = _FOR_MANY if most > 150 else start.solver
-    solve = _session(name, soon, listener, patience=10)
+    solve = _session(name, soon, listener, patience=15)
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)
     if not first.status.usable:

@@ -1,4 +1,4 @@
-"""Solve a program with those of its rows alone that are near their bounds.
+"""Solve a program with only the rows near their bounds.
 
 From a motion that is nearly as fast as possible most limits stay far away: at a time one or two of them hold the motion
 back. A solver's effort grows with all rows that it is given. So it is given those near their bounds, and all are
@@ -23,14 +23,16 @@ from brachis.optimise.backends import (
 
 _NEAR = 0.2
 """Distance from its bound up to which a row is near, as a part of the limit."""
-_VERTEX = 0.05
-"""At a fast motion about as many rows as variables are within this distance."""
-_WORTH = 0.6
-"""Part of the rows, no more, that may be near, if the others are left out."""
-_BEGIN = 0.15
-"""Violation at the first point, no more."""
-_END = 0.5
-"""Violation at an answer, no more: else it is another motion, and all rows are needed."""
+_AT_BOUND = 0.05
+"""Distance from its bound up to which a row holds the motion, about."""
+_ROWS_A_VARIABLE = 2.0
+"""Rows that hold the motion, for every variable, no fewer: from a slower motion the end time would collapse."""
+_MOST_KEPT = 0.6
+"""Part of the rows: if more are near, leaving out the others gains nothing."""
+_FIRST_VIOLATION = 0.15
+"""Violation at the first point above which it is no fast motion."""
+_LAST_VIOLATION = 0.5
+"""Violation of other rows above which an answer is another motion: then all rows are needed."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
 
@@ -42,7 +44,7 @@ class NearRows:
     ----------
     program : Problem
     kept : (c',) int ndarray
-        Numbers of the rows that are left, ascending.
+        Indices of the rows to keep, ascending.
     """
 
     def __init__(self, program: Problem, kept: np.ndarray) -> None:
@@ -95,9 +97,10 @@ def solve_near_rows(
         Of the program with all its rows.
     """
     slack = _slack(program, x)
-    is_vertex = np.count_nonzero(slack < _VERTEX) >= 2.0 * len(x)
+    holding = np.count_nonzero(slack < _AT_BOUND)
+    is_fast = holding >= _ROWS_A_VARIABLE * len(x) and slack.min() >= -_FIRST_VIOLATION
     kept = np.flatnonzero(slack < _NEAR)
-    if not is_vertex or slack.min() < -_BEGIN or len(kept) > _WORTH * len(slack):
+    if not is_fast or len(kept) > _MOST_KEPT * len(slack):
         return solve(program, x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
@@ -108,7 +111,7 @@ def solve_near_rows(
         is_over = report.status is SolveStatus.TIME_LIMIT
         if is_over or (report.status.usable and not len(missing)):
             return _complete(program, kept, reports)
-        if not report.status.usable or slack.min() < -_END:
+        if not report.status.usable or slack.min() < -_LAST_VIOLATION:
             break
         kept = np.union1d(kept, np.flatnonzero(slack < _NEAR))
         x = report.x
@@ -118,7 +121,8 @@ def solve_near_rows(
 def _slack(program: Problem, x: np.ndarray) -> np.ndarray:
     """Distances of all rows from their nearer bound, (c,); negative beyond it, minus infinity where x has no rows."""
     try:
-        rows = program.rows(x)
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows = program.rows(x)
     except UnreachableError:
         return np.full(len(program.lower), -np.inf)
     slack = np.minimum(rows - program.lower, program.upper - rows)
@@ -128,7 +132,7 @@ def _slack(program: Problem, x: np.ndarray) -> np.ndarray:
 def _complete(
     program: Problem, kept: np.ndarray, reports: Sequence[SolverReport]
 ) -> SolverReport:
-    """Make the report of the whole program of the last one, with rows `kept`, and those before it."""
+    """Combine the reports; the last solve had the rows `kept`."""
     last = reports[-1]
     multipliers = np.zeros(len(program.lower))
     multipliers[kept] = last.multipliers

@@ -38,7 +38,7 @@ def breaks_for(
     tolerance: float,
     *,
     from_rest: bool,
-    most: float = np.inf,
+    most: int,
 ) -> np.ndarray:
     """Choose knots over which splines follow a timing.
 
@@ -54,7 +54,7 @@ def breaks_for(
         Part of the time that all intervals together may lose.
     from_rest : bool
         Whether accelerations vanish at both ends.
-    most : float, optional
+    most : int
         Intervals with which halving ends, before those beside much shorter ones are halved too.
 
     Returns
@@ -94,7 +94,7 @@ def breaks_for(
         pieces=pieces,
         tolerance=tolerance,
         shortest=shortest,
-        most=int(min(most, pieces + 2.0 / shortest)),
+        most=most,
     )
     return even_out(np.append(begins, 1.0))
 

@@ -11,6 +11,8 @@ from brachis.kernel import Chain
 def chain_of(model: pin.Model, tool_frame: int) -> Chain:
     """Describe the joints, the bodies and a frame of a serial model at its zero posture.
 
+    The columns (v, w) of the world Jacobian are the joints' screws: w is an axis, and w x v a point on it.
+
     Parameters
     ----------
     model : pinocchio.Model

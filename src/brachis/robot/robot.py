@@ -449,8 +449,14 @@ class Robot(Summary):
 
     def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame in the world frame, from postures (K, n)."""
-        postures = np.asarray(q, dtype=float)
-        return self.chain.tool(postures, in_tool_axes=False)[:2]
+        positions = np.empty((len(q), 3))
+        rotations = np.empty((len(q), 3, 3))
+        tool = self.frame_id
+        for k, data in enumerate(self.place_joints(q)):
+            placement = data.oMf[tool]
+            positions[k] = placement.translation
+            rotations[k] = placement.rotation
+        return positions, rotations
 
     def heights(self, q: np.ndarray) -> np.ndarray:
         """Heights of the tool frame above the plane on which the robot stands, (K,) m, from postures (K, n).

@@ -24,8 +24,9 @@ _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 
 
-_NEARLY = 1e-3
-"""Violation of rows up to which an iterate is nearly feasible."""
+_NEARLY_FEASIBLE = 1e-3
+"""Violation of rows up to which an iterate counts."""
+
 Function = Callable[[np.ndarray], float | np.ndarray]
 """Of the variables of a problem."""
 
@@ -99,14 +100,16 @@ class SolveMonitor:
         return self.must_stop()
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
-        """Tell whether iterates have been no faster for long; kept in `stagnated`.
+        """Tell whether iterates have been no better for long; kept in `stagnated`.
 
         A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
-        within which a solver wanders without ever seeing its conditions of optimality hold. Iterates that exceed a row
-        by a little count as if they took so much longer, but the last one has to be feasible.
+        within which a solver wanders without ever seeing its conditions of optimality hold. An iterate counts with its
+        objective times 1 + violation. The last one has to be feasible.
         """
         needed = objective * (1.0 + infeasibility)
-        self._recent = [*self._recent, needed] if infeasibility <= _NEARLY else []
+        self._recent = (
+            [*self._recent, needed] if infeasibility <= _NEARLY_FEASIBLE else []
+        )
         patience = self.options.patience
         before = self._recent[:-patience]
         least = self.options.progress * abs(objective)

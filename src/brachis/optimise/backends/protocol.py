@@ -85,12 +85,13 @@ class SolverOptions:
     time_limit : float
         s; no solve is begun where it is 0.
     progress : float
-        Relative change of the objective over the last feasible iterates below which a solve has stagnated.
+        Least relative gain of the last iterates over the best one before; with less a solve has stagnated. An iterate
+        counts with its objective times 1 + violation, if it violates rows by no more than 1e-3.
     patience : int
-        How many iterates these are.
+        How many iterates the last ones are.
     anywhere : bool
         Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
-        asks; IPOPT counts all feasible iterates in any case.
+        asks; IPOPT counts all iterates in any case.
     """
 
     tolerance: float = 1e-6

@@ -169,7 +169,7 @@ class TaskMap(Summary, ABC):
         return np.einsum("kmn,kn->km", self.velocity_slopes(twists, qdot), qdot)
 
     def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """V_q alone, (K, m, n), of K states from the `twists` at their postures."""
+        """V_q, (K, m, n), of K states from the `twists` at their postures."""
         return self.derivatives(twists, qdot, np.zeros_like(qdot)).velocity_q
 
     def derivatives(
