@@ -51,9 +51,9 @@ def saved(result, tmp_path):
 
 
 def test_the_line_at_270_degrees(result):
-    """The best closed form of a single joint comes to 1.5754 s at these knots: joint 3."""
+    """The best closed form of a single joint comes to 1.5754 s at these knots: joint 3, before its limits are held."""
     assert result.verified
-    assert result.t_end <= 1.5754 * (1.0 - 1e-3)
+    assert result.t_end <= 1.572
     assert result.trajectory.branch == "chart"
 
 

@@ -21,9 +21,8 @@ def test_a_pose_has_six_rows_and_twelve_coordinates():
     placement = robot.tool_placement(np.array(START))
     value = space.value(np.array(START))
     assert value.shape == (12,)
-    np.testing.assert_allclose(value[:3], placement.translation, atol=1e-14)
-    rotation = value[3:].reshape(3, 3)
-    np.testing.assert_allclose(rotation, placement.rotation, atol=1e-14)
+    np.testing.assert_array_equal(value[:3], placement.translation)
+    np.testing.assert_array_equal(value[3:].reshape(3, 3), placement.rotation)
     assert isinstance(task_map_of(robot, space.rows), Pose)
 
 

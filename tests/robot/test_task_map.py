@@ -31,8 +31,7 @@ def test_position_rows_are_world_coordinates_in_the_order_asked(rows):
     assert space.units == ("m",) * len(rows)
     q = np.array([0.3, -0.4, 0.5])
     named = dict(zip("xyz", robot.tool_placement(q).translation, strict=True))
-    expected = [named[row] for row in rows]
-    np.testing.assert_allclose(space.value(q), expected, atol=1e-14)
+    np.testing.assert_array_equal(space.value(q), [named[row] for row in rows])
 
 
 def test_yaw_of_the_scara_is_the_sum_of_its_angles(scara):

@@ -51,8 +51,11 @@ static inline vec apply(const matrix *E, vec a)
     return add(add(scale(E->x, a.x), scale(E->y, a.y)), scale(E->z, a.z));
 }
 
-static inline twist axis_as_twist(const chain *arm, long i, vec axis, vec point)
+/* Move the chain behind joint i by its coordinate q, and return the joint's axis. */
+static inline twist move_axis(const chain *arm, long i, pack q, displacement *placed)
 {
+    vec axis, point;
+    move_joint(arm, i, q, placed, &axis, &point);
     if (arm->turns[i] == 0.0) {
         return (twist){constant((double[3]){0.0, 0.0, 0.0}), axis};
     }
@@ -159,6 +162,19 @@ static inline twist gravity_upwards(const chain *arm)
     return (twist){none, subtract(none, constant(arm->gravity))};
 }
 
+/* Take the motion (v, a) past joint i with axis S, psi = v x S, rate and acceleration, to the body behind it. */
+static inline void pass_joint(
+    const chain *arm, long i, const displacement *placed, twist S, twist psi, pack rate, pack acceleration, twist *v,
+    twist *a, bodies *own
+)
+{
+    *v = add_twists(*v, scale_twist(S, rate));
+    *a = add_twists(*a, scale_twist(psi, rate));
+    *a = add_twists(*a, scale_twist(S, acceleration));
+    *own = place_body(arm, i, placed);
+    move_body(own, *v, *a);
+}
+
 /* Torques, (K, n), of K states, (K, n). */
 void brachis_torques(
     const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *torques
@@ -172,17 +188,11 @@ void brachis_torques(
         twist v = {0};
         twist a = gravity_upwards(arm);
         for (long i = 0; i < n; i++) {
-            vec axis, point;
-            move_joint(arm, i, gather(q, count, n, k, i), &placed, &axis, &point);
-            twist S = axis_as_twist(arm, i, axis, point);
             pack rate = gather(qdot, count, n, k, i);
-            twist psi = cross_twists(v, S);
-            v = add_twists(v, scale_twist(S, rate));
-            a = add_twists(a, scale_twist(psi, rate));
-            a = add_twists(a, scale_twist(S, gather(qddot, count, n, k, i)));
-            axes[i] = S;
-            moved[i] = place_body(arm, i, &placed);
-            move_body(&moved[i], v, a);
+            pack acceleration = gather(qddot, count, n, k, i);
+            axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
+            twist psi = cross_twists(v, axes[i]);
+            pass_joint(arm, i, &placed, axes[i], psi, rate, acceleration, &v, &a, &moved[i]);
         }
         vec torque = moved[n - 1].torque;
         vec force = moved[n - 1].force;
@@ -211,18 +221,12 @@ void brachis_torque_derivatives(
         twist v = {0};
         twist a = gravity_upwards(arm);
         for (long i = 0; i < n; i++) {
-            vec axis, point;
-            move_joint(arm, i, gather(q, count, n, k, i), &placed, &axis, &point);
-            twist S = axis_as_twist(arm, i, axis, point);
             pack rate = gather(qdot, count, n, k, i);
-            axes[i] = S;
-            psi[i] = cross_twists(v, S);
-            phi[i] = add_twists(cross_twists(a, S), cross_twists(v, psi[i]));
-            v = add_twists(v, scale_twist(S, rate));
-            a = add_twists(a, scale_twist(psi[i], rate));
-            a = add_twists(a, scale_twist(S, gather(qddot, count, n, k, i)));
-            moved[i] = place_body(arm, i, &placed);
-            move_body(&moved[i], v, a);
+            pack acceleration = gather(qddot, count, n, k, i);
+            axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
+            psi[i] = cross_twists(v, axes[i]);
+            phi[i] = add_twists(cross_twists(a, axes[i]), cross_twists(v, psi[i]));
+            pass_joint(arm, i, &placed, axes[i], psi[i], rate, acceleration, &v, &a, &moved[i]);
             moved[i].E = coriolis(&moved[i], v);
         }
         for (long i = n - 1; i >= 0; i--) {
@@ -275,9 +279,7 @@ void brachis_mass_matrices(const chain *arm, long count, const double *q, double
         bodies placed_bodies[n];
         displacement placed = at_zero();
         for (long i = 0; i < n; i++) {
-            vec axis, point;
-            move_joint(arm, i, gather(q, count, n, k, i), &placed, &axis, &point);
-            axes[i] = axis_as_twist(arm, i, axis, point);
+            axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
             placed_bodies[i] = place_body(arm, i, &placed);
         }
         for (long i = n - 1; i >= 0; i--) {

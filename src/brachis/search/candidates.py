@@ -344,7 +344,7 @@ def solve_without_third_order_limits(
 def best_of_joints(
     problem: Problem, solved: SolvedProgram, solve: Solve
 ) -> SolvedProgram:
-    """Solve again with joints in place of the chart's rows, and keep the fastest.
+    """Solve again in a chart around the answer, and with joints in place of its rows, and keep the fastest.
 
     Parameters
     ----------
@@ -361,7 +361,8 @@ def best_of_joints(
     def solve_again(program: Program, x: np.ndarray) -> SolvedProgram:
         return solve_by_margin_continuation(program, x, solve, MARGINS)
 
-    points = [move_to_chart(problem, solved, rows) for rows in _select_joints(solved)]
+    choices = [None, *_select_joints(solved)]
+    points = [move_to_chart(problem, solved, rows) for rows in choices]
     return improve(
         solved,
         [_go_to(point) for point in points if point is not None],
@@ -386,7 +387,7 @@ def move_to_chart(
     problem : Problem
     solved : SolvedProgram
     rows : ChartRows, optional
-        Of the chart, as for `chart_around`.
+        Of the chart; chosen anew if not given, as for `chart_around`.
 
     Returns
     -------
