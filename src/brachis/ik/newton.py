@@ -38,7 +38,7 @@ class Newton:
         self, task_map: TaskMap, geometry: ChainGeometry | None = None
     ) -> None:
         self._task_map = task_map
-        self._chain = task_map.robot.chain if geometry is None else geometry.chain
+        self._chain = geometry or task_map.robot.chain
         self.scales = task_map.robot.scales
 
     def task_coordinates(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

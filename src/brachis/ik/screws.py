@@ -16,7 +16,7 @@ these alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -224,60 +224,23 @@ class Poses:
         )
 
 
-@dataclass(frozen=True)
-class ChainGeometry:
-    """A serial chain as screw axes at the zero posture, in the world frame.
+@dataclass(frozen=True, eq=False)
+class ChainGeometry(Chain):
+    """A serial chain as screw axes at the zero posture, in the world frame; see `brachis.kernel.Chain`.
 
     Attributes
     ----------
     joint_names : tuple of str
-    revolute : (n,) bool ndarray
-        True for a revolute, False for a prismatic joint.
-    axes : (n, 3) ndarray
-        Unit direction of rotation or of translation.
-    points : (n, 3) ndarray
-        A point on each axis of rotation, m (zero for prismatic joints).
-    tool_position : (3,) ndarray
-        Tool frame origin at the zero posture, m.
-    tool_rotation : (3, 3) ndarray
-        Tool frame orientation at the zero posture.
     """
 
-    joint_names: tuple[str, ...]
-    revolute: np.ndarray
-    axes: np.ndarray
-    points: np.ndarray
-    tool_position: np.ndarray
-    tool_rotation: np.ndarray
+    joint_names: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, robot: Robot) -> ChainGeometry:
         """Take the screws of a robot's chain."""
-        chain = robot.chain
-        return cls(
-            joint_names=robot.joint_names,
-            revolute=chain.revolute,
-            axes=chain.axes,
-            points=chain.points,
-            tool_position=chain.tool_position,
-            tool_rotation=chain.tool_rotation,
-        )
-
-    @cached_property
-    def chain(self) -> Chain:
-        """The chain as the compiled kernel takes it, without bodies."""
-        return Chain(
-            revolute=self.revolute,
-            axes=self.axes,
-            points=self.points,
-            tool_position=self.tool_position,
-            tool_rotation=self.tool_rotation,
-        )
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return len(self.joint_names)
+        own = robot.chain
+        parts = {each.name: getattr(own, each.name) for each in fields(own)}
+        return cls(**parts, joint_names=robot.joint_names)
 
     @cached_property
     def _generators(self) -> list[tuple[np.ndarray, np.ndarray]]:
