@@ -73,7 +73,7 @@ def compile_kernel() -> list[Path]:
     Raises
     ------
     RuntimeError
-        There is no C compiler, or it fails.
+        A C compiler is missing, or it fails.
     """
     compiler = find_compiler()
     if compiler is None:

@@ -35,7 +35,7 @@ class Prescribed:
     tool_axis : int
         Axis of the tool whose direction in the plane of the two rows is yaw; -1 without yaw.
     sign : float
-        Of yaw about the world axis that is no row.
+        Of yaw about the third world axis.
     """
 
     axes: tuple[int, ...] = ()

@@ -30,7 +30,7 @@ _ROWS_A_VARIABLE = 2.0
 _MOST_KEPT = 0.6
 """Part of the rows: if more are near, leaving out the others gains nothing."""
 _FIRST_VIOLATION = 0.15
-"""Violation at the first point above which it is no fast motion."""
+"""Largest violation of a first point that counts as a fast motion."""
 _LAST_VIOLATION = 0.5
 """Violation of other rows above which an answer is another motion: then all rows are needed."""
 _ROUNDS = 4
