@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from pydantic import BaseModel, TypeAdapter
+from pydantic import BaseModel
 from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -29,6 +29,7 @@ from brachis.task import (
     Task,
     ToolLimits,
 )
+from brachis.task.fields import describe_fields
 from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
 from brachis.task.scene import CollisionSettings, HalfSpaceShape, Round, SceneBody
@@ -48,8 +49,6 @@ from brachis.task.segments import (
 PAGE = Path(__file__).parent / "task_files.md"
 
 LIMITS = dataclass(LimitSpec)
-for _name, _key in TypeAdapter(LimitSpec).json_schema()["properties"].items():
-    LIMITS.__pydantic_fields__[_name].description = _key["description"]
 
 PARTS: dict[str, type] = {
     "robot": RobotSettings,
@@ -324,13 +323,15 @@ the first point. Points may be positions, 4x4 matrices, SE3 objects, or position
 def rows(model: type) -> Iterator[str]:
     """Yield one line a key: name, default, description."""
     yield from TABLE_HEAD
-    for name, field in model.__pydantic_fields__.items():
-        yield _row(name, field)
+    for name in model.__pydantic_fields__:
+        yield _row(model, name)
 
 
-def _row(name: str, field: FieldInfo) -> str:
-    description = " ".join((field.description or "").split())
-    return f"| `{name}` | {_default(field)} | {description.replace('|', ' or ')} |"
+def _row(model: type, name: str) -> str:
+    field = model.__pydantic_fields__[name]
+    text = field.description or describe_fields(model)[name]
+    description = " ".join(text.split()).replace("|", " or ")
+    return f"| `{name}` | {_default(field)} | {description} |"
 
 
 def _default(field: FieldInfo) -> str:
@@ -364,14 +365,13 @@ def page() -> str:
         for name, field in Attitude.model_fields.items()
     ]
     parts += ["\n### `rotate: {axis: ..., angle_deg: ...}`\n", *rows(Rotation)]
-    profile = Target.model_fields["profile"]
     parts += [
         "\n### `to: {...}`\n",
         "The keys of an orientation as above, and\n",
         *TABLE_HEAD,
     ]
     parts += [
-        _row("profile", profile),
+        _row(Target, "profile"),
         "\n### `tangent: {...}`\n",
         *rows(Tangent),
         CSV.rstrip(),

@@ -6,8 +6,6 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from brachis.apps import bottleneck, plots, report
-from brachis.apps.view import Viewer, view
 from brachis.errors import NotInstalledError, UnknownNameError
 from brachis.search.planned import PlannedMotion
 
@@ -16,6 +14,7 @@ if TYPE_CHECKING:
 
     from brachis.apps.bottleneck import BottleneckReport
     from brachis.apps.report import Report
+    from brachis.apps.view import Viewer
 
 CANDIDATES = "candidates"
 
@@ -78,6 +77,8 @@ class Result(PlannedMotion):
         UnknownNameError
             The plot does not exist.
         """
+        from brachis.apps import plots
+
         if kind == CANDIDATES:
             return plots.plot_candidates(self.candidates)
         if kind not in plots.PLOTS:
@@ -103,6 +104,8 @@ class Result(PlannedMotion):
         InputError
             The file cannot be written; or Jinja2 or Plotly is not installed (`NotInstalledError`).
         """
+        from brachis.apps import report
+
         page = report.make_report(self, degrees=degrees)
         if path is not None:
             page.save(path)
@@ -112,6 +115,8 @@ class Result(PlannedMotion):
         self, *, check: bool = False, reference: bool = False
     ) -> BottleneckReport:
         """Find out what holds the motion back, as `brachis.bottleneck.report` does."""
+        from brachis.apps import bottleneck
+
         return bottleneck.report(self, check=check, reference=reference)
 
     def view(
@@ -123,6 +128,8 @@ class Result(PlannedMotion):
         block: bool | None = None,
     ) -> Viewer:
         """Show the motion and the list of candidates in the browser, as `brachis.view` does."""
+        from brachis.apps.view import view
+
         candidates = [candidate.to_dict() for candidate in self.candidates]
         return view(
             self.trajectory,
@@ -136,6 +143,8 @@ class Result(PlannedMotion):
 
     def _repr_html_(self) -> str:
         """Show the summary in a notebook, and the overview if Matplotlib is installed."""
+        from brachis.apps import plots
+
         try:
             picture = plots.as_html(self.plot())
         except NotInstalledError:

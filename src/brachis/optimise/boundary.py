@@ -13,9 +13,9 @@ linear in the control points too (see `periodic`). Boundary conditions therefore
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from brachis.optimise.bspline import ORDERS, local_basis
 from brachis.path.time_law import TimeLaw
@@ -37,6 +37,48 @@ class EndCondition:
     derivatives: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class FreePart:
+    """What free variables add to control points: the matrix S, entry by entry in the order of its rows.
+
+    Attributes
+    ----------
+    point, variable : (z,) int ndarray
+        Row and column of each entry.
+    weight : (z,) ndarray
+        The entries.
+    shape : tuple of int
+        Numbers of control points and of free variables.
+    """
+
+    point: np.ndarray
+    variable: np.ndarray
+    weight: np.ndarray
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, matrix: np.ndarray) -> FreePart:
+        """Take the entries of a matrix, (N + d, free)."""
+        point, variable = np.nonzero(matrix)
+        return cls(point, variable, matrix[point, variable], matrix.shape)
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """Numbers of entries in the rows, (N + d,)."""
+        return np.bincount(self.point, minlength=self.shape[0])
+
+    def control_points(self, free: np.ndarray) -> np.ndarray:
+        """Part of the control points, (N + d,), that free variables make."""
+        terms = self.weight * free[self.variable]
+        return np.bincount(self.point, terms, self.shape[0])
+
+    def matrix(self) -> np.ndarray:
+        """Return S as a whole, (N + d, free)."""
+        whole = np.zeros(self.shape)
+        whole[self.point, self.variable] = self.weight
+        return whole
+
+
 @dataclass(frozen=True)
 class BoundarySpline:
     """A scalar spline over normalised time with boundary conditions built in.
@@ -46,7 +88,7 @@ class BoundarySpline:
     knots : (N + 2 d + 1,) ndarray
     degree : int
         d.
-    matrix : (N + d, free) csr_array
+    free_part : FreePart
         S.
     given : (1 + k, N + d) ndarray
         Given terms of the control points, by powers of the duration.
@@ -54,7 +96,7 @@ class BoundarySpline:
 
     knots: np.ndarray
     degree: int
-    matrix: csr_array
+    free_part: FreePart
     given: np.ndarray
 
     @classmethod
@@ -82,13 +124,13 @@ class BoundarySpline:
         points = np.flatnonzero(group >= 0)
         variables = np.unique(group[points], return_inverse=True)[1]
         shape = (count, int(variables.max(initial=-1)) + 1)
-        entries = (np.ones(len(points)), (points, variables))
-        return cls(knots, degree, csr_array(entries, shape=shape), given)
+        free_part = FreePart(points, variables, np.ones(len(points)), shape)
+        return cls(knots, degree, free_part, given)
 
     @property
     def free(self) -> int:
         """Number of free variables."""
-        return int(self.matrix.shape[1])
+        return self.free_part.shape[1]
 
     @property
     def greville(self) -> np.ndarray:
@@ -101,15 +143,16 @@ class BoundarySpline:
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
-        return np.asarray(self.matrix @ free + self.given_points(duration))
+        return self.free_part.control_points(free) + self.given_points(duration)
 
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
         """Free variables that come nearest to given control points: means over those that are one variable each."""
         own_part = control_points - self.given_points(duration)
-        counts = np.diff(self.matrix.indptr)
-        is_alone = (counts == 1) & (self.matrix @ np.ones(self.free) == 1.0)
-        own = self.matrix[is_alone]
-        return np.asarray(own.T @ own_part[is_alone] / (own.T @ np.ones(own.shape[0])))
+        part = self.free_part
+        is_alone = (part.counts[part.point] == 1) & (part.weight == 1.0)
+        variable = part.variable[is_alone]
+        sums = np.bincount(variable, own_part[part.point[is_alone]], self.free)
+        return np.asarray(sums / np.bincount(variable, minlength=self.free))
 
 
 def sum_powers(
@@ -183,7 +226,7 @@ def periodic(
     if not np.isnan(start):
         given[0] += start * matrix[:, 0]
         matrix = matrix[:, 1:]
-    return BoundarySpline(knots, degree, csr_array(matrix), given)
+    return BoundarySpline(knots, degree, FreePart.of(matrix), given)
 
 
 @dataclass(frozen=True)
@@ -308,14 +351,15 @@ class SparsityPattern:
     @classmethod
     def of(cls, columns: np.ndarray, spline: BoundarySpline) -> SparsityPattern:
         """Find the places of a spline's local basis, whose `columns` are (K, d + 1)."""
-        matrix = spline.matrix
+        part = spline.free_part
+        begins = np.cumsum(part.counts) - part.counts
         points = columns.ravel()
-        counts = np.diff(matrix.indptr)[points]
+        counts = part.counts[points]
         term = np.repeat(np.arange(len(points)), counts)
         within = np.arange(len(term)) - np.repeat(np.cumsum(counts) - counts, counts)
-        entry = matrix.indptr[points][term] + within
-        variable = matrix.indices[entry]
-        weight = matrix.data[entry]
+        entry = begins[points][term] + within
+        variable = part.variable[entry]
+        weight = part.weight[entry]
         point, function = np.divmod(term, columns.shape[1])
         numbers = point * spline.free + variable
         unique, place = np.unique(numbers, return_inverse=True)

@@ -129,7 +129,9 @@ def fit_curves(
     own = wanted[:, phase.boundary.given :]
     for spline, values in zip(phase.splines, own.T, strict=True):
         missing = values - basis @ spline.given_points(duration)
-        parts.append(np.linalg.lstsq(basis @ spline.matrix, missing, rcond=None)[0])
+        parts.append(
+            np.linalg.lstsq(basis @ spline.free_part.matrix(), missing, rcond=None)[0]
+        )
     parts.append(phase.grid.lengths_of(phase.knots))
     return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
 

@@ -21,10 +21,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
 
 from brachis.limits import Limit
-from brachis.optimise.boundary import BoundarySpline, SparsityPattern, sum_powers
+from brachis.optimise.boundary import (
+    BoundarySpline,
+    FreePart,
+    SparsityPattern,
+    sum_powers,
+)
 from brachis.optimise.grid import FixedGrid
 from brachis.path.time_law import TimeLaw
 
@@ -61,16 +65,17 @@ class Progress:
     def of(cls, spline: BoundarySpline) -> Progress:
         """Take the differences of a spline whose free variables follow the duration, variable 0."""
         given = np.diff(spline.given, axis=1)
-        matrix = csr_array(spline.matrix[1:] - spline.matrix[:-1])
-        matrix.eliminate_zeros()
         depends = np.any(given[1:] != 0.0, axis=0)
-        several = np.diff(matrix.indptr) + depends > 1
+        row, variable, weight = _differences(spline.free_part)
+        several = np.bincount(row, minlength=len(depends)) + depends > 1
         several |= np.any(given[2:] != 0.0, axis=0)
-        chosen = coo_array(matrix[several])
+        number = np.cumsum(several) - 1
+        chosen = several[row]
         by_duration = np.flatnonzero(depends[several])
-        row = np.concatenate([by_duration, chosen.row])
-        variable = np.concatenate([np.zeros_like(by_duration), 1 + chosen.col])
-        weight = np.concatenate([np.zeros(len(by_duration)), chosen.data])
+        row = np.concatenate([by_duration, number[row[chosen]]])
+        none = np.zeros_like(by_duration)
+        variable = np.concatenate([none, 1 + variable[chosen]])
+        weight = np.concatenate([none, weight[chosen]])
         order = np.lexsort((variable, row))
         return cls(given[:, several], row[order], variable[order], weight[order])
 
@@ -84,6 +89,22 @@ class Progress:
         """Entries of the Jacobian, (z,)."""
         by_duration = sum_powers(self.given, x[0], slope=True)
         return np.where(self.variable == 0, by_duration[self.row], self.weight)
+
+
+def _differences(part: FreePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Subtract from each row of a matrix the row before it; return row, column and value of what is not zero."""
+    rows, columns = part.shape
+    row = np.concatenate([part.point - 1, part.point])
+    column = np.tile(part.variable, 2)
+    weight = np.concatenate([part.weight, -part.weight])
+    inside = (row >= 0) & (row < rows - 1)
+    places, place = np.unique(
+        row[inside] * columns + column[inside], return_inverse=True
+    )
+    values = np.bincount(place, weight[inside], len(places))
+    kept = values != 0.0
+    row, column = np.divmod(places[kept], max(columns, 1))
+    return row, column, values[kept]
 
 
 @dataclass(frozen=True, eq=False)

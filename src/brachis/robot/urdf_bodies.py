@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from brachis.common.summary import Summary
 from brachis.errors import InputError
@@ -157,8 +156,7 @@ def _read_body(
 def placement_matrix(placement: Placement) -> np.ndarray:
     """Return a placement as a (4, 4) matrix."""
     matrix = np.eye(4)
-    turn = Rotation.from_euler("xyz", placement.rpy_deg, degrees=True)
-    matrix[:3, :3] = turn.as_matrix()
+    matrix[:3, :3] = _turn_by_rpy(np.radians(placement.rpy_deg))
     matrix[:3, 3] = placement.xyz
     return matrix
 
@@ -211,7 +209,7 @@ def origin_of(owner: Element, path: str) -> np.ndarray:
     """Return the placement, (4, 4), that an origin describes: roll, pitch and yaw about fixed axes."""
     placed = np.eye(4)
     angles = numbers_of(owner, path, "rpy", "0 0 0")
-    placed[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+    placed[:3, :3] = _turn_by_rpy(angles)
     placed[:3, 3] = numbers_of(owner, path, "xyz", "0 0 0")
     return placed
 
@@ -222,5 +220,18 @@ def _displacement(joint: Element, position: float) -> np.ndarray:
     if joint.get("type") == "prismatic":
         placed[:3, 3] = position * _axis(joint)
     elif joint.get("type") in ("revolute", "continuous"):
-        placed[:3, :3] = Rotation.from_rotvec(position * _axis(joint)).as_matrix()
+        placed[:3, :3] = _turn_about(_axis(joint), position)
     return placed
+
+
+def _turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the rotation, (3, 3), about a unit axis by an angle, rad (Rodrigues' formula)."""
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+
+
+def _turn_by_rpy(angles: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the rotation, (3, 3), by roll, pitch and yaw, rad, about the fixed x, then y, then z axis."""
+    roll, pitch, yaw = map(_turn_about, np.eye(3), angles)
+    return np.asarray(yaw @ pitch @ roll)

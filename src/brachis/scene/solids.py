@@ -12,7 +12,6 @@ from typing import Any, TypeAlias
 
 import coal
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from brachis.common.files import mesh_file, read_text
 from brachis.errors import InputError, TaskError, UrdfError
@@ -169,6 +168,8 @@ def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Sol
 
 def _turn_to(direction: np.ndarray) -> np.ndarray:
     """Return a rotation, (3, 3), that turns the z axis to a direction, (3,)."""
+    from scipy.spatial.transform import Rotation
+
     turn, _ = Rotation.align_vectors(direction, [0.0, 0.0, 1.0])
     return np.asarray(turn.as_matrix())
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from brachis.common.arguments import check_keywords
-from brachis.task.fields import required_keys
+from brachis.task.fields import describe_fields, required_keys
 from brachis.task.messages import models_in, validate
 from brachis.task.segments import (
     ArcSegment,
@@ -35,9 +35,9 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
     name = kind.capitalize()
     shapes: list[Any] = [*models_in(model.model_fields[kind].annotation)]
     fields = {
-        key: field
+        key: describe_fields(part)[key]
         for part in (*shapes, model)
-        for key, field in part.model_fields.items()
+        for key in part.model_fields
         if key != kind
     }
     needed = required_keys(shapes[0]) if len(shapes) == 1 else ()
@@ -60,8 +60,8 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
         return validate(model, {kind: given, **beside}, name)
 
     described = [
-        f"{key} : {'required' if key in needed else 'optional'}\n    {field.description}"
-        for key, field in fields.items()
+        f"{key} : {'required' if key in needed else 'optional'}\n    {description}"
+        for key, description in fields.items()
     ]
     make.__doc__ = _DOCSTRING.format(
         summary=model.__doc__, parameters="\n".join(described), example=example

@@ -7,11 +7,15 @@ written ``<like this>`` because they appear in pydantic's error locations; `brac
 
 from __future__ import annotations
 
+import ast
+import inspect
 import itertools
 import os
 import re
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from operator import attrgetter
 from types import NoneType
 from typing import (
@@ -60,7 +64,8 @@ LARGEST = 1e12
 class Model(BaseModel):
     """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity.
 
-    The docstring below a field is its description in the documentation, the JSON schema and messages.
+    The docstring below a field is its description in the documentation, the JSON schema and messages: see
+    `describe_fields`. Pydantic would read them when classes are made, which takes longer than a plan.
     """
 
     # Instances are checked again, because a program can make limits that nobody has checked.
@@ -69,7 +74,7 @@ class Model(BaseModel):
         extra="forbid",
         allow_inf_nan=False,
         revalidate_instances="always",
-        use_attribute_docstrings=True,
+        defer_build=True,
     )
 
     if not TYPE_CHECKING:
@@ -112,6 +117,37 @@ class Model(BaseModel):
     def __str__(self) -> str:
         """Show it as `repr` does."""
         return repr(self)
+
+
+def describe_fields(model: type) -> dict[str, str]:
+    """Return what is said of the fields of a model, or of a dataclass: by their types, or by the docstrings below."""
+    found: dict[str, str] = {}
+    for base in model.__mro__[::-1]:
+        found |= _docstrings_in(base.__module__).get(base.__name__, {})
+    fields = model.model_fields if issubclass(model, Model) else {}
+    return found | {
+        name: field.description for name, field in fields.items() if field.description
+    }
+
+
+@cache
+def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
+    """Read the docstrings below the fields of the classes of one of our modules: by class, then by field."""
+    if not module.startswith("brachis."):
+        return {}
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    classes = (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    return {own.name: dict(_docstrings_of(own)) for own in classes}
+
+
+def _docstrings_of(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
+    for statement, following in itertools.pairwise(node.body):
+        match statement, following:
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
+                yield name, inspect.cleandoc(text)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,14 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from brachis.errors import TaskError, nearest
-from brachis.task.fields import REFUSED, WRONG_FORM, WRONG_KEYS, Model, plain
+from brachis.task.fields import (
+    REFUSED,
+    WRONG_FORM,
+    WRONG_KEYS,
+    Model,
+    describe_fields,
+    plain,
+)
 
 _M = TypeVar("_M", bound=Model)
 _Location = tuple[str | int, ...]
@@ -165,8 +172,8 @@ def _description_at(location: _Location, model: type[Model]) -> str | None:
         return None
     last = names[-1]
     models = _models_at(location[: location.index(last)], model)
-    fields = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
-    found = [field.description for field in fields if field and field.description]
+    known = [describe_fields(one) for one in models if issubclass(one, Model)]
+    found = [own[last] for own in known if last in own]
     if len(found) != 1:
         return None
     return f"{last}: {' '.join(found[0].split()).removesuffix('.')}"

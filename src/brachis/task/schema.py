@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
+from brachis.task.fields import Model, describe_fields
+from brachis.task.limit_models import LimitSpec
 from brachis.task.models import Task
 
 _UNITS = {
@@ -67,6 +70,12 @@ def json_schema() -> dict[str, Any]:
     blend on the last segment) is checked by `brachis.task.load_task` alone.
     """
     schema = Task.model_json_schema(mode="validation")
+    known: list[type] = [LimitSpec, *_subclasses(Model)]
+    models = {model.__name__: model for model in known}
+    parts: dict[str, Any] = {"Task": schema, **schema["$defs"]}
+    for name in models.keys() & parts.keys():
+        for key, description in describe_fields(models[name]).items():
+            parts[name]["properties"][key].setdefault("description", description)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:brachis:task:1",
@@ -76,6 +85,12 @@ def json_schema() -> dict[str, Any]:
         ],  # a path of joints may begin without it
         "title": "brachis task",
     }
+
+
+def _subclasses(model: type[Model]) -> Iterator[type[Model]]:
+    for own in model.__subclasses__():
+        yield own
+        yield from _subclasses(own)
 
 
 def unit_of(key: str) -> str:

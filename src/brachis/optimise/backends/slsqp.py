@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from brachis.errors import UnreachableError
 from brachis.optimise.backends.monitor import SolveMonitor, objective_at
@@ -91,9 +90,9 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
 
 def _dense(problem: Problem, entries: np.ndarray) -> np.ndarray:
     """Jacobian as a matrix, (c, v)."""
-    pattern = (problem.jacobian_rows, problem.jacobian_columns)
-    shape = (len(problem.lower), len(problem.x_lower))
-    return np.asarray(sparse.coo_array((entries, pattern), shape=shape).toarray())
+    matrix = np.zeros((len(problem.lower), len(problem.x_lower)))
+    matrix[problem.jacobian_rows, problem.jacobian_columns] = entries
+    return matrix
 
 
 def _is_stationary(problem: Problem, x: np.ndarray) -> bool:
