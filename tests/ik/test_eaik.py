@@ -16,7 +16,6 @@ from brachis.ik import (
     NotApplicableError,
     check_answers,
     find,
-    margin_gradient,
 )
 from brachis.ik.eaik import eaik, exact_axes
 from brachis.ik.snapping import PolishedSolver
@@ -177,7 +176,7 @@ def test_answers_of_a_sign_differ_and_stand_in_ascending_order(robot, redundant)
 def test_margin_gradient(robot, redundant):
     bench = Bench(robot(), redundant, 20)
     for branch in (0, 1):
-        exact = margin_gradient(bench.solver, bench.q, branch)
+        exact = bench.solver.margin_gradient(bench.q, branch)
         for joint, step in enumerate(1e-6 * np.eye(bench.robot.n)):
             change = bench.solver.branch_margins(
                 bench.q + step, branch

@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from brachis.ik import ChainGeometry, Family, IKSolver, margin_gradient
+from brachis.ik import ChainGeometry, Family, IKSolver
 from brachis.robot import Robot, bind, task_map_of
 from support.chains import Joint, chain_urdf
 from support.closed_forms import wrapped
@@ -284,7 +284,7 @@ class PoseBench:
         """Compare the margins' derivatives by complex steps with central differences."""
         q, h = self.q[:20], 1e-5
         for branch in (0, len(self.solver.branches) - 1):
-            exact = margin_gradient(self.solver, q, branch)
+            exact = self.solver.margin_gradient(q, branch)
             for joint, step in enumerate(h * np.eye(self.robot.n)):
                 upper, lower = (
                     self.solver.branch_margins(q + s, branch) for s in (step, -step)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from brachis.ik import Family, TriedDecomposition, find, margin_gradient
+from brachis.ik import Family, TriedDecomposition, find
 from brachis.robot import Robot, task_map_of
 
 
@@ -118,7 +118,7 @@ class Bench:
         solver, q, h = candidate.solver, self.q[:40], 1e-6
         assert solver is not None
         for branch in range(len(solver.branches)):
-            exact = margin_gradient(solver, q, branch)
+            exact = solver.margin_gradient(q, branch)
             for joint in range(self.robot.n):
                 step = h * np.eye(self.robot.n)[joint]
                 upper, lower = (

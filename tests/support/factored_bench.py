@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from scipy.optimize import brentq
 
-from brachis.ik import ChainGeometry, margin_gradient
+from brachis.ik import ChainGeometry
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import task_map_of
 
@@ -113,7 +113,7 @@ class Bench:
     def check_gradient(self):
         q, h = self.q[:20], 1e-5
         for branch in (0, len(self.solver.branches) - 1):
-            exact = margin_gradient(self.solver, q, branch)
+            exact = self.solver.margin_gradient(q, branch)
             for joint, step in enumerate(h * np.eye(self.robot.n)):
                 upper, lower = (
                     self.solver.branch_margins(q + s, branch) for s in (step, -step)

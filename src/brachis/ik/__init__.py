@@ -11,10 +11,10 @@ Examples
 
 from brachis.ik.protocol import (
     Family,
+    FormulaSolver,
     IKSolver,
     NotApplicableError,
     ik_family,
-    margin_gradient,
 )
 from brachis.ik.registry import (
     BUILTIN,
@@ -34,6 +34,7 @@ __all__ = [
     "NO_CLOSED_FORM",
     "ChainGeometry",
     "Family",
+    "FormulaSolver",
     "IKSolver",
     "Match",
     "NotApplicableError",
@@ -44,6 +45,5 @@ __all__ = [
     "find",
     "find_all",
     "ik_family",
-    "margin_gradient",
     "missing_eaik",
 ]

@@ -24,9 +24,9 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.ik.arm import Arm, RemainingJoints
-from brachis.ik.protocol import IKSolver, NotApplicableError
+from brachis.ik.protocol import FormulaMargins, FormulaSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews, Poses, Screw
-from brachis.ik.vectors import wrap
+from brachis.ik.vectors import where_positive, wrap
 from brachis.robot.joints import complement
 
 SINGULAR = "J_nr is singular everywhere"
@@ -47,7 +47,7 @@ def largest_size(values: np.ndarray) -> float:
     return size
 
 
-class DeterminantSolver(IKSolver):
+class DeterminantSolver(FormulaMargins):
     """What closed forms have in common whose branches are the signs of det J_nr.
 
     Parameters
@@ -81,11 +81,13 @@ class DeterminantSolver(IKSolver):
         """Det J_nr, (K,), in postures (K, n)."""
         return self._chain.screws_at(q).determinant(self._joints)
 
-    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """Return det J_nr, (K, 1), divided by its largest size, with the sign of the branch."""
-        sign = 1.0 if branch == 0 else -1.0
-        values = self._determinants(q)
-        return sign * values[:, None] / self._scale
+    def margins(self, q: np.ndarray) -> np.ndarray:
+        """Return det J_nr, (K, 1), divided by its largest size."""
+        return self._determinants(q)[:, None] / self._scale
+
+    def margin_signs(self, branch: int) -> np.ndarray:
+        """Return the sign of det J_nr."""
+        return np.array([1.0 if branch == 0 else -1.0])
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ A slide whose direction depends on joints that are solved for before it has that
 """
 
 
-class FactoredSolver(IKSolver):
+class FactoredSolver(FormulaSolver):
     """Closed form that solves for one joint after the other; each step has an axis of the answers, its slot.
 
     Parameters
@@ -207,35 +209,41 @@ class FactoredSolver(IKSolver):
             motion.position[spread], motion.rotation[spread]
         )
 
-    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+    def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Arrange the steps' answers; angles in (-pi, pi]."""
-        revolute = self._joints.revolute
-        with np.errstate(invalid="ignore", divide="ignore"):
-            held, values = self._steps(targets, q_r)
-            slots = [len(signs) for signs in self._signs]
-            answers = np.empty((len(values), *slots, len(q_r)))
-            for place, value in enumerate(values):
-                answers[place] = value
-            turning = slice(None) if revolute.all() else revolute
-            answers[turning] = wrap(answers[turning])
-            answers += 0.0 * answers.sum(axis=0)
-            for slot in self._sided:
-                side = np.moveaxis(
-                    self._signs[slot].reshape(-1, *[1] * len(slots)), 0, slot
-                )
-                exists = side * self._factors[slot].value(held) > 0.0
-                answers = np.where(exists, answers, np.nan)
-        ordered = answers[::-1] if self._joints.mirrored else answers
-        return ordered.reshape(len(values), len(self.branches), -1).T[:, :, None]
+        held, values = self._steps(targets, q_r)
+        slots = [len(signs) for signs in self._signs]
+        for slot in self._sided:
+            level = np.moveaxis(
+                self._signs[slot].reshape(-1, *[1] * len(slots)), 0, slot
+            )
+            values = [
+                where_positive(level * self._factors[slot].value(held), value)
+                for value in values
+            ]
+        ordered = values[::-1] if self._joints.mirrored else values
+        revolute = self._geometry.revolute[np.sort(self._joints.joints)]
+        pairs = zip(ordered, revolute, strict=True)
+        shape = (*slots, len(q_r))
+        answers = [
+            np.broadcast_to(wrap(value) if turns else value, shape)
+            for value, turns in pairs
+        ]
+        return (
+            np.stack(answers).reshape(len(values), len(self.branches), -1).T[:, :, None]
+        )
 
-    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """Return the factors of det J_nr that are not constant, with the signs of the branch."""
+    def margins(self, q: np.ndarray) -> np.ndarray:
+        """Return the factors of det J_nr that are not constant."""
         arm = self._arm_at(self._geometry.screws_at(q))
         margins = np.empty((len(q), len(self._varying)), arm.centre.dtype)
         for column, slot in enumerate(self._varying):
-            size = self._choices[branch][slot] / self._scales[slot]
-            margins[:, column] = self._factors[slot].value(arm) * size
+            margins[:, column] = self._factors[slot].value(arm) / self._scales[slot]
         return margins
+
+    def margin_signs(self, branch: int) -> np.ndarray:
+        """Return the signs of these factors."""
+        return np.array([self._choices[branch][slot] for slot in self._varying])
 
     def reason_if_singular(self) -> str:
         """Say which factor of det J_nr vanishes at all postures; empty if none does."""

@@ -30,9 +30,10 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.ik.branches import DeterminantSolver
 from brachis.ik.point_recipes import move_within_plane
-from brachis.ik.protocol import NotApplicableError, ik_family
+from brachis.ik.protocol import FormulaSolver, NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
-from brachis.ik.vectors import determinants, rotate, wrap
+from brachis.ik.vectors import determinants, rotate, where_positive, wrap
+from brachis.kernel import formula
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose, RowsAndYaw
@@ -48,7 +49,7 @@ _LABELS = {
 """What branches are called after the kinds of the joints that remain when one has been given to yaw."""
 
 
-class PlanarSolver(DeterminantSolver):
+class PlanarSolver(DeterminantSolver, FormulaSolver):
     """Closed form of a planar chain; see the module's formulas.
 
     Parameters
@@ -106,8 +107,8 @@ class PlanarSolver(DeterminantSolver):
             if self._chain.revolute[i]:
                 centre = self._centres[i][:, None]
                 vectors[:, 0] -= centre
-                sin = self._senses[i] * np.sin(q[:, i])
-                vectors = vectors * np.cos(q[:, i]) + _turn(vectors) * sin
+                sin = self._senses[i] * formula.sin(q[:, i])
+                vectors = vectors * formula.cos(q[:, i]) + _turn(vectors) * sin
                 own = _turn(vectors[:, 0])
                 vectors[:, 0] += centre
             else:
@@ -127,7 +128,7 @@ class PlanarSolver(DeterminantSolver):
             rows = np.concatenate([rows, turns])
         return determinants(rows)
 
-    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+    def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Return the non-redundant joints, (K, 2, 1, m)."""
         known = q_r * self._senses[self._redundant]
         screws = self._chain.screws_with(self._redundant, known)
@@ -135,17 +136,16 @@ class PlanarSolver(DeterminantSolver):
         tool = screws.tool_position[:, None]
         rows = targets[:, : len(self._rows)] - self._offset
         goal = (self._lift @ rows.T)[:, None]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            if len(joints) == 1:
-                row = self._rows[0][:, None, None]
-                values = [joints[0].orbit(tool).component(row, rows[:, 0], 0)]
-            elif self._tool_axis is None:
-                values = [*move_within_plane(joints[0], joints[1], tool, goal, 0)]
-            else:
-                heading = self._plane @ screws.tool_rotation[:, self._tool_axis]
-                angle = targets[:, 2] - np.arctan2(heading[1], heading[0])
-                values = self._solve_with_yaw(joints, tool, goal, angle)
-            return self._arrange(np.broadcast_arrays(*values), q_r)
+        if len(joints) == 1:
+            row = self._rows[0][:, None, None]
+            values = [joints[0].orbit(tool).component(row, rows[:, 0], 0)]
+        elif self._tool_axis is None:
+            values = [*move_within_plane(joints[0], joints[1], tool, goal, 0)]
+        else:
+            heading = self._plane @ screws.tool_rotation[:, self._tool_axis]
+            angle = targets[:, 2] - formula.arctan2(heading[1], heading[0])
+            values = self._solve_with_yaw(joints, tool, goal, angle)
+        return self._arrange(np.broadcast_arrays(*values), q_r)
 
     def _solve_with_yaw(
         self,
@@ -180,14 +180,12 @@ class PlanarSolver(DeterminantSolver):
         answers = np.stack(values, axis=2) * self._senses[self._joints]
         revolute = self._chain.revolute[self._joints]
         answers[..., revolute] = wrap(answers[..., revolute])
-        answers[~np.isfinite(answers).all(axis=2)] = np.nan
         if len(answers) == 1:
-            q = np.empty((len(q_r), self._chain.n))
+            q = np.empty((len(q_r), self._chain.n), answers.dtype)
             q[:, self._redundant] = q_r
             q[:, self._joints] = answers[0]
-            sign = np.sign(self._determinants(q))
-            exists = sign == np.array([[1.0], [-1.0]])
-            answers = np.where(exists[:, :, None], answers, np.nan)
+            levels = self._determinants(q) * np.array([[1.0], [-1.0]])
+            answers = where_positive(levels[:, :, None], answers)
         return np.swapaxes(answers, 0, 1)[:, :, None]
 
 
@@ -261,7 +259,7 @@ def planar(
     return PlanarSolver(geometry, task_map, redundant, basis)
 
 
-class PrismaticSolver(DeterminantSolver):
+class PrismaticSolver(DeterminantSolver, FormulaSolver):
     """Linear solver for prismatic non-redundant joints; see the module's formula."""
 
     def __init__(
@@ -279,24 +277,32 @@ class PrismaticSolver(DeterminantSolver):
     def _determinants(self, q: np.ndarray) -> np.ndarray:
         return determinants(self._directions(self._chain.screws_at(q)))
 
-    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Return the non-redundant joints, (K, B, 1, m)."""
+    def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """Return the non-redundant joints, (K, B, 1, m), by Cramer's rule."""
         screws = self._chain.screws_with(self._redundant, q_r)
-        values = determinants(self._directions(screws))
-        regular = np.abs(values) > 1e-12 * self._scale
-        matrices = np.moveaxis(self._directions(screws), 2, 0)
-        matrices = np.where(regular[:, None, None], matrices, np.eye(len(self._rows)))
-        gap = targets - screws.tool_position[self._rows].T
-        slides = np.linalg.solve(matrices, gap[:, :, None])[:, None, None, :, 0]
+        directions = self._directions(screws)
+        gap = targets.T - screws.tool_position[self._rows]
+        size = determinants(directions)
+        slides = []
+        for joint in range(len(gap)):
+            replaced = np.array(directions, dtype=gap.dtype)
+            replaced[:, joint] = gap
+            slides.append(determinants(replaced) / size)
+        one = np.stack(slides, axis=1)[:, None, None]
         if len(self.branches) == 1:
-            return slides
-        exists = regular[:, None] & (np.sign(values)[:, None] == (1.0, -1.0))
-        return np.where(exists[:, :, None, None], slides, np.nan)
+            return one
+        levels = size[:, None] * np.array([1.0, -1.0])
+        return where_positive(levels[:, :, None, None], one)
 
-    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
+    def margins(self, q: np.ndarray) -> np.ndarray:
         """Return the determinant of D; no margin where D is constant."""
-        margins = super().branch_margins(q, branch)
+        margins = super().margins(q)
         return margins if len(self.branches) == 2 else margins[:, :0]
+
+    def margin_signs(self, branch: int) -> np.ndarray:
+        """Return the sign of the determinant, where it is a margin."""
+        signs = super().margin_signs(branch)
+        return signs if len(self.branches) == 2 else signs[:0]
 
 
 @ik_family("prismatic", source="linear in the slides; the docstring of `planar`")

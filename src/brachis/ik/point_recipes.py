@@ -55,6 +55,7 @@ from brachis.ik.branches import SINGULAR, Factor, FactoredSolver, Steps, fit
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Screw
 from brachis.ik.vectors import across, angle_about, dot
+from brachis.kernel import formula
 from brachis.robot import TaskMap
 from brachis.robot.task_map import Pose
 
@@ -116,7 +117,7 @@ def solve_cylinder(arm: Arm, target: np.ndarray) -> Values:
     away = target - b.point
     radius = across(b.axis, away)
     side = dot(c.axis, arm.centre - b.point)
-    reach = np.sqrt(dot(radius, radius) - side * side)
+    reach = formula.sqrt(dot(radius, radius) - side * side)
     orbit = c.orbit(arm.centre)
     level = np.concatenate([reach, -reach], axis=FRONT) + dot(front, b.point)
     third = orbit.component(front, level, UP)

@@ -5,10 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from brachis.ik.screws import ChainGeometry
+from brachis.kernel import Formula
 from brachis.robot import TaskMap
 
 
@@ -70,6 +73,82 @@ class IKSolver(ABC):
             Dimensionless, of the order of one in the middle of the branch.
         """
 
+    def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """Differentiate the branch margins with respect to all joints, (K, k, n), exact by complex steps."""
+        count, n = q.shape
+        step = 1e-30
+        stepped = np.repeat(q[None].astype(complex), n, axis=0)
+        stepped[np.arange(n), :, np.arange(n)] += 1j * step
+        margins = self.branch_margins(stepped.reshape(n * count, n), branch)
+        return np.moveaxis(margins.imag.reshape(n, count, -1) / step, 0, 2)
+
+
+class FormulaMargins(IKSolver):
+    """Closed form whose margins are formulas, which the compiled library evaluates.
+
+    They are written with NumPy, and recorded when they are first needed: see `brachis.kernel.formula` for what they may
+    do.
+    """
+
+    @abstractmethod
+    def margins(self, q: np.ndarray) -> np.ndarray:
+        """Branch margins, (K, k), but for their signs."""
+
+    @abstractmethod
+    def margin_signs(self, branch: int) -> np.ndarray:
+        """Signs of the margins in a branch, (k,)."""
+
+    @cached_property
+    def _formulas(self) -> dict[object, Formula]:
+        return {}
+
+    def _formula(
+        self, key: object, make: Callable[..., Formula], *given: Any
+    ) -> Formula:
+        """Return the formula of a key; it is made if it has not been."""
+        if key not in self._formulas:
+            self._formulas[key] = make(*given)
+        return self._formulas[key]
+
+    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """Evaluate the margins."""
+        formula = self._formula("margins", Formula.of, self.margins, q.shape[1])
+        return formula(q) * self.margin_signs(branch)
+
+    def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """Evaluate the slopes of the margins."""
+        formula = self._formula("slopes", Formula.gradient, self.margins, q.shape[1])
+        return formula(q) * self.margin_signs(branch)[:, None]
+
+
+class FormulaSolver(FormulaMargins):
+    """Closed form whose answers are formulas too."""
+
+    @abstractmethod
+    def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """Non-redundant joints, (K, B, A, m), as of `solve`; one of them is not finite where there is no answer."""
+
+    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """Evaluate the answers of all branches."""
+        return _without_parts(self._all(targets, q_r)(targets, q_r))
+
+    def solve_branch(
+        self, targets: np.ndarray, q_r: np.ndarray, branch: int
+    ) -> np.ndarray:
+        """Evaluate the answers of one branch."""
+        formula = self._formula(branch, self._all(targets, q_r).part, branch)
+        return _without_parts(formula(targets, q_r))
+
+    def _all(self, *at: np.ndarray) -> Formula:
+        counts = [own.shape[1] for own in at]
+        return self._formula("answers", Formula.of, self.answers, *counts)
+
+
+def _without_parts(answers: np.ndarray) -> np.ndarray:
+    """Replace answers, (..., m), of which a part is missing by NaN."""
+    answers[~np.isfinite(answers).all(axis=-1)] = np.nan
+    return answers
+
 
 class NotApplicableError(Exception):
     """A family does not fit a decomposition; the message is the reason, shown to the user."""
@@ -107,24 +186,3 @@ def ik_family(name: str, *, source: str) -> Callable[[Build], Family]:
         return Family(name, build, source)
 
     return declare
-
-
-def margin_gradient(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
-    """Differentiate the branch margins with respect to all joints, exact by complex steps.
-
-    Parameters
-    ----------
-    solver : IKSolver
-    q : (K, n) ndarray
-    branch : int
-
-    Returns
-    -------
-    (K, k, n) ndarray
-    """
-    count, n = q.shape
-    step = 1e-30
-    stepped = np.repeat(q[None].astype(complex), n, axis=0)
-    stepped[np.arange(n), :, np.arange(n)] += 1j * step
-    margins = solver.branch_margins(stepped.reshape(n * count, n), branch)
-    return np.moveaxis(margins.imag.reshape(n, count, -1) / step, 0, 2)

@@ -23,7 +23,7 @@ import numpy as np
 
 from brachis.common.arrays import cross
 from brachis.ik.vectors import apply, apply_inverse, cosine_roots, determinants, dot
-from brachis.kernel import Chain
+from brachis.kernel import Chain, formula
 from brachis.robot import Robot
 
 
@@ -77,7 +77,7 @@ class Circle:
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         """Position at an angle, (3, ...)."""
-        return self.place(np.cos(angle), np.sin(angle))
+        return self.place(formula.cos(angle), formula.sin(angle))
 
     def place(self, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
         """Position at an angle of which cosine and sine are known, (3, ...)."""
@@ -123,7 +123,7 @@ class Line:
         """Slides at a distance from another position: approaching it at the first, leaving it at the second."""
         away = other - self.start
         nearest = dot(self.axis, away)
-        root = np.sqrt(nearest * nearest - dot(away, away) + squared)
+        root = formula.sqrt(nearest * nearest - dot(away, away) + squared)
         return np.concatenate([nearest - root, nearest + root], axis=slot)
 
 
@@ -282,7 +282,7 @@ class ChainGeometry(Chain):
         """
         moving = np.zeros(self.n, dtype=bool)
         moving[list(joints)] = True
-        q = np.zeros((self.n, len(positions)))
+        q = np.zeros((self.n, len(positions)), dtype=positions.dtype)
         q[moving] = positions.T
         return self._move(q, moving)
 
@@ -291,8 +291,8 @@ class ChainGeometry(Chain):
         count = q.shape[1]
         axes = np.empty((3, self.n, count), dtype=q.dtype)
         points = np.empty_like(axes)
-        rotation = np.eye(3, dtype=q.dtype)[:, :, None]
-        offset = np.zeros((3, 1), dtype=q.dtype)
+        rotation = np.eye(3)[:, :, None]
+        offset = np.zeros((3, 1))
         placed = 0
         for i in np.flatnonzero(moving).tolist():
             here = slice(placed, i + 1)
@@ -302,8 +302,8 @@ class ChainGeometry(Chain):
                 first, second = self._generators[i]
                 rotation = (
                     rotation
-                    + (first @ rotation) * np.sin(q[i])
-                    + (second @ rotation) * (1.0 - np.cos(q[i]))
+                    + (first @ rotation) * formula.sin(q[i])
+                    + (second @ rotation) * (1.0 - formula.cos(q[i]))
                 )
                 offset = points[:, i] - (self.points[i, None] @ rotation)[:, 0]
             else:

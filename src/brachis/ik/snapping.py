@@ -266,3 +266,7 @@ class PolishedSolver(IKSolver):
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return the margins of the ideal chain."""
         return self._solver.branch_margins(q, branch)
+
+    def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """Return the slopes of the margins of the ideal chain."""
+        return self._solver.margin_gradient(q, branch)

@@ -35,6 +35,7 @@ from brachis.ik.point_recipes import choose_recipe
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Circle, Screw
 from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
+from brachis.kernel import formula
 from brachis.robot import TaskMap
 
 _FLIP = 2
@@ -108,7 +109,7 @@ def _solve_wrist(
     """Solve R_u R_v R_w = (R_a R_b R_c)^-1 R_D for the angles of u, v, w."""
     u, v, w = arm.screws[3:]
     turns = [
-        (joint.axis, np.cos(q), np.sin(q))
+        (joint.axis, formula.cos(q), formula.sin(q))
         for joint, q in zip(arm.base, base, strict=True)
         if joint.revolute
     ]
@@ -121,8 +122,8 @@ def _solve_wrist(
     start = apply_inverse(rotation, start)
     orbit = Circle.of(v.axis, w.axis)
     bend = orbit.component(-u.axis, -dot(u.axis, end), _FLIP)
-    cos = np.cos(bend)
-    sin = np.sin(bend)
+    cos = formula.cos(bend)
+    sin = formula.sin(bend)
     first = angle_about(u.axis, orbit.place(cos, sin), end)
     last = angle_about(w.axis, start, Circle.of(v.axis, u.axis).place(cos, -sin))
     return first, bend, last

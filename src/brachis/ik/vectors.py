@@ -9,9 +9,12 @@ J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposit
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from brachis.common.arrays import cross
+from brachis.kernel import formula
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -26,8 +29,8 @@ def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Turn a vector about a unit axis (Rodrigues' formula), shape (3, ...)."""
-    cos = np.cos(angle)
-    sin = np.sin(angle)
+    cos = formula.cos(angle)
+    sin = formula.sin(angle)
     return (
         vector * cos
         + cross(axis, vector) * sin
@@ -56,7 +59,7 @@ def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndar
     """
     start = across(axis, start)
     end = across(axis, end)
-    return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
+    return formula.arctan2(dot(axis, cross(start, end)), dot(start, end))
 
 
 def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.ndarray:
@@ -66,8 +69,8 @@ def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.n
     first one, negative at the second. NaN where c is out of reach.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
-        half = np.arccos(c / np.sqrt(a * a + b * b))
-    middle = np.arctan2(b, a)
+        half = formula.arccos(c / formula.sqrt(a * a + b * b))
+    middle = formula.arctan2(b, a)
     return np.concatenate([middle - half, middle + half], axis=slot)
 
 
@@ -83,13 +86,36 @@ def meeting_point(
 
 def wrap(angle: np.ndarray) -> np.ndarray:
     """Return the same angles in (-pi, pi]."""
-    return angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
+    return angle - 2.0 * np.pi * formula.ceil((angle - np.pi) / (2.0 * np.pi))
+
+
+def sign(value: np.ndarray) -> np.ndarray:
+    """Return the sign of numbers that are not zero."""
+    return value / formula.sqrt(value * value)
+
+
+def where_positive(level: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values where levels are not negative, else NaN."""
+    root = formula.sqrt(level)
+    return values + (root - root)
 
 
 def determinants(matrices: np.ndarray) -> np.ndarray:
-    """Compute determinants (K,) of matrices (m, m, K); real or complex, and analytic."""
-    if len(matrices) == 1:
-        return matrices[0, 0]
-    if len(matrices) == 2:
-        return matrices[0, 0] * matrices[1, 1] - matrices[0, 1] * matrices[1, 0]
-    return np.linalg.det(np.moveaxis(matrices, 2, 0))
+    """Compute determinants (K,) of matrices (m, m, K); real or complex, and analytic.
+
+    By Laplace's expansion: without a division, and each minor once.
+    """
+    minors = {0: np.ones_like(matrices[0, 0])}
+    for row in matrices:
+        larger: dict[int, Any] = {}
+        for columns, minor in minors.items():
+            for j, entry in enumerate(row):
+                if columns >> j & 1:
+                    continue
+                term = entry * minor
+                is_odd = (columns >> j).bit_count() % 2
+                own = columns | 1 << j
+                signed = -term if is_odd else term
+                larger[own] = larger.get(own, 0.0) + signed
+        minors = larger
+    return minors[2 ** len(matrices) - 1]

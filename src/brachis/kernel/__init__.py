@@ -5,6 +5,7 @@ formulas.
 """
 
 from brachis.kernel.chain import Chain
+from brachis.kernel.formula import Formula
 from brachis.kernel.halving import halve_intervals
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
@@ -13,6 +14,7 @@ from brachis.kernel.tool import rotation_vectors, tool_derivatives
 
 __all__ = [
     "Chain",
+    "Formula",
     "Prescribed",
     "body_twists",
     "bounds_of_pairs",

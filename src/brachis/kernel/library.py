@@ -33,6 +33,7 @@ FUNCTIONS = {
     "brachis_body_twists": "- llpp",
     "brachis_newton": "- ppllpplpplddip",
     "brachis_halve": "l plddlpp",
+    "brachis_formula": "- llplplplppp",
 }
 """What functions return and take: pointer, long, double, int, or nothing."""
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.ik import IKSolver, margin_gradient
+from brachis.ik import IKSolver
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
@@ -78,7 +78,7 @@ class ClosedFormMap(PathMap):
 
     def branch_margin_gradient(self, q: np.ndarray) -> np.ndarray:
         """Differentiate `branch_margins` with respect to q, (K, b, n)."""
-        return margin_gradient(self.solver, q, self.branch)
+        return self.solver.margin_gradient(q, self.branch)
 
     def start_margins(self) -> np.ndarray:
         """Margins of the branch at the start."""

@@ -1,0 +1,352 @@
+"""Formulas that are written with NumPy, recorded once, and evaluated by the library at many points.
+
+A function is called once with arrays of `Number` in the place of values; it takes square roots and angles by the
+functions below, which are NumPy's for plain values. What it does to them is kept as a sequence of
+steps; so are its derivatives, by the chain rule from the last step to the first (reverse accumulation; A. Griewank, A.
+Walther, Evaluating Derivatives, 2008). Steps that nothing needs are left out, and the same one is kept once.
+
+A function has to do the same whatever the values are: no comparison, no `numpy.linalg`. Terms with a factor of zero
+count as zero, also where the other factor would be infinite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from brachis.kernel.library import address, as_doubles, load
+
+_OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 ceil"
+_CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
+"""In the order of formula.c."""
+_SIDE_BY_SIDE = 16
+"""Points that the library computes side by side."""
+
+
+class Number:
+    """A number of a formula: an input, a constant, or what an operation gives.
+
+    Attributes
+    ----------
+    record : Record
+        To which it belongs.
+    operation : str
+        One of the operations, ``input`` or ``constant``.
+    operands : tuple
+        Numbers; the place of an input, or the value of a constant.
+    place : int
+        Among the numbers of the record.
+    value : float or None
+        Of a constant.
+    """
+
+    __slots__ = ("operands", "operation", "place", "record", "value")
+
+    def __init__(
+        self, record: Record, operation: str, operands: tuple[Any, ...]
+    ) -> None:
+        self.record = record
+        self.operation = operation
+        self.operands = operands
+        self.place = len(record.numbers)
+        self.value: float | None = operands[0] if operation == "constant" else None
+
+    def __add__(self, other: Any) -> Number:
+        """Add."""
+        return self.record.add(self, self.record.number(other))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Number:
+        """Subtract."""
+        return self.record.add(self, -self.record.number(other))
+
+    def __rsub__(self, other: Any) -> Number:
+        """Subtract from a plain number."""
+        return self.record.add(self.record.number(other), -self)
+
+    def __mul__(self, other: Any) -> Number:
+        """Multiply."""
+        return self.record.multiply(self, self.record.number(other))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Number:
+        """Divide."""
+        return self.record.divide(self, self.record.number(other))
+
+    def __rtruediv__(self, other: Any) -> Number:
+        """Divide a plain number."""
+        return self.record.divide(self.record.number(other), self)
+
+    def __neg__(self) -> Number:
+        """Change the sign."""
+        return self.record.negate(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """The numbers of a formula, in the order in which they come about."""
+
+    numbers: list[Number] = field(default_factory=list)
+    _known: dict[tuple[Any, ...], Number] = field(default_factory=dict)
+
+    def _keep(self, operation: str, *operands: Any) -> Number:
+        """Return the number, which is made if it is not known."""
+        key = (operation, *operands)  # numbers are known by their identity
+        known = self._known.get(key)
+        if known is None:
+            known = Number(self, operation, operands)
+            self.numbers.append(known)
+            self._known[key] = known
+        return known
+
+    def inputs(self, count: int) -> np.ndarray:
+        """Make the next inputs, (1, count)."""
+        begin = sum(own.operation == "input" for own in self.numbers)
+        made = [self._keep("input", begin + i) for i in range(count)]
+        return np.array(made, dtype=object).reshape(1, count)
+
+    def number(self, value: Any) -> Number:
+        """Return a number as it is, anything else as a constant."""
+        return (
+            value if isinstance(value, Number) else self._keep("constant", float(value))
+        )
+
+    def apply(self, function: str, *operands: Number) -> Number:
+        """Apply a function of one number or two."""
+        values = [own.value for own in operands]
+        if None in values:
+            return self._keep(function, *operands)
+        return self.number(getattr(np, function)(*values))
+
+    def add(self, a: Number, b: Number) -> Number:
+        """Add two numbers; a difference where one of them is a negative."""
+        if a.value is not None and b.value is not None:
+            return self.number(a.value + b.value)
+        if a.value == 0.0:
+            return b
+        if b.value == 0.0:
+            return a
+        if b.operation == "negate":
+            return self._keep("subtract", a, b.operands[0])
+        if a.operation == "negate":
+            return self._keep("subtract", b, a.operands[0])
+        return self._keep("add", *sorted((a, b), key=_place))
+
+    def negate(self, a: Number) -> Number:
+        """Change the sign of a number."""
+        if a.value is not None:
+            return self.number(-a.value)
+        return a.operands[0] if a.operation == "negate" else self._keep("negate", a)
+
+    def multiply(self, a: Number, b: Number) -> Number:
+        """Multiply two numbers."""
+        if b.value is not None:
+            a, b = (b, a)
+        if a.value is not None and b.value is not None:
+            return self.number(a.value * b.value)
+        if a.value == 0.0:
+            return a
+        if a.value in (1.0, -1.0):
+            return b if a.value == 1.0 else -b
+        if a.operation == "negate" or b.operation == "negate":
+            sign = (a.operation == "negate") != (b.operation == "negate")
+            product = self.multiply(
+                *(
+                    own.operands[0] if own.operation == "negate" else own
+                    for own in (a, b)
+                )
+            )
+            return -product if sign else product
+        return self._keep("multiply", *sorted((a, b), key=_place))
+
+    def divide(self, a: Number, b: Number) -> Number:
+        """Divide a number by another one."""
+        if a.value == 0.0 or b.value == 1.0:
+            return a
+        if a.value is not None and b.value:
+            return self.number(a.value / b.value)
+        return self._keep("divide", a, b)
+
+    def gradient(self, output: Number, inputs: np.ndarray) -> list[Number]:
+        """Differentiate a number by inputs."""
+        slopes = {output: self.number(1.0)}
+        for number in self.numbers[output.place :: -1]:
+            slope = slopes.get(number)
+            if slope is None or number.operation in ("input", "constant"):
+                continue
+            own = _SLOPES[number.operation](number, *number.operands)
+            for operand, by_operand in zip(number.operands, own, strict=True):
+                term = slope * by_operand
+                slopes[operand] = slopes[operand] + term if operand in slopes else term
+        none = self.number(0.0)
+        return [slopes.get(own, none) for own in inputs.ravel()]
+
+
+_SLOPES: dict[str, Callable[..., tuple[Any, ...]]] = {
+    "add": lambda _, _a, _b: (1.0, 1.0),
+    "subtract": lambda _, _a, _b: (1.0, -1.0),
+    "multiply": lambda _, a, b: (b, a),
+    "divide": lambda c, _, b: (1.0 / b, -c / b),
+    "negate": lambda _, _a: (-1.0,),
+    "sqrt": lambda c, _: (0.5 / c,),
+    "sin": lambda _, a: (cos(a),),
+    "cos": lambda _, a: (-sin(a),),
+    "arccos": lambda _, a: (-1.0 / sqrt(1.0 - a * a),),
+    "arctan2": lambda _, a, b: (b / (a * a + b * b), -a / (a * a + b * b)),
+    "ceil": lambda _, _a: (0.0,),
+}
+"""Slopes of what an operation gives, by its operands."""
+
+
+def _place(number: Number) -> int:
+    return number.place
+
+
+def _recording(function: np.ufunc) -> Callable[..., Any]:
+    """Return a function of NumPy that takes arrays of numbers of a formula too, and plain ones among them."""
+
+    def apply_to_one(*values: Any) -> Any:
+        known = [own.record for own in values if isinstance(own, Number)]
+        if not known:
+            return function(*values)
+        return known[0].apply(function.__name__, *map(known[0].number, values))
+
+    def apply(*values: Any) -> Any:
+        if all(np.asarray(own).dtype != object for own in values):
+            return function(*values)
+        return np.frompyfunc(apply_to_one, len(values), 1)(*values)
+
+    return apply
+
+
+sqrt: Callable[..., Any] = _recording(np.sqrt)
+sin: Callable[..., Any] = _recording(np.sin)
+cos: Callable[..., Any] = _recording(np.cos)
+arccos: Callable[..., Any] = _recording(np.arccos)
+arctan2: Callable[..., Any] = _recording(np.arctan2)
+ceil: Callable[..., Any] = _recording(np.ceil)
+
+
+@dataclass(frozen=True, eq=False)
+class Formula:
+    """A recorded function of K points.
+
+    Attributes
+    ----------
+    counts : tuple of int
+        Numbers of the inputs, in each argument.
+    shape : tuple of int
+        Of what is found at a point.
+    constants : (c,) ndarray
+    steps : (s, 3) int32 ndarray
+        Operation and operands, which are counted over inputs, constants and steps.
+    wanted : (o,) int32 ndarray
+        What is found, counted likewise.
+    """
+
+    counts: tuple[int, ...]
+    shape: tuple[int, ...]
+    constants: np.ndarray
+    steps: np.ndarray
+    wanted: np.ndarray
+
+    @classmethod
+    def of(cls, function: Callable[..., np.ndarray], *counts: int) -> Formula:
+        """Record a function of arrays, (K, count) each, that returns an array, (K, ...)."""
+        record = Record()
+        with np.errstate(all="ignore"):
+            found = function(*(record.inputs(count) for count in counts))
+        return cls._of_numbers(record, counts, found[0])
+
+    @classmethod
+    def gradient(
+        cls, function: Callable[[np.ndarray], np.ndarray], count: int
+    ) -> Formula:
+        """Record the slopes, (K, c, count), of a function that returns an array, (K, c)."""
+        record = Record()
+        inputs = record.inputs(count)
+        with np.errstate(all="ignore"):
+            values = [record.number(own) for own in function(inputs)[0]]
+        slopes = [record.gradient(own, inputs) for own in values]
+        found = np.array(slopes, dtype=object).reshape(len(values), count)
+        return cls._of_numbers(record, (count,), found)
+
+    @classmethod
+    def _of_numbers(
+        cls, record: Record, counts: tuple[int, ...], found: np.ndarray
+    ) -> Formula:
+        """Keep what is needed for the numbers that are wanted."""
+        wanted = [record.number(own) for own in found.flat]
+        own = record.numbers
+        constants = [number for number in own if number.operation == "constant"]
+        done = [number for number in own if number.operation in _CODES]
+        place = {
+            number: number.operands[0] for number in own if number.operation == "input"
+        }
+        place |= {
+            number: sum(counts) + i for i, number in enumerate((*constants, *done))
+        }
+        steps = [
+            (
+                _CODES[number.operation],
+                place[number.operands[0]],
+                place[number.operands[-1]],
+            )
+            for number in done
+        ]
+        whole = cls(
+            counts,
+            found.shape,
+            np.array([number.value for number in constants], dtype=float),
+            np.array(steps, dtype=np.int32).reshape(-1, 3),
+            np.array([place[number] for number in wanted], dtype=np.int32),
+        )
+        return whole.part(...)
+
+    def part(self, index: Any) -> Formula:
+        """Return the formula of a part of what is found at a point; `index` as NumPy takes it."""
+        wanted = np.reshape(self.wanted, self.shape)[index]
+        inputs = sum(self.counts)
+        begin = inputs + len(self.constants)
+        needed = np.zeros(begin + len(self.steps), dtype=bool)
+        needed[wanted] = True
+        needed[:inputs] = True
+        operands = self.steps[:, 1:].tolist()
+        for step in range(len(operands) - 1, -1, -1):
+            if needed[begin + step]:
+                needed[operands[step]] = True
+        place = np.cumsum(needed, dtype=np.int32) - 1
+        steps = self.steps[needed[begin:]]
+        steps[:, 1:] = place[steps[:, 1:]]
+        constants = self.constants[needed[inputs:begin]]
+        return Formula(
+            self.counts, wanted.shape, constants, steps, place[wanted].ravel()
+        )
+
+    def __call__(self, *points: np.ndarray) -> np.ndarray:
+        """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
+        count = len(points[0])
+        inputs = as_doubles(np.concatenate(points, axis=1), (count, sum(self.counts)))
+        found = np.empty((count, len(self.wanted)))
+        numbers = np.empty(
+            (inputs.shape[1] + len(self.constants) + len(self.steps), _SIDE_BY_SIDE)
+        )
+        load().brachis_formula(
+            inputs.shape[1],
+            len(self.constants),
+            address(self.constants),
+            len(self.steps),
+            address(self.steps),
+            count,
+            address(inputs),
+            len(self.wanted),
+            address(self.wanted),
+            address(numbers),
+            address(found),
+        )
+        return found.reshape(count, *self.shape)
