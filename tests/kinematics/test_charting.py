@@ -132,10 +132,11 @@ def test_rows_come_back_from_their_arrays(once_around):
         again = ChartRows.of_arrays(*rows.arrays())
         pairs = [*zip(rows.at(s), again.at(s), strict=True)]
         if rows.knots is not None:
-            own, other = rows.bend(s, q), again.bend(s, q)
-            pairs += [(own.rows, other.rows), (own.drift, other.drift)]
+            own, other = rows.conditions(s, q), again.conditions(s, q)
+            pairs += [(own.turning, other.turning), (own.drift, other.drift)]
         else:
-            assert rows.bend(s, q) is again.bend(s, q) is None
+            assert rows.conditions(s, q).turning is None
+            assert again.conditions(s, q).turning is None
         for first, second in pairs:
             np.testing.assert_allclose(first, second, atol=1e-12)
 

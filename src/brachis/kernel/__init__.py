@@ -5,19 +5,26 @@ formulas.
 """
 
 from brachis.kernel.chain import Chain
+from brachis.kernel.chain_rule import MotionSlopes, apply_chain_rule, find_entries
 from brachis.kernel.formula import Formula
 from brachis.kernel.halving import halve_intervals
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
+from brachis.kernel.path_motion import Conditions, PathMotion
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
 
 __all__ = [
     "Chain",
+    "Conditions",
     "Formula",
+    "MotionSlopes",
+    "PathMotion",
     "Prescribed",
+    "apply_chain_rule",
     "body_twists",
     "bounds_of_pairs",
+    "find_entries",
     "find_postures",
     "go_backwards",
     "go_forwards",

@@ -33,6 +33,10 @@ FUNCTIONS = {
     "brachis_body_twists": "- llpp",
     "brachis_newton": "- ppllpplpplddip",
     "brachis_halve": "l plddlpp",
+    "brachis_path_motion": "- ppplppppppp",
+    "brachis_path_derivatives": "- lpplpppppppp",
+    "brachis_chain_rule": "- llllppplllp",
+    "brachis_entries": "- llllpllppp",
     "brachis_formula": "- llplplplppp",
 }
 """What functions return and take: pointer, long, double, int, or nothing."""

@@ -6,16 +6,6 @@
 
 static const double TURN = 6.283185307179586;
 
-/* What is prescribed: the pose of the tool (`is_pose`), or `rows` of its position along the world's axes, and behind them,
-if `tool_axis` is not negative, yaw: the direction of this axis of the tool in the plane of the two rows. */
-typedef struct {
-    long is_pose;
-    long rows;
-    long axes[3];
-    long tool_axis;
-    double sign; /* of yaw about the world's third axis */
-} prescribed;
-
 static inline double lane_of(pack values, int lane)
 {
     return values[lane];
@@ -69,9 +59,9 @@ static long write_task(
         R[j][2] = lane_of(tool->rotation[j].z, lane);
     }
     double miss[6] = {0};
-    long used[6] = {0, 1, 2, 3, 4, 5};
-    double signs[6] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
-    long count = 6;
+    long used[6];
+    double signs[6];
+    long count = rows_of(asked, used, signs);
     if (asked->is_pose) {
         double to[9];
         for (int i = 0; i < 3; i++) {
@@ -82,27 +72,20 @@ static long write_task(
         }
         logarithm(to, miss + 3);
     } else {
-        count = asked->rows;
-        for (long i = 0; i < count; i++) {
-            used[i] = asked->axes[i];
+        for (long i = 0; i < asked->rows; i++) {
             miss[i] = target[i] - position[used[i]];
         }
         if (asked->tool_axis >= 0) {
             const double *axis = R[asked->tool_axis];
             double yaw = atan2(axis[asked->axes[1]], axis[asked->axes[0]]);
-            double off = target[count] - yaw;
-            miss[count] = off - TURN * floor(off / TURN + 0.5);
-            used[count] = 6 - asked->axes[0] - asked->axes[1];
-            signs[count] = asked->sign;
-            count++;
+            double off = target[count - 1] - yaw;
+            miss[count - 1] = off - TURN * floor(off / TURN + 0.5);
         }
     }
     for (long row = 0; row < count; row++) {
         double *own = system + row * (n + 1);
         for (long i = 0; i < n; i++) {
-            const twist *c = &columns[i];
-            pack parts[6] = {c->v.x, c->v.y, c->v.z, c->w.x, c->w.y, c->w.z};
-            own[i] = signs[row] * lane_of(parts[used[row]], lane);
+            own[i] = signs[row] * lane_of(part_of(&columns[i], used[row]), lane);
         }
         own[n] = miss[row];
     }

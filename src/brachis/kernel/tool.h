@@ -5,6 +5,39 @@
 
 #include "chain.h"
 
+/* What is prescribed: the pose of the tool (`is_pose`), or `rows` of its position along the world's axes, and behind them,
+if `tool_axis` is not negative, yaw: the direction of this axis of the tool in the plane of the two rows. */
+typedef struct {
+    long is_pose;
+    long rows;
+    long axes[3];
+    long tool_axis;
+    double sign; /* of yaw about the world's third axis */
+} prescribed;
+
+/* Parts of the tool's motion that are prescribed, and their signs; returns how many they are. */
+static inline long rows_of(const prescribed *asked, long *used, double *signs)
+{
+    long count = asked->is_pose ? 6 : asked->rows;
+    for (long i = 0; i < count; i++) {
+        used[i] = asked->is_pose ? i : asked->axes[i];
+        signs[i] = 1.0;
+    }
+    if (!asked->is_pose && asked->tool_axis >= 0) {
+        used[count] = 6 - asked->axes[0] - asked->axes[1];
+        signs[count] = asked->sign;
+        count++;
+    }
+    return count;
+}
+
+/* A part of a motion: linear along three axes, then angular about them. */
+static inline pack part_of(const twist *a, long part)
+{
+    const pack parts[6] = {a->v.x, a->v.y, a->v.z, a->w.x, a->w.y, a->w.z};
+    return parts[part];
+}
+
 /* Placement: position, and columns of the rotation. */
 typedef struct {
     vec position;
@@ -76,6 +109,85 @@ static inline void logarithm(const double *R, double *vector)
     double factor = size > 1e-9 * real ? 2.0 * atan2(size, real) / size : 2.0 / real;
     for (int i = 0; i < 3; i++) {
         vector[i] = sign * factor * found[1 + i];
+    }
+}
+
+static inline twist read_twist(const double *table, long count, long n, long k, long i)
+{
+    pack parts[6];
+    for (int row = 0; row < 6; row++) {
+        parts[row] = gather(table + row * count * n, count, n, k, i);
+    }
+    return (twist){{parts[3], parts[4], parts[5]}, {parts[0], parts[1], parts[2]}};
+}
+
+static inline void write_twist(twist a, double *table, long count, long n, long k, long i)
+{
+    pack parts[6] = {a.v.x, a.v.y, a.v.z, a.w.x, a.w.y, a.w.z};
+    for (int row = 0; row < 6; row++) {
+        scatter(parts[row], table + row * count * n, count, n, k, i);
+    }
+}
+
+/* How a motion changes as its axes turn with w. */
+static inline twist turn_axes(vec w, twist a)
+{
+    return (twist){cross(w, a.w), cross(w, a.v)};
+}
+
+/* The tool's acceleration that rates alone make, from the columns of its Jacobian. */
+static inline twist bias_of(long n, const twist *columns, const pack *rates, int in_tool_axes)
+{
+    twist V = {0};
+    twist a = {0};
+    for (long i = 0; i < n; i++) {
+        a = add_twists(a, scale_twist(cross_twists(V, columns[i]), rates[i]));
+        V = add_twists(V, scale_twist(columns[i], rates[i]));
+    }
+    if (!in_tool_axes) {
+        a.v = add(a.v, cross(V.w, V.v));
+    }
+    return a;
+}
+
+/* Derivatives of the tool's velocity V and acceleration a, from the columns J_i of its Jacobian, rates and their own
+rates. Joints after joint i carry its axis relative to the tool: in the tool's axes dJ_i/dq_k = [J_i, J_k] for i < k,
+else 0 (Murray, Li, Sastry 1994, chapter 3). With S_k and s_k the parts of V and a that come from the joints before
+joint k,
+    dV/dq_k = [S_k, J_k],    da/dq_k = [s_k, J_k] + [[S_k, J_k], V - S_k],    da/dqdot_k = 2 [S_k, J_k] + [J_k, V]
+In the world's axes the tool's turn with each joint, and a point of it has the acceleration a_v + w x v. */
+static inline void differentiate_tool(
+    long n, const twist *columns, const pack *rates, const pack *more, int in_tool_axes, twist *velocity_q,
+    twist *acceleration_q, twist *acceleration_qdot
+)
+{
+    twist before[n], parts[n];
+    twist V = {0};
+    twist a = {0};
+    for (long i = 0; i < n; i++) {
+        before[i] = V;
+        parts[i] = a;
+        velocity_q[i] = cross_twists(V, columns[i]);
+        V = add_twists(V, scale_twist(columns[i], rates[i]));
+        a = add_twists(a, scale_twist(columns[i], more[i]));
+        a = add_twists(a, scale_twist(velocity_q[i], rates[i]));
+    }
+    twist classical = {a.w, add(a.v, cross(V.w, V.v))};
+    for (long i = 0; i < n; i++) {
+        twist after = add_twists(V, scale_twist(before[i], all(-1.0)));
+        twist slope = velocity_q[i];
+        twist by_q = add_twists(cross_twists(parts[i], columns[i]), cross_twists(slope, after));
+        twist by_qdot = add_twists(scale_twist(slope, all(2.0)), cross_twists(columns[i], V));
+        if (!in_tool_axes) {
+            vec w = columns[i].w;
+            by_qdot.v = add(by_qdot.v, add(cross(w, V.v), cross(V.w, columns[i].v)));
+            by_q.v = add(by_q.v, add(cross(slope.w, V.v), cross(V.w, slope.v)));
+            by_q = add_twists(by_q, turn_axes(w, classical));
+            slope = add_twists(slope, turn_axes(w, V));
+        }
+        velocity_q[i] = slope;
+        acceleration_q[i] = by_q;
+        acceleration_qdot[i] = by_qdot;
     }
 }
 

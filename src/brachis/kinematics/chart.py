@@ -21,8 +21,9 @@ import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton
+from brachis.kernel import Conditions
 from brachis.kinematics.joint_map import apply_each
-from brachis.kinematics.path_map import Bend, PathMap, PathState
+from brachis.kinematics.path_map import PathMap, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 
@@ -119,14 +120,16 @@ class ChartRows:
         rows, offset = self.at(s)
         return apply_each(rows, q) - offset
 
-    def bend(self, s: np.ndarray, q: np.ndarray) -> Bend | None:
-        """How rows change along the path, in postures (K, n) at path coordinates (K,); None where they do not."""
+    def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
+        """Return rows, and how they change along the path, in postures (K, n) at path coordinates (K,)."""
+        rows, _ = self.at(s)
         if self.knots is None:
-            return None
+            return Conditions(rows)
         spline = self._spline()
         values = np.array([spline(s, nu=order) for order in (1, 2, 3)])
-        rows = values[..., :-1]
-        return Bend(rows, np.einsum("okij,kj->oki", rows, q) - values[..., -1])
+        turning = values[..., :-1]
+        drift = np.einsum("okij,kj->oki", turning, q) - values[..., -1]
+        return Conditions(rows, turning[:2], drift)
 
 
 class ChartMap(PathMap):
@@ -225,21 +228,16 @@ class ChartMap(PathMap):
         guess = np.where(near_enough[:, None], reference + aside, reference)
         return self._newton.solve(targets, guess, rows, wanted)
 
-    def bend(self, s: np.ndarray, q: np.ndarray) -> Bend | None:
-        """Return how the rows change along the path."""
-        return self.rows.bend(s, q)
+    def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
+        """Return the rows, and how they change along the path."""
+        return self.rows.conditions(s, q)
 
-    def invert(self, s: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        """Invert J_aug."""
-        augmented = np.concatenate([jacobian, self.rows.at(s)[0]], axis=1)
-        if (np.sign(np.linalg.det(augmented)) != self._side).any():
+    def check(self, determinants: np.ndarray) -> None:
+        """Refuse J_aug where its determinant has another sign than along the reference."""
+        if (np.sign(determinants) != self._side).any():
             raise UnreachableError(
                 "the motion leaves the chart: det J_aug changes its sign"
             )
-        try:
-            return np.asarray(np.linalg.inv(augmented))
-        except np.linalg.LinAlgError as error:
-            raise UnreachableError("the chart is singular") from error
 
     def start_margins(self) -> np.ndarray:
         """Margin of the reference at its beginning."""
@@ -252,13 +250,14 @@ class ChartMap(PathMap):
     def margin_gradient(self, state: PathState) -> tuple[np.ndarray, np.ndarray]:
         """Differentiate by singular vectors u and v of the least singular value: it changes by u^T dJ_aug v."""
         least, v = state.least_singular
-        u = least[:, None] * np.einsum("kji,kj->ki", state.inverse, v)
+        u = least[:, None] * np.einsum("kji,kj->ki", state.motion.inverse, v)
         m = self.task_map.m
-        moved = self.task_map.velocity_slopes(state.twists, v)
+        moved = self.task_map.velocity_slopes(state.motion.twists, v)
         by_q = np.einsum("ki,kij->kj", u[:, :m], moved)
         by_s = np.zeros(len(v))
-        if state.bend:
-            by_s = np.einsum("ki,kij,kj->k", u[:, m:], state.bend.rows[0], v)
+        turning = state.conditions.turning
+        if turning is not None:
+            by_s = np.einsum("ki,kij,kj->k", u[:, m:], turning[0], v)
         return by_q[:, None] / self._typical, by_s[:, None] / self._typical
 
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
+from brachis.kernel import Conditions
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
@@ -66,6 +67,7 @@ class ClosedFormMap(PathMap):
         self.branch = branch
         self.branch_label = solver.branches[branch]
         self.start = start
+        self._rows = np.eye(robot.n)[self.redundant]
         self._turning = robot.revolute[self.nonredundant]
         self._turns = np.array(self.nonredundant)[self._turning]
         lower = robot.limits.position_lower
@@ -143,18 +145,9 @@ class ClosedFormMap(PathMap):
                 previous = joint_path[k]
         return joint_path
 
-    def invert(self, s: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        """Put J_aug^-1 together from J_nr^-1 and -J_nr^-1 J_r."""
-        m = self.task_map.m
-        try:
-            own = np.linalg.inv(jacobian[:, :, self.nonredundant])
-        except np.linalg.LinAlgError as error:
-            raise UnreachableError("J_nr is singular") from error
-        inverse = np.zeros((len(own), self.robot.n, self.robot.n))
-        inverse[:, self.redundant, range(m, m + self.r)] = 1.0
-        inverse[:, self.nonredundant, :m] = own
-        inverse[:, self.nonredundant, m:] = -own @ jacobian[:, :, self.redundant]
-        return inverse
+    def conditions(self, s: np.ndarray, _q: np.ndarray) -> Conditions:
+        """Return rows that each select a redundant joint."""
+        return Conditions(np.broadcast_to(self._rows, (len(s), *self._rows.shape)))
 
     def choose_turns(
         self,

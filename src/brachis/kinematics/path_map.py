@@ -34,30 +34,10 @@ from functools import cached_property
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.kinematics.joint_map import (
-    JointDerivatives,
-    JointMap,
-    JointState,
-    apply_each,
-)
+from brachis.kernel import Conditions, PathMotion
+from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
-
-
-@dataclass(frozen=True)
-class Bend:
-    """How the linear functions of the joints change along the path.
-
-    Attributes
-    ----------
-    rows : (3, K, r, n) ndarray
-        C', C'' and C'''.
-    drift : (3, K, r) ndarray
-        e, e' and e''.
-    """
-
-    rows: np.ndarray
-    drift: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -67,23 +47,19 @@ class PathState(JointState):
     Attributes
     ----------
     path : PathSample
-    twists : (6, K, n) ndarray
-        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
-    inverse : (K, n, n) ndarray
-        J_aug^-1.
-    bend : Bend or None
-        None where C is constant and p = 0.
+    conditions : Conditions
+    motion : PathMotion
     """
 
     path: PathSample
-    twists: np.ndarray
-    inverse: np.ndarray
-    bend: Bend | None
+    conditions: Conditions
+    motion: PathMotion
 
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
         """Least singular values (K,) of J_aug, and their right singular vectors (K, n)."""
-        values, vectors = np.linalg.eigh(self.inverse @ np.swapaxes(self.inverse, 1, 2))
+        inverse = self.motion.inverse
+        values, vectors = np.linalg.eigh(inverse @ np.swapaxes(inverse, 1, 2))
         return 1.0 / np.sqrt(values[:, -1]), vectors[:, :, -1]
 
 
@@ -127,12 +103,13 @@ class PathMap(JointMap):
         """
 
     @abstractmethod
-    def invert(self, s: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        """Return J_aug^-1, (K, n, n); raises UnreachableError where it is singular, or changes its sign."""
+    def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
+        """Return C, and how it changes along the path, in postures (K, n) at path coordinates (K,)."""
 
-    def bend(self, _s: np.ndarray, _q: np.ndarray) -> Bend | None:
-        """Return how C changes along the path; None where it does not."""
-        return None
+    def check(self, determinants: np.ndarray) -> None:
+        """Raise UnreachableError where J_aug is singular, by its determinants, (K,)."""
+        if not determinants.all():
+            raise UnreachableError("the joints that are not redundant are singular")
 
     def choose_turns(
         self,
@@ -164,61 +141,21 @@ class PathMap(JointMap):
         q = self.postures(y, sample, near=near)
         if not np.isfinite(q).all():
             raise UnreachableError(self.no_posture)
-        twists = self.task_map.twists(q)
-        inverse = self.invert(s, self.task_map.jacobian(twists))
-        m = self.task_map.m
-        sdot = ydot[:, :1]
-        bend = self.bend(s, q)
-        gradient = np.empty((len(q), self.robot.n, 1 + self.r))
-        gradient[:, :, 0] = apply_each(inverse[:, :, :m], sample.xi)
-        gradient[:, :, 1:] = inverse[:, :, m:]
-        if bend:
-            gradient[:, :, 0] -= apply_each(inverse[:, :, m:], bend.drift[0])
-        qdot = apply_each(gradient, ydot)
-        wanted = sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot)
-        qddot = apply_each(gradient, yddot) + apply_each(inverse[:, :, :m], wanted)
-        if bend:
-            turned = 2.0 * sdot * apply_each(bend.rows[0], qdot)
-            turned += bend.drift[1] * sdot**2
-            qddot -= apply_each(inverse[:, :, m:], turned)
-        q = self.choose_turns(q, qdot, qddot, t, near)
-        motion = (y, ydot, yddot, ydddot, q, qdot, qddot, gradient)
-        return PathState(self, *motion, sample, twists, inverse, bend)
+        conditions = self.conditions(s, q)
+        motion = PathMotion.of(
+            self.robot.chain,
+            self.task_map.prescribed,
+            q,
+            (sample.xi, sample.xi_ds, sample.xi_dds),
+            conditions,
+            (ydot, yddot),
+        )
+        self.check(motion.determinants)
+        found = (motion.qdot, motion.qddot)
+        q = self.choose_turns(q, *found, t, near)
+        moved = (y, ydot, yddot, ydddot, q, *found, motion.gradient)
+        return PathState(self, *moved, sample, conditions, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""
-        task = self.task_map.derivatives(state.twists, state.qdot, state.qddot)
-        path = state.path
-        gradient = state.gradient
-        sdot = state.ydot[:, :1]
-        sddot = state.yddot[:, :1]
-        inverse = state.inverse[:, :, : self.task_map.m]
-        rows_inverse = state.inverse[:, :, self.task_map.m :]
-        bend = state.bend
-
-        right = -task.velocity_q @ gradient
-        right[:, :, 0] += path.xi_ds * sdot
-        qdot_y = inverse @ right
-        right = -task.acceleration_qdot @ gradient
-        right[:, :, 0] += 2.0 * path.xi_ds * sdot
-        qddot_ydot = inverse @ right
-        if bend:
-            first, second, _ = bend.rows
-            _, e_ds, e_dds = bend.drift
-            along = sdot[:, :, None]
-            rows = first @ gradient * along
-            rows[:, :, 0] += apply_each(first, state.qdot) + e_ds * sdot
-            lower = rows_inverse @ rows
-            qdot_y -= lower
-            qddot_ydot -= 2.0 * lower
-        right = -task.acceleration_q @ gradient - task.acceleration_qdot @ qdot_y
-        right[:, :, 0] += path.xi_dds * sdot**2 + path.xi_ds * sddot
-        qddot_y = inverse @ right
-        if bend:
-            rows = 2.0 * along * (first @ qdot_y)
-            rows += (second * along**2 + first * sddot[:, :, None]) @ gradient
-            rows[:, :, 0] += apply_each(first, state.qddot)
-            rows[:, :, 0] += 2.0 * sdot * apply_each(second, state.qdot)
-            rows[:, :, 0] += e_dds * sdot**2 + e_ds * sddot
-            qddot_y -= rows_inverse @ rows
-        return JointDerivatives(qdot_y, qddot_y, qddot_ydot)
+        return JointDerivatives(*state.motion.derivatives())

@@ -143,12 +143,17 @@ class _DerivativeLimit(JointLimit):
         return np.asarray(getattr(motion, self.derivative))
 
     def quantity_partials(self, motion: JointStates) -> Partials:
-        return Partials(**{self.derivative: self._identity(len(motion.q))})
-
-    def _identity(self, count: int) -> np.ndarray:
-        """Differentiate the quantity by itself, (K, n, n), at `count` moments."""
         n = self._robot.n
-        return np.broadcast_to(np.eye(n), (count, n, n))
+        by_itself = np.broadcast_to(np.eye(n), (len(motion.q), n, n))
+        return Partials(**{self.derivative: by_itself})
+
+    def partials(self, motion: JointStates) -> Partials:
+        return Partials(**{self.derivative: self._rows(len(motion.q))})
+
+    def _rows(self, count: int) -> np.ndarray:
+        """Differentiate the values by the quantity, (K, c, n), at `count` moments."""
+        rows = np.eye(self._robot.n)[self._joints] * self._scale[:, None]
+        return np.broadcast_to(rows, (count, *rows.shape))
 
 
 def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -194,7 +199,7 @@ class VelocityLimit(_DerivativeLimit, HasLatticeWeights):
     derivative = "qdot"
 
     def lattice_weights(self, q: np.ndarray) -> tuple[None, np.ndarray]:
-        return None, self._scale_rows(self._identity(len(q)))
+        return None, self._rows(len(q))
 
 
 class AccelerationLimit(_DerivativeLimit, HasLatticeWeights):
@@ -204,7 +209,7 @@ class AccelerationLimit(_DerivativeLimit, HasLatticeWeights):
     derivative = "qddot"
 
     def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
-        return self._scale_rows(self._identity(len(q))), None
+        return self._rows(len(q)), None
 
 
 class JerkLimit(_DerivativeLimit):

@@ -188,10 +188,21 @@ class Partials:
     qdddot: np.ndarray | None = None
     s: np.ndarray | None = None
 
+    @property
+    def by_joints(self) -> tuple[np.ndarray | None, ...]:
+        """Partials by q, qdot, qddot and qdddot."""
+        return self.q, self.qdot, self.qddot, self.qdddot
+
+    @property
+    def size(self) -> int:
+        """Number of values, c."""
+        parts = (*self.by_joints, self.s)
+        return next(part.shape[1] for part in parts if part is not None)
+
     def map(self, change: Callable[[np.ndarray], np.ndarray]) -> Partials:
         """Return the partials by q and its derivatives, changed."""
-        parts = (self.q, self.qdot, self.qddot, self.qdddot)
-        return Partials(*(None if part is None else change(part) for part in parts))
+        parts = (None if part is None else change(part) for part in self.by_joints)
+        return Partials(*parts)
 
 
 class HasLatticeWeights(ABC):

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from brachis.kernel import MotionSlopes, apply_chain_rule
 from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit, Partials
 
@@ -99,37 +100,23 @@ class Evaluation:
         return np.concatenate(self.by_limit, axis=1)
 
     @cached_property
-    def slopes(self) -> tuple[np.ndarray, ...]:
-        """Slopes of `values` by y, ydot, yddot and, where a limit asks for the jerk, ydddot, (K, c, 1 + r) each."""
-        parts = [self.chain(limit.partials(self.motion)) for limit in self.limits]
-        orders = max(len(part) for part in parts)
-        padded = [
-            (*part, *[np.zeros_like(part[0])] * (orders - len(part))) for part in parts
-        ]
-        return tuple(np.concatenate(own, axis=1) for own in zip(*padded, strict=True))
+    def slopes(self) -> np.ndarray:
+        """Slopes of `values` by y, ydot, yddot and, where a limit asks for the jerk, ydddot, (3 or 4, K, c, 1 + r)."""
+        return self.chain([limit.partials(self.motion) for limit in self.limits])
 
-    def chain(self, partials: Partials) -> tuple[np.ndarray, ...]:
-        """Differentiate functions with given partials by y, ydot, yddot and, if they ask for it, ydddot."""
+    def chain(self, partials: Sequence[Partials]) -> np.ndarray:
+        """Differentiate functions with given partials by y, ydot, yddot and, if one asks for it, ydddot."""
         motion = self.motion
         exact = motion.derivatives
-        gradient = motion.gradient
-        terms = [
-            (partials.q, (gradient,)),
-            (partials.qdot, (exact.qdot_y, gradient)),
-            (partials.qddot, (exact.qddot_y, exact.qddot_ydot, gradient)),
-        ]
-        if partials.qdddot is not None:
-            thrice = (3.0 * exact.qddot_y, 3.0 * exact.qdot_y)
-            terms.append((partials.qdddot, (motion.qdddot_y, *thrice, gradient)))
-        shape = next(part.shape[:2] for part, _ in terms if part is not None)
-        slopes = [np.zeros((*shape, motion.y.shape[1])) for _ in terms]
-        if partials.s is not None:
-            slopes[0][:, :, 0] = partials.s
-        for part, factors in terms:
-            if part is not None:
-                for i, factor in enumerate(factors):
-                    slopes[i] += part @ factor
-        return tuple(slopes)
+        jerk = None
+        if any(own.qdddot is not None for own in partials):
+            jerk = motion.qdddot_y
+        by_curves = (exact.qdot_y, exact.qddot_y, exact.qddot_ydot, jerk)
+        return apply_chain_rule(
+            [(own.by_joints, own.s) for own in partials],
+            [own.size for own in partials],
+            MotionSlopes(motion.gradient, *by_curves),
+        )
 
     def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
         """How far the limits that count are violated, (K, their c); negative inside."""

@@ -65,7 +65,7 @@ class EndTime:
         slopes = 2.0 * _CALM * _shares(phase)[:, None] * phase.state(x).yddot
         slopes[:, 0] = 0.0
         zero = np.zeros_like(slopes)[:, None]
-        gradient = phase.gradient_by_curves((zero, zero, slopes[:, None]), x)
+        gradient = phase.gradient_by_curves(np.stack([zero, zero, slopes[:, None]]), x)
         gradient[0] = 1.0  # the duration does not change
         return gradient
 

@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from brachis.kernel import find_entries
 from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit, Moments, Partials, Role
 from brachis.limits.safeguards import MARGIN, build_branch_margins
@@ -336,7 +337,7 @@ class Phase:
         at_end = np.concatenate(by_q) @ state.gradient[-1]
         by_y = np.zeros((len(self.t_norm), *at_end.shape))
         by_y[-1] = at_end
-        return self._sum_up(self._chain_rule((by_y,), x), np.ones(len(self.t_norm)))
+        return self._sum_up(self._chain_rule(by_y[None], x), np.ones(len(self.t_norm)))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
         """How far the limits are violated at every collocation point, (K, c); negative inside.
@@ -381,7 +382,7 @@ class Phase:
         evaluation = self.evaluate(x)
         is_mean = self.evaluator.is_mean
         slopes = self._chain_rule(evaluation.slopes, x)
-        of_limits = slopes[:, ~is_mean].ravel()
+        of_limits = (slopes[:, ~is_mean] if is_mean.any() else slopes).ravel()
         of_progress = self._layout.progress.jacobian(x)
         of_total = np.ones(len(self.grid.lower))
         return np.concatenate([of_limits, of_progress, of_total])
@@ -395,12 +396,10 @@ class Phase:
             Of its terms with respect to the joints, one term a point: (K, 1, n).
         x : (v,) ndarray
         """
-        return self.gradient_by_curves(self.evaluate(x).chain(partials), x)
+        return self.gradient_by_curves(self.evaluate(x).chain([partials]), x)
 
-    def gradient_by_curves(
-        self, slopes: Sequence[np.ndarray], x: np.ndarray
-    ) -> np.ndarray:
-        """Gradient, (v,), of a sum over the collocation points with slopes (K, 1, c) by y, ydot, ... at each."""
+    def gradient_by_curves(self, slopes: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Gradient, (v,), of a sum over the collocation points with slopes by y, ydot, ..., (orders, K, 1, c)."""
         entries = self._chain_rule(slopes, x)
         return self._sum_up(entries, np.ones(len(self.t_norm)))[0]
 
@@ -440,24 +439,23 @@ class Phase:
             [np.bincount(variable, term, self.variables) for term in terms.T]
         )
 
-    def _chain_rule(self, by: Sequence[np.ndarray], x: np.ndarray) -> np.ndarray:
-        """Turn slopes by y, ydot, ..., (K, c, 1 + r) each, into slopes by T, each curve's variables and h, (z, c)."""
+    def _chain_rule(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""
         orders = len(by)
         pairs = zip(by, self._by_duration(x), strict=False)
         of_time = sum(np.einsum("kcj,kj->kc", slope, own) for slope, own in pairs)
-        of_curves = []
         first = self.boundary.given
         bases = zip(self._layout.patterns, self._bases(x), strict=True)
-        for j, (pattern, basis) in enumerate(bases, first):
-            values = per_second(basis[:orders], x[0])
-            parts = (
-                slope[pattern.point, :, j] * own[:, None]
-                for slope, own in zip(by, values, strict=True)
+        of_curves = [
+            find_entries(
+                by, j, pattern.point, np.array(per_second(basis[:orders], x[0]))
             )
-            of_curves.append(sum(parts, start=np.zeros(())))
+            for j, (pattern, basis) in enumerate(bases, first)
+        ]
+        if not len(self.grid.point):
+            return np.concatenate([of_time, *of_curves])
         by_h = self.grid.slopes(self._h(x), self._control_points(x))[:orders]
-        together = np.concatenate([own[:, :, first:] for own in by], axis=2)
-        together = together[self.grid.point]
+        together = np.concatenate(by[..., first:], axis=2)[self.grid.point]
         of_lengths = together @ np.hstack(per_second(by_h, x[0]))[:, :, None]
         return np.concatenate([of_time, *of_curves, of_lengths[:, :, 0]])
 
