@@ -33,7 +33,7 @@ from brachis.problem.plausibility import (
     of_robot,
     of_task,
 )
-from brachis.problem.problem import Problem, decompositions_of
+from brachis.problem.problem import Decompositions, Problem, decompositions_of
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
@@ -44,6 +44,7 @@ from brachis.robots import is_robot, locate
 from brachis.search import Search, first_maps, try_remedies
 from brachis.search.given_motion import with_tolerances
 from brachis.search.processes import ignore, process_count, run_in_processes
+from brachis.search.schedule import has_charts
 from brachis.task import (
     Source,
     Task,
@@ -234,7 +235,9 @@ def _open_search(
     report: Listener,
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
-    decompositions = decompositions_of(problem, families)
+    decompositions = Decompositions(problem, families)
+    if not has_charts(problem, decompositions):
+        decompositions.find()  # what is wrong with them is said before the path is looked at
     check_within_reach(problem.task_map, problem.path)
     return Search(problem, decompositions, deadline, report)
 

@@ -111,7 +111,7 @@ class FormulaMargins(IKSolver):
         return self._formulas[key]
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """Evaluate the margins."""
+        """Evaluate the margins by their formula."""
         formula = self._formula("margins", Formula.of, self.margins, q.shape[1])
         return formula(q) * self.margin_signs(branch)
 

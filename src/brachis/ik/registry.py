@@ -23,7 +23,13 @@ from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar, prismatic
 from brachis.ik.point_recipes import positioning
-from brachis.ik.protocol import Family, IKSolver, NotApplicableError
+from brachis.ik.protocol import (
+    Family,
+    FormulaMargins,
+    FormulaSolver,
+    IKSolver,
+    NotApplicableError,
+)
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.snapping import TOLERANCE, PolishedSolver, SnappedChain, snap_axes
 from brachis.ik.spherical_wrist import spherical_wrist
@@ -282,6 +288,21 @@ class _Matcher:
             )
 
 
+def _margins_of(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
+    """Branch margins, (K, k); without a record of their formula, which would take longer than to compute them once."""
+    if isinstance(solver, FormulaMargins):
+        return solver.margins(q) * solver.margin_signs(branch)
+    return solver.branch_margins(q, branch)
+
+
+def _answers_of(solver: IKSolver, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+    """Answers of all branches, (K, B, A, m); likewise."""
+    if not isinstance(solver, FormulaSolver):
+        return solver.solve(targets, q_r)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return solver.answers(targets, q_r)
+
+
 def check_answers(
     robot: Robot,
     task_map: TaskMap,
@@ -312,7 +333,7 @@ def check_answers(
             f"two of its branches have the same label: {', '.join(solver.branches)}"
         )
     margins = [
-        solver.branch_margins(q, b).min(axis=1, initial=np.inf)
+        _margins_of(solver, q, b).min(axis=1, initial=np.inf)
         for b in range(len(solver.branches))
     ]
     q = q[np.max(margins, axis=0) > 1e-2]
@@ -322,7 +343,7 @@ def check_answers(
         )
     rest = complement(robot.n, redundant)
     targets = task_map.of_placements(*robot.tool_placements(q))
-    answers = solver.solve(targets, q[:, list(redundant)])
+    answers = _answers_of(solver, targets, q[:, list(redundant)])
     expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
     if answers.shape != expected:
         raise NotApplicableError(

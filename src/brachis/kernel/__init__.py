@@ -10,7 +10,7 @@ from brachis.kernel.formula import Formula
 from brachis.kernel.halving import halve_intervals
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
-from brachis.kernel.path_motion import Conditions, PathMotion
+from brachis.kernel.path_motion import Conditions, PathMotion, least_singular
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
 
@@ -29,6 +29,7 @@ __all__ = [
     "go_backwards",
     "go_forwards",
     "halve_intervals",
+    "least_singular",
     "rotation_derivatives",
     "rotation_vectors",
     "tool_derivatives",

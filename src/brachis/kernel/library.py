@@ -35,6 +35,7 @@ FUNCTIONS = {
     "brachis_halve": "l plddlpp",
     "brachis_path_motion": "- ppplppppppp",
     "brachis_path_derivatives": "- lpplpppppppp",
+    "brachis_least_singular": "- llppp",
     "brachis_chain_rule": "- llllppplllp",
     "brachis_entries": "- llllpllppp",
     "brachis_formula": "- llplplplppp",

@@ -284,3 +284,65 @@ void brachis_path_derivatives(
         write_block(third, qddot_y, count, n * c, k);
     }
 }
+
+/* M = A A^T, (n, n) */
+static void multiply_by_transpose(long n, const pack *A, pack *M)
+{
+    for (long i = 0; i < n; i++) {
+        for (long j = 0; j <= i; j++) {
+            M[i * n + j] = inner_product(A + i * n, A + j * n, n);
+            M[j * n + i] = M[i * n + j];
+        }
+    }
+}
+
+/* Least singular values, (K), of matrices with these inverses B, (K, n, n), and their right singular vectors v, (K, n). The
+power M^1024 of M = B B^T, by squaring, is all but v v^T. */
+void brachis_least_singular(long count, long n, const double *inverses, double *values, double *vectors)
+{
+    for (long k = 0; k < count; k += LANES) {
+        pack B[n * n], M[n * n], power[n * n], squared[n * n], v[n], image[n];
+        read_block(inverses, count, n * n, k, B);
+        multiply_by_transpose(n, B, M);
+        for (long i = 0; i < n * n; i++) {
+            power[i] = M[i];
+        }
+        for (int number = 0; number < 10; number++) {
+            pack trace = all(0.0);
+            for (long i = 0; i < n; i++) {
+                trace += power[i * (n + 1)];
+            }
+            for (long i = 0; i < n * n; i++) {
+                power[i] /= trace;
+            }
+            multiply_by_transpose(n, power, squared);
+            for (long i = 0; i < n * n; i++) {
+                power[i] = squared[i];
+            }
+        }
+        for (int lane = 0; lane < LANES; lane++) {
+            long largest = 0;
+            for (long i = 1; i < n; i++) {
+                largest = power[i * (n + 1)][lane] > power[largest * (n + 1)][lane] ? i : largest;
+            }
+            for (long i = 0; i < n; i++) {
+                v[i][lane] = power[i * n + largest][lane];
+            }
+        }
+        pack size = inner_product(v, v, n);
+        for (int lane = 0; lane < LANES; lane++) {
+            size[lane] = sqrt(size[lane]);
+        }
+        for (long i = 0; i < n; i++) {
+            v[i] /= size;
+        }
+        for (long i = 0; i < n; i++) {
+            image[i] = inner_product(M + i * n, v, n);
+        }
+        pack value = inner_product(v, image, n);
+        for (int lane = 0; lane < LANES && k + lane < count; lane++) {
+            values[k + lane] = 1.0 / sqrt(value[lane]);
+        }
+        write_block(v, vectors, count, n, k);
+    }
+}

@@ -135,5 +135,15 @@ class PathMotion:
         return qdot_y, qddot_y, qddot_ydot
 
 
+def least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""
+    count, n, _ = inverses.shape
+    values = np.empty(count)
+    vectors = np.empty((count, n))
+    kept = as_doubles(inverses, (count, n, n))
+    load().brachis_least_singular(count, n, *map(address, (kept, values, vectors)))
+    return values, vectors
+
+
 def _course(given: tuple[np.ndarray | None, ...]) -> _Course:
     return _Course(*(None if own is None else address(own) for own in given))

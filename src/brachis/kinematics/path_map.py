@@ -34,7 +34,7 @@ from functools import cached_property
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.kernel import Conditions, PathMotion
+from brachis.kernel import Conditions, PathMotion, least_singular
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -58,9 +58,7 @@ class PathState(JointState):
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
         """Least singular values (K,) of J_aug, and their right singular vectors (K, n)."""
-        inverse = self.motion.inverse
-        values, vectors = np.linalg.eigh(inverse @ np.swapaxes(inverse, 1, 2))
-        return 1.0 / np.sqrt(values[:, -1]), vectors[:, :, -1]
+        return least_singular(self.motion.inverse)
 
 
 class PathMap(JointMap):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -234,6 +235,38 @@ class Decomposition(Summary):
         return ClosedFormMap(
             given.task_map, given.path, solver, self.redundant, branch, start
         )
+
+
+class Decompositions(Sequence[Decomposition]):
+    """The choices that the task allows, which are found when they are first asked for; see `decompositions_of`.
+
+    Searches in charts that begin at a given posture never ask for them.
+
+    Parameters
+    ----------
+    problem : Problem
+    families : sequence of Family, optional
+    """
+
+    def __init__(self, problem: Problem, families: Sequence[ik.Family] = ()) -> None:
+        self._problem = problem
+        self._families = families
+
+    @cached_property
+    def _all(self) -> list[Decomposition]:
+        return decompositions_of(self._problem, self._families)
+
+    def find(self) -> list[Decomposition]:
+        """Return them all; raises as `decompositions_of` does."""
+        return self._all
+
+    def __len__(self) -> int:
+        """How many they are."""
+        return len(self.find())
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return one of them, or some."""
+        return self.find()[index]
 
 
 def decompositions_of(
