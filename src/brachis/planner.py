@@ -26,6 +26,7 @@ from brachis.optimise.layout import SHORTEST_TIME
 from brachis.optimise.least_motion import LeastMotion, find_least_motion
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import breaks_of, program_of
+from brachis.problem.feasibility import check_regular, lacks_a_direction
 from brachis.problem.plausibility import (
     check_within_reach,
     of_end_time,
@@ -236,9 +237,12 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
-    if not has_charts(problem, decompositions):
+    task_map = problem.task_map
+    if has_charts(problem, decompositions) and not lacks_a_direction(task_map):
+        check_regular(task_map, problem.start, problem.end)
+    else:
         decompositions.find()  # what is wrong with them is said before the path is looked at
-    check_within_reach(problem.task_map, problem.path)
+    check_within_reach(task_map, problem.path)
     return Search(problem, decompositions, deadline, report)
 
 

@@ -1,0 +1,84 @@
+"""Other ways to the fastest motion along two lines, in one run: ``python benchmarks/peers/run.py [--save]``.
+
+Each has its extra: ``pip install -e ".[peers]"`` brings all. One that is not installed is left out. All start from the
+joint path of the pseudo-inverse, or search for a better one; one checker looks at every answer at 5,001 times.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from threadpoolctl import threadpool_limits
+
+from committed import write
+from peers import by_brachis, by_casadi, by_drake, by_toppra
+from peers.lines import LINES, Answer, Line, check
+
+SOLVERS = {
+    "brachis": by_brachis.solve,
+    "CasADi and IPOPT": by_casadi.solve,
+    "Drake": by_drake.solve,
+    "toppra after pseudo-inverse": by_toppra.solve,
+}
+REPETITIONS = 3
+COLUMNS = (
+    "line",
+    "solver",
+    "set-up",
+    "solve",
+    "end time",
+    "limits used",
+    "off the line",
+)
+
+
+def row(line: Line, name: str) -> list[str]:
+    """Solve a line several times; the times are medians."""
+    try:
+        answers = [SOLVERS[name](line) for _ in range(REPETITIONS)]
+    except ImportError as missing:
+        return [line.name, name, f"{missing.name} is not installed", "", "", "", ""]
+    return [line.name, name, *cells(line, answers)]
+
+
+def cells(line: Line, answers: list[Answer]) -> list[str]:
+    """Say how long it took, and what the checker finds."""
+    first = answers[0]
+    times = [
+        float(np.median([getattr(own, part) for own in answers]))
+        for part in ("set_up", "solve")
+    ]
+    cells = [f"{part:.3f} s" for part in times]
+    if not np.isfinite(first.t_end):
+        return [*cells, "none", "", ""]
+    found = check(line, first)
+    return [
+        *cells,
+        f"{first.t_end:.4f} s",
+        f"{100 * found.worst:.1f} %",
+        f"{found.off_path:.3f} mm",
+    ]
+
+
+def main() -> None:
+    """Print the table; with ``--save`` also keep it."""
+    rows = []
+    with threadpool_limits(1):
+        for name in LINES:
+            line = Line.of(name)
+            by_brachis.solve(line)  # imports
+            for solver in SOLVERS:
+                rows.append(row(line, solver))
+                print(" | ".join(rows[-1]), flush=True)
+    if "--save" in sys.argv:
+        about = __doc__.split("\n\n", 1)[1].replace("\n", " ").strip()
+        command = "python benchmarks/peers/run.py --save"
+        write("peers", command, "Beside other solvers", COLUMNS, rows, about)
+
+
+if __name__ == "__main__":
+    main()
