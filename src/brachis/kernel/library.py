@@ -81,9 +81,12 @@ def _open(path: Path) -> ctypes.CDLL:
 
 
 def address(values: np.ndarray) -> int:
-    """Return where the numbers of a contiguous array of doubles begin."""
-    place, _ = values.__array_interface__["data"]
-    return int(place)
+    """Return where the numbers of a contiguous array begin."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(values))  # type: ignore[arg-type]
+    except (TypeError, ValueError):  # read-only, or empty
+        place, _ = values.__array_interface__["data"]
+        return int(place)
 
 
 def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:

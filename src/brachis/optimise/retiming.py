@@ -74,6 +74,16 @@ class PathEffort:
     options: SolverOptions
 
 
+COARSE = PathEffort(
+    intervals=(8,),
+    limit_places=28,
+    places=400,
+    margin=MARGINS[1],
+    options=SolverOptions(
+        tolerance=1e-3, max_iterations=25, time_limit=np.inf, progress=3e-3, patience=3
+    ),
+)
+"""To tell which of many joint paths are worth a rough search."""
 ROUGH = PathEffort(
     intervals=(16,),
     limit_places=56,

@@ -27,8 +27,8 @@ from brachis.optimise.program import Program
 from brachis.optimise.retiming import BetterPaths, PathEffort, improve_joint_paths
 from brachis.optimise.transcription import program_over
 
-_CHARTS = 4
-"""Charts in which a guess is improved, no more."""
+CHARTS = 4
+"""Charts in which a guess is improved, no more, unless stated."""
 _TRANSVERSAL = 0.5
 """Least transversality of rows along a motion, below which its chart is left for another."""
 
@@ -57,6 +57,7 @@ def improve_guess(
     program: Program,
     solve: SolverSession,
     effort: PathEffort,
+    charts: int = CHARTS,
 ) -> BetterGuess:
     """Find a better joint path next to that of a guess.
 
@@ -67,6 +68,8 @@ def improve_guess(
         Of its joint maps, over any knots; see `improve_joint_paths`.
     solve : SolverSession
     effort : PathEffort
+    charts : int, optional
+        In which it is looked for, no more.
 
     Returns
     -------
@@ -83,8 +86,8 @@ def improve_guess(
     better = BetterGuess(_along(start, found), program, found)
     # A chart around a motion that is given is kept.
     is_free = start.in_chart and start.durations is None
-    charts = _CHARTS if is_free and better.start.is_improved else 1
-    for _ in range(1, charts):
+    more = charts - 1 if is_free and better.start.is_improved else 0
+    for _ in range(more):
         moved = _lay_chart(better)
         if moved is None or solve.deadline.passed:
             break

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from contextlib import closing
+from functools import partial
 
 import numpy as np
 
@@ -19,9 +20,9 @@ from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverOptions, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.retiming import ROUGH
+from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
 from brachis.optimise.transcription import breaks_of, program_of
-from brachis.search.over_path import improve_guess
+from brachis.search.over_path import CHARTS, improve_guess
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.timed import solvers_of
 
@@ -53,10 +54,15 @@ def screen(
         With the better joint paths, and their least times as estimates; the fastest first.
     """
     jobs = process_count(starts[0].problem.task.search.jobs, deadline)
+    improve = partial(run_in_processes, _improve, jobs=jobs, listener=listener)
     listener(f"improving {len(starts)} joint paths")
+    if len(starts) > most:
+        # The half that looks worse after a coarse search is left out.
+        count = max(most, (len(starts) + 1) // 2)
+        coarse = [*improve(starts, deadline, COARSE, 1)]
+        starts = sorted(coarse, key=lambda start: start.estimate)[:count]
     solved: list[InitialGuess] = []
-    work = run_in_processes(_improve, starts, deadline, jobs=jobs, listener=listener)
-    with closing(work) as outcomes:
+    with closing(improve(starts, deadline, ROUGH, CHARTS)) as outcomes:
         for start in outcomes:
             solved.append(start)
             # If as many end at the least end time, others are unlikely to end below it.
@@ -78,7 +84,11 @@ def screen(
 
 
 def _improve(
-    start: InitialGuess, deadline: Deadline, _listener: Listener
+    start: InitialGuess,
+    deadline: Deadline,
+    effort: PathEffort,
+    charts: int,
+    _listener: Listener,
 ) -> InitialGuess:
     """Improve a guess over the path; one that cannot be gets an infinite estimate."""
     hopeless = dataclasses.replace(start, estimate=np.inf)
@@ -90,7 +100,7 @@ def _improve(
     try:
         maps = start.maps_by_leg()
         program = program_of(problem, maps, [breaks_of(problem)] * len(maps))
-        better = improve_guess(start, program, session, ROUGH)
+        better = improve_guess(start, program, session, effort, charts)
     except (ImportError, UnreachableError):  # the plan says which backend is missing
         return hopeless
     return better.start if better.start.is_improved else hopeless
