@@ -1,0 +1,73 @@
+"""Work for the kernel, whose instructions `test_instructions` counts: a chain of seven joints at 61 points."""
+
+import sys
+
+import numpy as np
+
+from brachis.kernel import (
+    Chain,
+    Conditions,
+    Formula,
+    MotionSlopes,
+    PathMotion,
+    Prescribed,
+    apply_chain_rule,
+    find_postures,
+    formula,
+    least_singular,
+    library,
+)
+
+POINTS, N = 61, 7
+
+
+def work() -> None:
+    """Call every function of the inner loops once."""
+    rng = np.random.default_rng(0)
+    axes = rng.normal(size=(N, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    chain = Chain(
+        revolute=np.arange(N) != 1,
+        axes=axes,
+        points=rng.normal(size=(N, 3)),
+        tool_position=rng.normal(size=3),
+        tool_rotation=np.eye(3),
+        masses=rng.uniform(1.0, 2.0, N),
+        centers=rng.normal(size=(N, 3)),
+        inertias=np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 1.0], (N, 1)),
+        gravity=np.array([0.0, 0.0, -9.81]),
+    )
+    q, qdot, qddot = rng.normal(size=(3, POINTS, N))
+    chain.torques(q, qdot, qddot)
+    partials = chain.torque_derivatives(q, qdot, qddot)
+    asked = Prescribed()
+    row = np.eye(N)[[0]]
+    rows = np.broadcast_to(row, (POINTS, 1, N))
+    path = tuple(rng.normal(size=(3, POINTS, 6)))
+    curves = tuple(rng.normal(size=(2, POINTS, 2)))
+    motion = PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
+    slopes = motion.derivatives()
+    least_singular(motion.inverse)
+    whole = MotionSlopes(motion.gradient, *slopes)
+    apply_chain_rule([((*partials, None), None)], [N], whole)
+    positions, rotations, _ = chain.tool(q, in_tool_axes=True)
+    targets = np.concatenate([positions, rotations.reshape(POINTS, 9)], axis=1)
+    find_postures(
+        chain,
+        asked,
+        targets,
+        q + 0.01,
+        (np.array(rows), q[:, :1]),
+        steps=20,
+        tolerance=1e-12,
+        largest_step=0.5,
+        beside=False,
+    )
+    Formula.of(lambda a: formula.sqrt(a * a + 1.0) / formula.cos(a), N)(q)
+
+
+if __name__ == "__main__":
+    baseline = library.library_path("baseline")
+    library.library_path = lambda _variant: baseline  # what all machines have
+    for _ in range(int(sys.argv[1])):
+        work()
