@@ -53,24 +53,14 @@ def screen(
     list of InitialGuess
         With the better joint paths, and their least times as estimates; the fastest first.
     """
-    jobs = process_count(starts[0].problem.task.search.jobs, deadline)
-    improve = partial(run_in_processes, _improve, jobs=jobs, listener=listener)
     listener(f"improving {len(starts)} joint paths")
+    improve = partial(_improve_most, most=most, deadline=deadline, listener=listener)
     if len(starts) > most:
         # The half that looks worse after a coarse search is left out.
-        count = max(most, (len(starts) + 1) // 2)
-        coarse = [*improve(starts, deadline, COARSE, 1)]
+        coarse = improve(starts, COARSE, 1)
+        count = max(most, (len(coarse) + 1) // 2)
         starts = sorted(coarse, key=lambda start: start.estimate)[:count]
-    solved: list[InitialGuess] = []
-    with closing(improve(starts, deadline, ROUGH, CHARTS)) as outcomes:
-        for start in outcomes:
-            solved.append(start)
-            # If as many end at the least end time, others are unlikely to end below it.
-            times = np.array([each.estimate for each in solved])
-            times = times[np.isfinite(times)]
-            is_least = times <= _SAME_LEAST * times.min(initial=np.inf)
-            if is_least.sum() >= max(4, most):
-                break
+    solved = improve(starts, ROUGH, CHARTS)
     kept: list[InitialGuess] = []
     for start in sorted(solved, key=lambda start: start.estimate):
         ratio = start.estimate / kept[0].estimate if kept else 1.0
@@ -81,6 +71,31 @@ def screen(
         if not (is_slow or is_one_too_many or is_known) and len(kept) < most:
             kept.append(start)
     return kept
+
+
+def _improve_most(
+    starts: Sequence[InitialGuess],
+    effort: PathEffort,
+    charts: int,
+    *,
+    most: int,
+    deadline: Deadline,
+    listener: Listener,
+) -> list[InitialGuess]:
+    """Improve guesses until as many as are wanted end at the least end time: others are unlikely to end below it."""
+    jobs = process_count(starts[0].problem.task.search.jobs, deadline)
+    given = (starts, deadline, effort, charts)
+    work = run_in_processes(_improve, *given, jobs=jobs, listener=listener)
+    solved: list[InitialGuess] = []
+    with closing(work) as outcomes:
+        for start in outcomes:
+            solved.append(start)
+            times = np.array([each.estimate for each in solved])
+            times = times[np.isfinite(times)]
+            is_least = times <= _SAME_LEAST * times.min(initial=np.inf)
+            if is_least.sum() >= max(4, most):
+                break
+    return solved
 
 
 def _improve(
