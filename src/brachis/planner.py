@@ -185,6 +185,10 @@ def plan(
             if best is None:
                 raise search.explain().error()
             searched = time.perf_counter()
+            known_after = searched - began
+            report(
+                f"{best.status}: t_E = {best.t_end:.4f} s, after {known_after:.2f} s"
+            )
 
             left = Deadline(0.0) if search.interrupted else deadline
             smoothed = _find_smoother(best, problem, left, report)

@@ -77,7 +77,7 @@ class PathEffort:
 COARSE = PathEffort(
     intervals=(8,),
     limit_places=28,
-    places=400,
+    places=200,
     margin=MARGINS[1],
     options=SolverOptions(
         tolerance=1e-3, max_iterations=25, time_limit=np.inf, progress=3e-3, patience=3

@@ -192,8 +192,9 @@ class Search:
             _solve_in_time,
             batch.starts,
             limit,
-            jobs=self._jobs,
+            jobs=self._problem.task.search.jobs,
             listener=self._listener,
+            deadline=self._deadline,
         )
         with closing(work) as outcomes:
             for number, candidate in enumerate(outcomes, first):
@@ -324,7 +325,9 @@ class Search:
 
     @property
     def _jobs(self) -> int:
-        return process_count(self._problem.task.search.jobs, self._deadline)
+        """How many candidates are finished at the same time: with ``auto`` one, for the next one may not be needed."""
+        jobs = self._problem.task.search.jobs
+        return 1 if jobs == "auto" else process_count(jobs, self._deadline)
 
     @property
     def _latest(self) -> Deadline:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import time
 import warnings
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import BrokenExecutor
@@ -21,6 +22,9 @@ _MAIN = "MainProcess"
 _START = 5.0
 """Seconds that processes may take to start: two on a free machine, more on a busy one."""
 
+_PAYS = 6.0
+"""Seconds of work for which other processes are started."""
+
 _Given = TypeVar("_Given")
 _Made = TypeVar("_Made")
 
@@ -29,8 +33,9 @@ def run_in_processes(
     function: Callable[..., _Made],
     given: Sequence[_Given],
     *others: object,
-    jobs: int,
+    jobs: int | str,
     listener: Listener,
+    deadline: Deadline = NEVER,
 ) -> Generator[_Made, None, None]:
     """Do a piece of work for every item, in up to `jobs` processes.
 
@@ -42,10 +47,13 @@ def run_in_processes(
         The items.
     *others : object
         The same for all items.
-    jobs : int
-        With 1, and within another program's workers, the work is done here, item by item as it is asked for.
+    jobs : int or "auto"
+        With 1, and within another program's workers, the work is done here, item by item as it is asked for. With
+        ``auto`` it is, until what is left takes longer than to start other processes.
     listener : callable
         Only heard of work that is done here.
+    deadline : Deadline, optional
+        By which processes have to have started.
 
     Yields
     ------
@@ -57,10 +65,20 @@ def run_in_processes(
     BrachisError
         The work cannot be sent to other processes, or a process ended before its work was done.
     """
-    if jobs == 1 or len(given) <= 1 or _within_a_worker():
-        for item in given:
-            interrupts.check()
-            yield function(item, *others, listener)
+    count = process_count(jobs, deadline)
+    is_alone = count == 1 or len(given) <= 1 or _within_a_worker()
+    began = time.perf_counter()
+    done = 0
+    for item in given:
+        taken = (time.perf_counter() - began) / max(done, 1)
+        pays = jobs != "auto" or taken * (len(given) - done) > _PAYS
+        if not is_alone and pays:
+            break
+        interrupts.check()
+        yield function(item, *others, listener)
+        done += 1
+    given = given[done:]
+    if not given:
         return
     interrupts.check()
     from joblib import Parallel, delayed
@@ -70,7 +88,7 @@ def run_in_processes(
         with (
             interrupts.block_in_children()
         ):  # joblib would lose a press, and its processes die of it
-            made = Parallel(n_jobs=jobs, backend="loky", return_as="generator")(
+            made = Parallel(n_jobs=count, backend="loky", return_as="generator")(
                 delayed(_apart)(function, item, *others) for item in given
             )
         for one in made:  # noqa: UP028  ("yield from" would close `made` before the lines below)
@@ -91,12 +109,14 @@ def run_in_processes(
                 made.close()
 
 
-def process_count(jobs: int, deadline: Deadline = NEVER) -> int:
-    """Return the number of processes that is used where a task asks for `jobs`.
+def process_count(jobs: int | str, deadline: Deadline = NEVER) -> int:
+    """Return the number of processes that is used where a task asks for `jobs`, a number or ``auto``.
 
     Never more than there are processors; only this one if the others would not have started by the deadline.
     """
-    return 1 if deadline.left < _START else min(jobs, os.cpu_count() or 1)
+    most = os.cpu_count() or 1
+    wanted = most if isinstance(jobs, str) else min(jobs, most)
+    return 1 if deadline.left < _START else wanted
 
 
 def _within_a_worker() -> bool:

@@ -21,7 +21,7 @@ from brachis.robot.task_map import JointSpace
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import DeadEnd
-from brachis.search.processes import process_count, run_in_processes
+from brachis.search.processes import run_in_processes
 from brachis.search.starts import (
     SEARCH_LEVELS,
     SearchLevel,
@@ -220,8 +220,9 @@ def _guess_on_some_branches(
         decompositions,
         level,
         deadline,
-        jobs=process_count(search.jobs, deadline),
+        jobs=search.jobs,
         listener=listener,
+        deadline=deadline,
     )
     ranked: list[tuple[int, InitialGuess]] = []
     lattices: Lattices = ()

@@ -23,7 +23,7 @@ from brachis.optimise.improve import SolverSession
 from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
 from brachis.optimise.transcription import breaks_of, program_of
 from brachis.search.over_path import CHARTS, improve_guess
-from brachis.search.processes import process_count, run_in_processes
+from brachis.search.processes import run_in_processes
 from brachis.search.timed import solvers_of
 
 _SAME_LEAST = 1.003
@@ -83,9 +83,16 @@ def _improve_most(
     listener: Listener,
 ) -> list[InitialGuess]:
     """Improve guesses until as many as are wanted end at the least end time: others are unlikely to end below it."""
-    jobs = process_count(starts[0].problem.task.search.jobs, deadline)
-    given = (starts, deadline, effort, charts)
-    work = run_in_processes(_improve, *given, jobs=jobs, listener=listener)
+    work = run_in_processes(
+        _improve,
+        starts,
+        deadline,
+        effort,
+        charts,
+        jobs=starts[0].problem.task.search.jobs,
+        listener=listener,
+        deadline=deadline,
+    )
     solved: list[InitialGuess] = []
     with closing(work) as outcomes:
         for start in outcomes:

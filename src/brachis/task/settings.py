@@ -244,6 +244,12 @@ class SplineSettings(Model):
         )
 
 
+Jobs = Annotated[
+    Literal["auto"] | Annotated[Count, Field(ge=1)],
+    ByForm("auto, or a whole number"),
+]
+
+
 class SearchSettings(Model):
     """The search over redundant joints, branches and initial guesses."""
 
@@ -253,8 +259,9 @@ class SearchSettings(Model):
     guesses: Literal["lattice", "numeric"] = "lattice"
     """Source of the initial guesses: lattice (a lattice of postures) or numeric (inverse kinematics from the start
     posture)."""
-    jobs: Count = Field(default=1, ge=1)
-    """Number of processes that plan at the same time, limited to the number of processors."""
+    jobs: Jobs = 1
+    """Number of processes that plan at the same time, limited to the number of processors. auto: all processors, where
+    what is left to do takes longer than to start processes. The answer is the same."""
     time_limit: Positive = Field(default=60.0, le=1e6)
     """Time limit of the whole plan, s. The best verified motion found by then is returned; if there is none, an
     unverified one, perhaps a second later."""
