@@ -43,8 +43,6 @@ _PLACES_AN_INTERVAL = 3.5
 """Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
-_ENOUGH = 5e-5
-"""Violation of them that is small enough."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -65,6 +63,8 @@ class PathEffort:
         Least branch margin.
     options : SolverOptions
         Of every solve. Limits may be exceeded by a little: the timing is computed anew.
+    posture_violation : float, optional
+        Violation of limits on postures that is small enough.
     """
 
     intervals: tuple[int, ...]
@@ -72,6 +72,7 @@ class PathEffort:
     places: int
     margin: float
     options: SolverOptions
+    posture_violation: float = 5e-5
 
 
 COARSE = PathEffort(
@@ -82,6 +83,7 @@ COARSE = PathEffort(
     options=SolverOptions(
         tolerance=1e-3, max_iterations=25, time_limit=np.inf, progress=3e-3, patience=3
     ),
+    posture_violation=5e-3,
 )
 """To tell which of many joint paths are worth a rough search."""
 ROUGH = PathEffort(
@@ -218,9 +220,9 @@ class BetterPaths:
         """Time of all phases, s; infinite where one has no timing."""
         return least_time(self.timings)
 
-    def is_better_than(self, other: BetterPaths) -> bool:
-        """Tell whether they exceed limits on postures less, or where both keep them, are faster."""
-        keeps_to = max(self.violation, _ENOUGH), max(other.violation, _ENOUGH)
+    def is_better_than(self, other: BetterPaths, slack: float) -> bool:
+        """Tell whether they exceed limits on postures less, or where both keep them within `slack`, are faster."""
+        keeps_to = max(self.violation, slack), max(other.violation, slack)
         if keeps_to[0] == keeps_to[1]:
             return self.t_end < other.t_end
         return keeps_to[0] < keeps_to[1]
@@ -306,7 +308,7 @@ def _better(
     try:
         violation = over_path.narrow(report.x)
         for _ in range(_NARROWED):
-            if violation < _ENOUGH or solve.deadline.passed:
+            if violation < effort.posture_violation or solve.deadline.passed:
                 break
             report = solve(over_path, report.x)
             reports = (*reports, report)
@@ -321,7 +323,8 @@ def _better(
     # The phase plane does not tell whether the limits allow a speed that is given.
     is_given = any(own.given is not None for own in timings)
     is_beyond = is_given and report.violation > _CREDIBLE
-    if is_beyond or not (found.is_better_than(best) or is_given):
+    is_better = found.is_better_than(best, effort.posture_violation)
+    if is_beyond or not (is_better or is_given):
         found = replace(best, reports=reports)
     return replace(
         found,
