@@ -10,6 +10,7 @@ from brachis.kernel import (
     Prescribed,
     apply_chain_rule,
     find_entries,
+    largest_parts,
     least_singular,
     tool_derivatives,
 )
@@ -197,3 +198,14 @@ def test_the_chain_rule(with_jerk):
     np.testing.assert_allclose(entries, known, atol=1e-12)
     with pytest.raises(ValueError, match="point"):
         find_entries(found, 1, points + 1, basis)
+
+
+def test_largest_parts_of_steps():
+    rng = np.random.default_rng(9)
+    rows = rng.normal(size=(6, 4, 5))
+    step = rng.normal(size=(POINTS, 5))
+    origin = rng.integers(0, 6, POINTS)
+    known = np.abs(np.einsum("eij,ej->ei", rows[origin], step)).max(axis=1)
+    np.testing.assert_allclose(largest_parts(rows, step, origin), known, atol=1e-14)
+    with pytest.raises(ValueError, match="nowhere"):
+        largest_parts(rows, step, origin + 6)

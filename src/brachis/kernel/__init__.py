@@ -8,6 +8,7 @@ from brachis.kernel.chain import Chain
 from brachis.kernel.chain_rule import MotionSlopes, apply_chain_rule, find_entries
 from brachis.kernel.formula import Formula
 from brachis.kernel.halving import halve_intervals
+from brachis.kernel.lattice import largest_parts
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Conditions, PathMotion, least_singular
@@ -29,6 +30,7 @@ __all__ = [
     "go_backwards",
     "go_forwards",
     "halve_intervals",
+    "largest_parts",
     "least_singular",
     "rotation_derivatives",
     "rotation_vectors",

@@ -38,6 +38,7 @@ FUNCTIONS = {
     "brachis_least_singular": "- llppp",
     "brachis_chain_rule": "- llllppplllp",
     "brachis_entries": "- llllpllppp",
+    "brachis_largest_parts": "- lllpppp",
     "brachis_formula": "- llplplplppp",
 }
 """What functions return and take: pointer, long, double, int, or nothing."""

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.common.arrays import Last
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton
 from brachis.kernel import Conditions
@@ -179,6 +180,9 @@ class ChartMap(PathMap):
         self._lines = make_interp_spline(
             s, np.concatenate([reference, sigma, self_motion], axis=1), k=1
         )
+        # Over the path all iterates have the same s.
+        self._rows_at = Last(rows.at)
+        self._reference_at = Last(self._between)
         even = np.linspace(0.0, 1.0, 33)
         augmented = self._augmented_at(even, self._between(even)[0])
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
@@ -217,11 +221,11 @@ class ChartMap(PathMap):
         """Joint positions, (K, n), at any times; without `near` the search begins at the reference."""
         s = y[:, 0]
         targets = (sample or self.path.sample(s)).target
-        rows, offset = self.rows.at(s)
+        rows, offset = self._rows_at(s)
         wanted = y[:, 1:] + offset
         if near is not None:
             return self._newton.solve(targets, near, rows, wanted)
-        reference, sigma, self_motion = self._between(s)
+        reference, sigma, self_motion = self._reference_at(s)
         aside = apply_each(self_motion, y[:, 1:] - sigma)
         # Within 0.8 rad or m the reference's own self-motion says where a posture is.
         near_enough = np.abs(aside).max(axis=1, initial=0.0) < 0.8

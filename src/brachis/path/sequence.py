@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import Last
 from brachis.errors import PathError
 from brachis.path.protocol import Array, Curve, Path, PathSample
 from brachis.robot import TaskMap, task_map_of
@@ -201,14 +202,26 @@ class SequencePath:
         s : array_like, shape (K,)
             Path coordinates.
         """
+        return self._last(np.atleast_1d(np.asarray(s, dtype=float)))
+
+    @cached_property
+    def _last(self) -> Last[PathSample]:
+        return Last(self._sample)
+
+    def _sample(self, s: Array) -> PathSample:
+        """Return the path at K values of s, (K,)."""
         return PathSample(*self.derivatives(s))
+
+    @cached_property
+    def _coordinates(self) -> int:
+        """How many there are."""
+        return int(self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2])
 
     def derivatives(self, s: Sequence[float] | Array, order: int = 3) -> Array:
         """Return the coordinates in the world and their derivatives by s, shape (order + 1, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
         which = np.searchsorted(self.breaks[1:-1], values, side="right")
-        rows = self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2]
-        result = np.empty((order + 1, values.size, rows))
+        result = np.empty((order + 1, values.size, self._coordinates))
         by_piece = np.argsort(which, kind="stable")
         used, starts = np.unique(which[by_piece], return_index=True)
         for i, here in zip(used, np.split(by_piece, starts[1:]), strict=True):

@@ -30,6 +30,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
+from brachis.kernel import largest_parts
 from brachis.limits import HasLatticeWeights, Moments
 from brachis.path import Path
 from brachis.problem.feasibility import in_figures
@@ -453,6 +454,5 @@ class Lattice(ABC):
                 continue
             for length, rows in zip(lengths, limit.lattice_weights(q), strict=True):
                 if rows is not None:
-                    parts = np.abs(np.einsum("eij,ej->ei", rows[origin], step))
-                    np.maximum(length, parts.max(axis=1), out=length)
+                    np.maximum(length, largest_parts(rows, step, origin), out=length)
         return np.asarray(lengths[0] + 0.5 * lengths[1])  # T = 0.5 s

@@ -192,8 +192,9 @@ class PostureLattice(Lattice):
 
     def _without_turns(self, q: np.ndarray) -> np.ndarray:
         """Postures, (K, n), with angles whose turns do not count in [0, 2 pi)."""
-        # Rounding may make a remainder a whole turn.
-        return np.where(self._modulo, np.remainder(q, TURN) % TURN, q)
+        angle = q - TURN * np.floor(q / TURN)
+        # Rounding may make it a whole turn.
+        return np.where(self._modulo, np.where(angle < TURN, angle, 0.0), q)
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
         """List edges to the postures at the cells around the nodes, along self-motion."""
