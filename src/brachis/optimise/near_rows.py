@@ -27,6 +27,8 @@ _AT_BOUND = 0.05
 """Distance from its bound up to which a row holds the motion, about."""
 _ROWS_A_VARIABLE = 2.0
 """Rows that hold the motion, for every variable, no fewer: from a slower motion the end time would collapse."""
+_LEAST_KEPT = 0.2
+"""Part of the rows, the nearest ones, that is kept whatever their distance: too few let the end time collapse."""
 _MOST_KEPT = 0.6
 """Part of the rows: if more are near, leaving out the others gains nothing."""
 _FIRST_VIOLATION = 0.15
@@ -99,7 +101,7 @@ def solve_near_rows(
     slack = _slack(program, x)
     holding = np.count_nonzero(slack < _AT_BOUND)
     is_fast = holding >= _ROWS_A_VARIABLE * len(x) and slack.min() >= -_FIRST_VIOLATION
-    kept = np.flatnonzero(slack < _NEAR)
+    kept = np.flatnonzero(slack < max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
     if not is_fast or len(kept) > _MOST_KEPT * len(slack):
         return solve(program, x)
     reports: list[SolverReport] = []

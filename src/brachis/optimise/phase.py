@@ -105,6 +105,7 @@ class Phase:
             time_law=self.time_law,
         )
         self._layout = layout
+        self._ends_by_duration = any(own.given[1:].any() for own in self.splines)
         self.slices = layout.slices
         self.degree = grid.degree
         self.knots = grid.knots
@@ -461,12 +462,13 @@ class Phase:
 
     def _by_duration(self, x: np.ndarray) -> list[np.ndarray]:
         """Slopes of the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
-        state = self.state(x)
+        slower = [-i / x[0] * part for i, part in enumerate(self.state(x).curves)]
+        if not self._ends_by_duration:
+            return slower
         given = [spline.given_points(x[0], slope=True) for spline in self.splines]
         rates = np.reshape(given, (len(self.splines), self.intervals + self.degree))
         moving = per_second(self._orders(x, rates, is_slope=True), x[0])
-        pairs = zip(moving, state.curves, strict=True)
-        return [rate - i / x[0] * part for i, (rate, part) in enumerate(pairs)]
+        return [rate + less for rate, less in zip(moving, slower, strict=True)]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
         """Basis functions of every curve's free variables, (4, z) each; computed anew where the grid's change."""
