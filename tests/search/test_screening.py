@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from brachis.common.deadline import NEVER, Deadline
+from brachis.optimise.retiming import COARSE, ROUGH
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import screening
@@ -83,7 +85,7 @@ def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatc
 
 
 def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeypatch):
-    solved = iter([True, *[False] * len(starts)])
+    solved = itertools.chain([True], itertools.cycle([False]))
     honest = screening.improve_guess
 
     def once(*arguments: object) -> object:
@@ -112,7 +114,9 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
 ):
     looked_at = []
 
-    def quickly(start, _deadline, _listener):
+    def quickly(start, _deadline, effort, _charts, _listener):
+        if effort is ROUGH:
+            return start
         looked_at.append(start)
         return dataclasses.replace(
             start, estimate=[1.5, 1.0, np.inf, 1.001, 1.002, 1.0][len(looked_at) - 1]
@@ -123,3 +127,18 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
     kept = screening.screen(starts, MOST, NEVER, quiet)
     assert len(looked_at) == 6
     assert [start.estimate for start in kept] == [1.0, 1.0]
+
+
+def test_the_better_half_of_a_coarse_search_is_searched_again(starts, monkeypatch):
+    searched = {COARSE: [], ROUGH: []}
+
+    def ranked(start, _deadline, effort, _charts, _listener):
+        searched[effort].append(start.origin)
+        number = [own.origin for own in starts].index(start.origin)
+        return dataclasses.replace(start, estimate=2.0 - 0.1 * number)
+
+    monkeypatch.setattr(screening, "_improve", ranked)
+    screening.screen(starts, MOST, NEVER, quiet)
+    origins = [start.origin for start in starts]
+    assert searched[COARSE] == origins
+    assert searched[ROUGH] == origins[::-1][: (len(starts) + 1) // 2]

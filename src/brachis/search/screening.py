@@ -112,10 +112,11 @@ def _improve(
     charts: int,
     _listener: Listener,
 ) -> InitialGuess:
-    """Improve a guess over the path; one that cannot be gets an infinite estimate."""
-    hopeless = dataclasses.replace(start, estimate=np.inf)
+    """Improve a guess over the path; one that cannot be, and was not before, gets an infinite estimate."""
+    if not start.is_improved:
+        start = dataclasses.replace(start, estimate=np.inf)
     if deadline.passed:
-        return hopeless
+        return start
     problem = start.problem
     (backend,) = solvers_for(solvers_of(problem)[0])
     session = SolverSession(backend, SolverOptions(time_limit=np.inf), deadline)
@@ -124,8 +125,8 @@ def _improve(
         program = program_of(problem, maps, [breaks_of(problem)] * len(maps))
         better = improve_guess(start, program, session, effort, charts)
     except (ImportError, UnreachableError):  # the plan says which backend is missing
-        return hopeless
-    return better.start if better.start.is_improved else hopeless
+        return start
+    return better.start
 
 
 def _is_same(first: InitialGuess, second: InitialGuess) -> bool:
