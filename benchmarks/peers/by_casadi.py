@@ -21,7 +21,7 @@ DEGREE = 3
 POINTS = 3
 """Collocation points an interval."""
 _LEAST = 0.05
-"""Part of the guessed duration that is the least one."""
+"""Least duration, as a fraction of the guessed one."""
 
 
 def solve(line: Line) -> Answer:
@@ -92,7 +92,7 @@ def solve(line: Line) -> Answer:
             "print_time": False,
             "ipopt.sb": "yes",
             "ipopt.max_iter": 500,
-            "ipopt.bound_relax_factor": 0.0,  # with it, and without, other iterations: fewer here
+            "ipopt.bound_relax_factor": 0.0,  # exact bounds; this also takes fewer iterations here
         },
     )
     ready = time.process_time()
@@ -184,11 +184,9 @@ def _torque(ca: Any, line: Line, q: Any, v: Any, a: Any) -> Any:
     """Joint torques by the recursive Newton-Euler algorithm, with friction."""
     chain = line.robot.chain
     steps = _steps(ca, line, q)
-    spin, turning, moving = (
-        ca.SX.zeros(3),
-        ca.SX.zeros(3),
-        ca.SX(-np.array(chain.gravity)),
-    )
+    spin = ca.SX.zeros(3)
+    turning = ca.SX.zeros(3)
+    moving = ca.SX(-np.array(chain.gravity))
     loads = []
     for i, (turn, shift) in enumerate(steps):
         axis = ca.DM(chain.axes[i])

@@ -10,10 +10,10 @@ import numpy as np
 from peers.lines import INTERVALS, Answer, Line
 
 PLACES = 61
-"""At which the tool is held on its path, and the effort within its limits."""
+"""Values of s at which the tool is held on its path and the torques within their limits."""
 _MOST_ITERATIONS = 20_000
 _SLACK = 1e-4
-"""Of the tool's position beside the line, m, and of its angle, rad."""
+"""Tolerance of the tool's position (m) and angle (rad)."""
 
 
 def solve(line: Line) -> Answer:

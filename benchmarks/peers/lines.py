@@ -15,7 +15,7 @@ from brachis.robot.from_task import robot_for
 
 ROOT = Path(__file__).parents[2]
 INTERVALS = 20
-"""Of cubic splines at full rest."""
+"""Knot intervals of the cubic splines, which start and end at full rest."""
 CHECKED = 5001
 """Times at which an answer is checked."""
 LINES = {
@@ -164,6 +164,3 @@ def check(line: Line, answer: Answer) -> Findings:
 
 def _axes(line: Line) -> list[int]:
     return list(line.problem.task_map.axes) or [0, 1, 2]
-
-
-Solver = Callable[[Line], Answer]

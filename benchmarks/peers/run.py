@@ -6,6 +6,7 @@ joint path of the pseudo-inverse, or search for a better one; one checker looks 
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from pathlib import Path
 
@@ -24,6 +25,12 @@ SOLVERS = {
     "Drake": by_drake.solve,
     "toppra after pseudo-inverse": by_toppra.solve,
 }
+NEEDS = {
+    "CasADi and IPOPT": "casadi",
+    "Drake": "pydrake",
+    "toppra after pseudo-inverse": "toppra",
+}
+"""Modules that have to be installed."""
 REPETITIONS = 3
 COLUMNS = (
     "line",
@@ -36,28 +43,28 @@ COLUMNS = (
 )
 
 
-def row(line: Line, name: str) -> list[str]:
+def measure(line: Line, name: str) -> list[str]:
     """Solve a line several times; the times are medians."""
-    try:
-        answers = [SOLVERS[name](line) for _ in range(REPETITIONS)]
-    except ImportError as missing:
-        return [line.name, name, f"{missing.name} is not installed", "", "", "", ""]
-    return [line.name, name, *cells(line, answers)]
+    module = NEEDS.get(name)
+    if module and importlib.util.find_spec(module) is None:
+        return [line.name, name, f"{module} is not installed", "", "", "", ""]
+    answers = [SOLVERS[name](line) for _ in range(REPETITIONS)]
+    return [line.name, name, *format_cells(line, answers)]
 
 
-def cells(line: Line, answers: list[Answer]) -> list[str]:
+def format_cells(line: Line, answers: list[Answer]) -> list[str]:
     """Say how long it took, and what the checker finds."""
     first = answers[0]
     times = [
         float(np.median([getattr(own, part) for own in answers]))
         for part in ("set_up", "solve")
     ]
-    cells = [f"{part:.3f} s" for part in times]
+    texts = [f"{part:.3f} s" for part in times]
     if not np.isfinite(first.t_end):
-        return [*cells, "none", "", ""]
+        return [*texts, "none", "", ""]
     found = check(line, first)
     return [
-        *cells,
+        *texts,
         f"{first.t_end:.4f} s",
         f"{100 * found.worst:.1f} %",
         f"{found.off_path:.3f} mm",
@@ -72,7 +79,7 @@ def main() -> None:
             line = Line.of(name)
             by_brachis.solve(line)  # imports
             for solver in SOLVERS:
-                rows.append(row(line, solver))
+                rows.append(measure(line, solver))
                 print(" | ".join(rows[-1]), flush=True)
     if "--save" in sys.argv:
         about = __doc__.split("\n\n", 1)[1].replace("\n", " ").strip()

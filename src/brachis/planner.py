@@ -245,7 +245,8 @@ def _open_search(
     if has_charts(problem, decompositions) and not lacks_a_direction(task_map):
         check_regular(task_map, problem.start, problem.end)
     else:
-        decompositions.find()  # what is wrong with them is said before the path is looked at
+        # Faulty decompositions are reported before the path is checked.
+        decompositions.find()
     check_within_reach(task_map, problem.path)
     return Search(problem, decompositions, deadline, report)
 

@@ -75,7 +75,7 @@ def test_what_has_no_value_is_not_finite():
 
 def test_points_of_another_size_are_refused(points):
     with pytest.raises(ValueError, match="needed"):
-        Formula.of(everything, 2, 1)(points[0], points[0])
+        Formula.of(everything, 2, 1)(*points[::-1])
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""How many instructions the kernel takes for `work.py`: counted by Valgrind, so that no busy machine changes it."""
+"""How many instructions `work.py` takes, with the interpreter's: counted by Valgrind."""
 
 import os
 import re

@@ -10,8 +10,8 @@ from brachis.kernel import (
     Prescribed,
     apply_chain_rule,
     find_entries,
+    find_least_singular,
     largest_parts,
-    least_singular,
     tool_derivatives,
 )
 from brachis.robot.chain import chain_of
@@ -135,7 +135,7 @@ def test_derivatives(case):
         np.testing.assert_allclose(found / scale, own / scale, atol=1e-11)
 
 
-def test_a_singular_matrix_has_no_determinant():
+def test_a_singular_matrix_has_determinant_zero():
     chain = chain_of(*random_model(3, 1))
     rows = np.zeros((1, 1, 3))
     ones = np.ones((1, 2))
@@ -150,9 +150,26 @@ def test_a_singular_matrix_has_no_determinant():
     assert motion.determinants[0] == 0.0
 
 
+def test_conditions_that_turn_need_their_drift():
+    chain = chain_of(*random_model(3, 1))
+    conditions = Conditions(np.zeros((1, 1, 3)), np.zeros((2, 1, 1, 3)))
+    ones = np.ones((1, 2))
+    rest = (Prescribed((0, 1)), np.zeros((1, 3)), (ones, ones, ones), conditions)
+    with pytest.raises(ValueError, match="needed"):
+        PathMotion.of(chain, *rest, (ones, ones))
+
+
+def test_close_least_singular_values():
+    """The value is right within 1e-5 of it, whatever mixture of both vectors is found."""
+    matrices = np.diag([1.0, 1.0005, 2.0, 3.0])[None]
+    values, _ = find_least_singular(np.linalg.inv(matrices))
+    assert values[0] * (1.0 + 1e-12) >= 1.0
+    assert values[0] < 1.0 + 1e-5
+
+
 def test_least_singular_values():
     matrices = np.random.default_rng(3).normal(size=(POINTS, 7, 7))
-    values, vectors = least_singular(np.linalg.inv(matrices))
+    values, vectors = find_least_singular(np.linalg.inv(matrices))
     _, known, right = np.linalg.svd(matrices)
     np.testing.assert_allclose(values, known[:, -1], rtol=1e-12)
     along = np.abs(np.sum(vectors * right[:, -1], axis=1))
@@ -198,6 +215,17 @@ def test_the_chain_rule(with_jerk):
     np.testing.assert_allclose(entries, known, atol=1e-12)
     with pytest.raises(ValueError, match="point"):
         find_entries(found, 1, points + 1, basis)
+    with pytest.raises(ValueError, match="curve"):
+        find_entries(found, width, points, basis)
+
+
+def test_partials_by_the_jerk_need_its_slopes():
+    parts = np.zeros((4, POINTS, 2, 3))
+    partials = np.zeros((POINTS, 1, 2))
+    with pytest.raises(ValueError, match="qdddot_y"):
+        apply_chain_rule(
+            [((None, None, None, partials), None)], [1], MotionSlopes(*parts)
+        )
 
 
 def test_largest_parts_of_steps():

@@ -12,9 +12,9 @@ from brachis.kernel import (
     PathMotion,
     Prescribed,
     apply_chain_rule,
+    find_least_singular,
     find_postures,
     formula,
-    least_singular,
     library,
 )
 
@@ -47,7 +47,7 @@ def work() -> None:
     curves = tuple(rng.normal(size=(2, POINTS, 2)))
     motion = PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
     slopes = motion.derivatives()
-    least_singular(motion.inverse)
+    find_least_singular(motion.inverse)
     whole = MotionSlopes(motion.gradient, *slopes)
     apply_chain_rule([((*partials, None), None)], [N], whole)
     positions, rotations, _ = chain.tool(q, in_tool_axes=True)

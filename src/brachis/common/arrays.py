@@ -10,8 +10,10 @@ import numpy as np
 _Found = TypeVar("_Found")
 
 
-class Last(Generic[_Found]):
-    """A function of an array, which answers at once where it is asked the same again.
+class LastCall(Generic[_Found]):
+    """A function of an array, (K,), that remembers its last result.
+
+    A second call with the same values returns it again; it is not to be written to.
 
     Parameters
     ----------
@@ -23,7 +25,7 @@ class Last(Generic[_Found]):
         self._known: tuple[bytes, _Found] | None = None
 
     def __call__(self, values: np.ndarray) -> _Found:
-        """Return what the function gives; it is not to be written to."""
+        """Return what the function gives."""
         key = values.tobytes()
         known = self._known
         if known is None or known[0] != key:

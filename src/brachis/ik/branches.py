@@ -26,7 +26,7 @@ from brachis.common import tolerances
 from brachis.ik.arm import Arm, RemainingJoints
 from brachis.ik.protocol import FormulaMargins, FormulaSolver, NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews, Poses, Screw
-from brachis.ik.vectors import where_positive, wrap
+from brachis.ik.vectors import nan_where_negative, wrap
 from brachis.robot.joints import complement
 
 SINGULAR = "J_nr is singular everywhere"
@@ -218,7 +218,7 @@ class FactoredSolver(FormulaSolver):
                 self._signs[slot].reshape(-1, *[1] * len(slots)), 0, slot
             )
             values = [
-                where_positive(level * self._factors[slot].value(held), value)
+                nan_where_negative(level * self._factors[slot].value(held), value)
                 for value in values
             ]
         ordered = values[::-1] if self._joints.mirrored else values

@@ -32,7 +32,7 @@ from brachis.ik.branches import DeterminantSolver
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import FormulaSolver, NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
-from brachis.ik.vectors import determinants, rotate, where_positive, wrap
+from brachis.ik.vectors import determinants, nan_where_negative, rotate, wrap
 from brachis.kernel import formula
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
@@ -185,7 +185,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             q[:, self._redundant] = q_r
             q[:, self._joints] = answers[0]
             levels = self._determinants(q) * np.array([[1.0], [-1.0]])
-            answers = where_positive(levels[:, :, None], answers)
+            answers = nan_where_negative(levels[:, :, None], answers)
         return np.swapaxes(answers, 0, 1)[:, :, None]
 
 
@@ -292,7 +292,7 @@ class PrismaticSolver(DeterminantSolver, FormulaSolver):
         if len(self.branches) == 1:
             return one
         levels = size[:, None] * np.array([1.0, -1.0])
-        return where_positive(levels[:, :, None, None], one)
+        return nan_where_negative(levels[:, :, None, None], one)
 
     def margins(self, q: np.ndarray) -> np.ndarray:
         """Return the determinant of D; no margin where D is constant."""

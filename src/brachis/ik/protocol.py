@@ -92,7 +92,7 @@ class FormulaMargins(IKSolver):
 
     @abstractmethod
     def margins(self, q: np.ndarray) -> np.ndarray:
-        """Branch margins, (K, k), but for their signs."""
+        """Branch margins, (K, k), before they are multiplied by `margin_signs`."""
 
     @abstractmethod
     def margin_signs(self, branch: int) -> np.ndarray:
@@ -130,21 +130,23 @@ class FormulaSolver(FormulaMargins):
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Evaluate the answers of all branches."""
-        return _without_parts(self._all(targets, q_r)(targets, q_r))
+        return _discard_incomplete(self._answers_formula(targets, q_r)(targets, q_r))
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
         """Evaluate the answers of one branch."""
-        formula = self._formula(branch, self._all(targets, q_r).part, branch)
-        return _without_parts(formula(targets, q_r))
+        formula = self._formula(
+            branch, self._answers_formula(targets, q_r).part, branch
+        )
+        return _discard_incomplete(formula(targets, q_r))
 
-    def _all(self, *at: np.ndarray) -> Formula:
+    def _answers_formula(self, *at: np.ndarray) -> Formula:
         counts = [own.shape[1] for own in at]
         return self._formula("answers", Formula.of, self.answers, *counts)
 
 
-def _without_parts(answers: np.ndarray) -> np.ndarray:
+def _discard_incomplete(answers: np.ndarray) -> np.ndarray:
     """Replace answers, (..., m), of which a part is missing by NaN."""
     answers[~np.isfinite(answers).all(axis=-1)] = np.nan
     return answers

@@ -288,15 +288,17 @@ class _Matcher:
             )
 
 
-def _margins_of(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
-    """Branch margins, (K, k); without a record of their formula, which would take longer than to compute them once."""
+def _compute_margins(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
+    """Branch margins, (K, k), without recording a formula: a single call is faster that way."""
     if isinstance(solver, FormulaMargins):
         return solver.margins(q) * solver.margin_signs(branch)
     return solver.branch_margins(q, branch)
 
 
-def _answers_of(solver: IKSolver, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-    """Answers of all branches, (K, B, A, m); likewise."""
+def _compute_answers(
+    solver: IKSolver, targets: np.ndarray, q_r: np.ndarray
+) -> np.ndarray:
+    """Answers of all branches, (K, B, A, m), without recording a formula."""
     if not isinstance(solver, FormulaSolver):
         return solver.solve(targets, q_r)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -333,7 +335,7 @@ def check_answers(
             f"two of its branches have the same label: {', '.join(solver.branches)}"
         )
     margins = [
-        _margins_of(solver, q, b).min(axis=1, initial=np.inf)
+        _compute_margins(solver, q, b).min(axis=1, initial=np.inf)
         for b in range(len(solver.branches))
     ]
     q = q[np.max(margins, axis=0) > 1e-2]
@@ -343,7 +345,7 @@ def check_answers(
         )
     rest = complement(robot.n, redundant)
     targets = task_map.of_placements(*robot.tool_placements(q))
-    answers = _answers_of(solver, targets, q[:, list(redundant)])
+    answers = _compute_answers(solver, targets, q[:, list(redundant)])
     expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
     if answers.shape != expected:
         raise NotApplicableError(

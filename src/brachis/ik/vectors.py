@@ -94,8 +94,8 @@ def sign(value: np.ndarray) -> np.ndarray:
     return value / formula.sqrt(value * value)
 
 
-def where_positive(level: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return values where levels are not negative, else NaN."""
+def nan_where_negative(level: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the values; NaN where the level is negative."""
     root = formula.sqrt(level)
     return values + (root - root)
 

@@ -11,7 +11,7 @@ from brachis.kernel.halving import halve_intervals
 from brachis.kernel.lattice import largest_parts
 from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
-from brachis.kernel.path_motion import Conditions, PathMotion, least_singular
+from brachis.kernel.path_motion import Conditions, PathMotion, find_least_singular
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
 
@@ -26,12 +26,12 @@ __all__ = [
     "body_twists",
     "bounds_of_pairs",
     "find_entries",
+    "find_least_singular",
     "find_postures",
     "go_backwards",
     "go_forwards",
     "halve_intervals",
     "largest_parts",
-    "least_singular",
     "rotation_derivatives",
     "rotation_vectors",
     "tool_derivatives",

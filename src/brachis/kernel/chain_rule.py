@@ -69,6 +69,9 @@ def apply_chain_rule(
     """
     shape = motion.gradient.shape
     count, n, width = shape
+    asks_for_jerk = any(by_joints[3] is not None for by_joints, _ in partials)
+    if asks_for_jerk and motion.qdddot_y is None:
+        raise ValueError("partials by qdddot need qdddot_y")
     parts = vars(motion).values()
     kept = [None if own is None else as_doubles(own, shape) for own in parts]
     slopes = _MotionSlopes(*map(_address, kept))
@@ -78,12 +81,13 @@ def apply_chain_rule(
     for (by_joints, by_s), size in zip(partials, sizes, strict=True):
         given = [_prepare(own, (count, size, n)) for own in by_joints]
         along = None if by_s is None else as_doubles(by_s, (count, size))
+        structures = (_Partial * 4)(*(_Partial(*own[:2]) for own in given))
         load().brachis_chain_rule(
             count,
             size,
             n,
             width,
-            ctypes.byref((_Partial * 4)(*(_Partial(*own[:2]) for own in given))),
+            ctypes.byref(structures),
             _address(along),
             ctypes.byref(slopes),
             orders,
@@ -130,6 +134,9 @@ def find_entries(
     orders, count, columns, width = slopes.shape
     if len(points) and not 0 <= points.min() <= points.max() < count:
         raise ValueError("a point does not exist")
+    if not 0 <= curve < width:
+        raise ValueError(f"curve {curve} does not exist; there are {width}")
+    table = as_doubles(slopes, slopes.shape)
     kept = np.ascontiguousarray(points, dtype=np.int_)
     factors = as_doubles(basis, (orders, len(points)))
     found = np.empty((len(points), columns))
@@ -138,7 +145,7 @@ def find_entries(
         count,
         columns,
         width,
-        address(as_doubles(slopes, slopes.shape)),
+        address(table),
         curve,
         len(points),
         address(kept),

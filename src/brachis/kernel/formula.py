@@ -207,7 +207,7 @@ def _place(number: Number) -> int:
     return number.place
 
 
-def _recording(function: np.ufunc) -> Callable[..., Any]:
+def _make_recordable(function: np.ufunc) -> Callable[..., Any]:
     """Return a function of NumPy that takes arrays of numbers of a formula too, and plain ones among them."""
 
     def apply_to_one(*values: Any) -> Any:
@@ -224,12 +224,12 @@ def _recording(function: np.ufunc) -> Callable[..., Any]:
     return apply
 
 
-sqrt: Callable[..., Any] = _recording(np.sqrt)
-sin: Callable[..., Any] = _recording(np.sin)
-cos: Callable[..., Any] = _recording(np.cos)
-arccos: Callable[..., Any] = _recording(np.arccos)
-arctan2: Callable[..., Any] = _recording(np.arctan2)
-ceil: Callable[..., Any] = _recording(np.ceil)
+sqrt: Callable[..., Any] = _make_recordable(np.sqrt)
+sin: Callable[..., Any] = _make_recordable(np.sin)
+cos: Callable[..., Any] = _make_recordable(np.cos)
+arccos: Callable[..., Any] = _make_recordable(np.arccos)
+arctan2: Callable[..., Any] = _make_recordable(np.arctan2)
+ceil: Callable[..., Any] = _make_recordable(np.ceil)
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,7 +331,9 @@ class Formula:
     def __call__(self, *points: np.ndarray) -> np.ndarray:
         """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
         count = len(points[0])
-        inputs = as_doubles(np.concatenate(points, axis=1), (count, sum(self.counts)))
+        pairs = zip(points, self.counts, strict=True)
+        given = [as_doubles(own, (count, size)) for own, size in pairs]
+        inputs = np.concatenate(given, axis=1)
         found = np.empty((count, len(self.wanted)))
         numbers = np.empty(
             (inputs.shape[1] + len(self.constants) + len(self.steps), _SIDE_BY_SIDE)

@@ -11,6 +11,8 @@ def largest_parts(rows: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.
     """Find the largest size, (E,), of the parts A step of steps, (E, n), with rows A, (K, c, n), where each begins."""
     count, values, n = rows.shape
     steps = len(step)
+    if origin.shape != (steps,):
+        raise ValueError(f"origin has the shape {origin.shape}; needed: {(steps,)}")
     if steps and not 0 <= origin.min() <= origin.max() < count:
         raise ValueError("a step begins nowhere")
     given = (as_doubles(rows, rows.shape), np.ascontiguousarray(origin, dtype=np.int_))

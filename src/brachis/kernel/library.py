@@ -97,7 +97,11 @@ def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
     ------
     ValueError
         It has another shape: the library would read beyond its end.
+    TypeError
+        It is complex.
     """
+    if np.iscomplexobj(values):
+        raise TypeError("an array is complex; needed: real numbers")
     found = np.ascontiguousarray(values, dtype=np.float64)
     if found.shape != shape:
         raise ValueError(f"an array has the shape {found.shape}; needed: {shape}")

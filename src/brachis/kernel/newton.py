@@ -13,7 +13,7 @@ from brachis.kernel.library import address, as_doubles, load
 
 
 class _Prescribed(ctypes.Structure):
-    """`prescribed` of newton.c."""
+    """`prescribed` of tool.h."""
 
     _fields_ = [
         ("is_pose", ctypes.c_long),

@@ -8,9 +8,9 @@ and J_aug has the m rows of the task Jacobian, then those of the conditions. */
 typedef struct {
     const double *xi, *xi_ds, *xi_dds; /* (K, m): motion of the tool per unit of the path coordinate s */
     const double *rows;                /* (K, r, n): of the conditions */
-    const double *turning;             /* (2, K, r, n): first and second derivative of these by s; null where none */
-    const double *drift;               /* (3, K, r): e, e' and e''; null likewise */
     const double *ydot, *yddot;        /* (K, 1 + r) */
+    const double *turning;             /* (2, K, r, n): first and second derivative of the rows by s; null where none */
+    const double *drift;               /* (3, K, r): e, e' and e''; null likewise */
 } course;
 
 /* Invert a matrix, (n, n), in place by elimination with pivots (Gauss, Jordan); returns its determinant, and infinite
@@ -296,8 +296,9 @@ static void multiply_by_transpose(long n, const pack *A, pack *M)
     }
 }
 
-/* Least singular values, (K), of matrices with these inverses B, (K, n, n), and their right singular vectors v, (K, n). The
-power M^1024 of M = B B^T, by squaring, is all but v v^T. */
+/* Least singular values, (K), of matrices with these inverses B, (K, n, n), and their right singular vectors v, (K, n): v is
+the eigenvector of M = B B^T with the largest eigenvalue, 1 / value^2. Ten squarings give M^1024, which is v v^T up to a factor.
+Where the two least values differ by less than 1 %, v is a mixture of both, and the value too large by less than 1e-5 of it. */
 void brachis_least_singular(long count, long n, const double *inverses, double *values, double *vectors)
 {
     for (long k = 0; k < count; k += LANES) {

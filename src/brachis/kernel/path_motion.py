@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from brachis.kernel.newton import Prescribed
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Linear conditions on the joints at K points of a path: C(s) q - p(s).
+    """Linear functions C(s) q - p(s) of the joints at K points of a path.
 
     Attributes
     ----------
@@ -31,22 +31,30 @@ class Conditions:
     drift: np.ndarray | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What the library reads, contiguous; see `course` of path_motion.c."""
+
+    xi: np.ndarray
+    xi_ds: np.ndarray
+    xi_dds: np.ndarray
+    rows: np.ndarray
+    ydot: np.ndarray
+    yddot: np.ndarray
+    turning: np.ndarray | None = None
+    drift: np.ndarray | None = None
+
+    def structure(self) -> _Course:
+        """Return the addresses; they hold as long as this object lives."""
+        parts = vars(self).items()
+        known = {name: address(own) for name, own in parts if own is not None}
+        return _Course(**known)
+
+
 class _Course(ctypes.Structure):
     """`course` of path_motion.c."""
 
-    _fields_ = [
-        (name, ctypes.c_void_p)
-        for name in (
-            "xi",
-            "xi_ds",
-            "xi_dds",
-            "rows",
-            "turning",
-            "drift",
-            "ydot",
-            "yddot",
-        )
-    ]
+    _fields_ = [(own.name, ctypes.c_void_p) for own in fields(_Given)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +65,8 @@ class PathMotion:
     ----------
     chain : Chain
     prescribed : Prescribed
-    given : tuple of ndarray
-        xi, xi_ds and xi_dds, (K, m); the conditions; ydot and yddot, (K, 1 + r).
+    given : _Given
+        From which it was computed.
     twists : (6, K, n) ndarray
         Columns of the tool's Jacobian.
     inverse : (K, n, n) ndarray
@@ -72,7 +80,7 @@ class PathMotion:
 
     chain: Chain
     prescribed: Prescribed
-    given: tuple[np.ndarray | None, ...]
+    given: _Given
     twists: np.ndarray
     inverse: np.ndarray
     determinants: np.ndarray
@@ -94,15 +102,23 @@ class PathMotion:
         count, n = q.shape
         m = prescribed.count
         r = n - m
-        turning = conditions.turning
-        drift = conditions.drift
-        given = (
-            *(as_doubles(own, (count, m)) for own in path),
-            as_doubles(conditions.rows, (count, r, n)),
-            None if turning is None else as_doubles(turning, (2, count, r, n)),
-            None if drift is None else as_doubles(drift, (3, count, r)),
-            *(as_doubles(own, (count, 1 + r)) for own in curves),
+        postures = as_doubles(q, (count, chain.n))
+        xi, xi_ds, xi_dds = path
+        ydot, yddot = curves
+        given = _Given(
+            xi=as_doubles(xi, (count, m)),
+            xi_ds=as_doubles(xi_ds, (count, m)),
+            xi_dds=as_doubles(xi_dds, (count, m)),
+            rows=as_doubles(conditions.rows, (count, r, n)),
+            ydot=as_doubles(ydot, (count, 1 + r)),
+            yddot=as_doubles(yddot, (count, 1 + r)),
         )
+        if conditions.turning is not None or conditions.drift is not None:
+            given = replace(
+                given,
+                turning=as_doubles(conditions.turning, (2, count, r, n)),
+                drift=as_doubles(conditions.drift, (3, count, r)),
+            )
         found = (
             np.empty((6, count, n)),
             np.empty((count, n, n)),
@@ -114,9 +130,9 @@ class PathMotion:
         load().brachis_path_motion(
             chain.address,
             ctypes.addressof(prescribed.structure),
-            ctypes.byref(_course(given)),
+            ctypes.byref(given.structure()),
             count,
-            address(as_doubles(q, (count, chain.n))),
+            address(postures),
             *map(address, found),
         )
         return cls(chain, prescribed, given, *found)
@@ -128,14 +144,14 @@ class PathMotion:
         load().brachis_path_derivatives(
             self.chain.n,
             ctypes.addressof(self.prescribed.structure),
-            ctypes.byref(_course(self.given)),
+            ctypes.byref(self.given.structure()),
             len(self.qdot),
             *map(address, (*own, qdot_y, qddot_ydot, qddot_y)),
         )
         return qdot_y, qddot_y, qddot_ydot
 
 
-def least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""
     count, n, _ = inverses.shape
     values = np.empty(count)
@@ -143,7 +159,3 @@ def least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     kept = as_doubles(inverses, (count, n, n))
     load().brachis_least_singular(count, n, *map(address, (kept, values, vectors)))
     return values, vectors
-
-
-def _course(given: tuple[np.ndarray | None, ...]) -> _Course:
-    return _Course(*(None if own is None else address(own) for own in given))

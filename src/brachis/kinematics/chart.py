@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.common.arrays import Last
+from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton
 from brachis.kernel import Conditions
@@ -180,9 +180,9 @@ class ChartMap(PathMap):
         self._lines = make_interp_spline(
             s, np.concatenate([reference, sigma, self_motion], axis=1), k=1
         )
-        # Over the path all iterates have the same s.
-        self._rows_at = Last(rows.at)
-        self._reference_at = Last(self._between)
+        self.sample_at = LastCall(path.sample)
+        self._rows_at = LastCall(rows.at)
+        self._reference_at = LastCall(self._between)
         even = np.linspace(0.0, 1.0, 33)
         augmented = self._augmented_at(even, self._between(even)[0])
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
@@ -236,7 +236,7 @@ class ChartMap(PathMap):
         """Return the rows, and how they change along the path."""
         return self.rows.conditions(s, q)
 
-    def check(self, determinants: np.ndarray) -> None:
+    def check_regular(self, determinants: np.ndarray) -> None:
         """Refuse J_aug where its determinant has another sign than along the reference."""
         if (np.sign(determinants) != self._side).any():
             raise UnreachableError(

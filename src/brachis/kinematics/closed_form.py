@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
 from brachis.kernel import Conditions
@@ -59,6 +60,7 @@ class ClosedFormMap(PathMap):
         self.robot = robot
         self.task_map = task_map
         self.path = path
+        self.sample_at = LastCall(path.sample)
         self.solver = solver
         self.redundant = list(redundant)
         self.nonredundant = complement(robot.n, redundant)

@@ -30,11 +30,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
+from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
-from brachis.kernel import Conditions, PathMotion, least_singular
+from brachis.kernel import Conditions, PathMotion, find_least_singular
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -58,7 +60,7 @@ class PathState(JointState):
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:
         """Least singular values (K,) of J_aug, and their right singular vectors (K, n)."""
-        return least_singular(self.motion.inverse)
+        return find_least_singular(self.motion.inverse)
 
 
 class PathMap(JointMap):
@@ -70,11 +72,14 @@ class PathMap(JointMap):
         Of the robot.
     no_posture : str
         The message where a posture does not exist.
+    sample_at : LastCall
+        Samples the path; over the path all iterates have the same s.
     """
 
     path: Path
     task_map: TaskMap
     no_posture: str
+    sample_at: LastCall[PathSample]
 
     @abstractmethod
     def postures(
@@ -100,14 +105,22 @@ class PathMap(JointMap):
             NaN where the curves cannot be met.
         """
 
+    def along(self, path: Path, start: np.ndarray) -> Self:
+        """Return the same map for a part of its path that begins at, or near, a posture, (n,)."""
+        part = super().along(path, start)
+        part.sample_at = LastCall(path.sample)
+        return part
+
     @abstractmethod
     def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
         """Return C, and how it changes along the path, in postures (K, n) at path coordinates (K,)."""
 
-    def check(self, determinants: np.ndarray) -> None:
+    def check_regular(self, determinants: np.ndarray) -> None:
         """Raise UnreachableError where J_aug is singular, by its determinants, (K,)."""
         if not determinants.all():
-            raise UnreachableError("the joints that are not redundant are singular")
+            raise UnreachableError(
+                "the Jacobian of the non-redundant joints is singular"
+            )
 
     def choose_turns(
         self,
@@ -135,7 +148,7 @@ class PathMap(JointMap):
         Without `t` and `near`, successive times must be so close that no joint turns by pi in between.
         """
         s = y[:, 0]
-        sample = self.path.sample(s)
+        sample = self.sample_at(s)
         q = self.postures(y, sample, near=near)
         if not np.isfinite(q).all():
             raise UnreachableError(self.no_posture)
@@ -148,7 +161,7 @@ class PathMap(JointMap):
             conditions,
             (ydot, yddot),
         )
-        self.check(motion.determinants)
+        self.check_regular(motion.determinants)
         found = (motion.qdot, motion.qddot)
         q = self.choose_turns(q, *found, t, near)
         moved = (y, ydot, yddot, ydddot, q, *found, motion.gradient)

@@ -101,8 +101,10 @@ def solve_near_rows(
     slack = _slack(program, x)
     holding = np.count_nonzero(slack < _AT_BOUND)
     is_fast = holding >= _ROWS_A_VARIABLE * len(x) and slack.min() >= -_FIRST_VIOLATION
-    kept = np.flatnonzero(slack < max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
-    if not is_fast or len(kept) > _MOST_KEPT * len(slack):
+    if not is_fast:
+        return solve(program, x)
+    kept = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
+    if len(kept) > _MOST_KEPT * len(slack):
         return solve(program, x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):

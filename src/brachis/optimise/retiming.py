@@ -85,7 +85,7 @@ COARSE = PathEffort(
     ),
     posture_violation=5e-3,
 )
-"""To tell which of many joint paths are worth a rough search."""
+"""For choosing which joint paths get a rough search."""
 ROUGH = PathEffort(
     intervals=(16,),
     limit_places=56,
@@ -221,7 +221,7 @@ class BetterPaths:
         return least_time(self.timings)
 
     def is_better_than(self, other: BetterPaths, slack: float) -> bool:
-        """Tell whether they exceed limits on postures less, or where both keep them within `slack`, are faster."""
+        """Tell whether these violate limits on postures less; if both stay within `slack`, whether these are faster."""
         keeps_to = max(self.violation, slack), max(other.violation, slack)
         if keeps_to[0] == keeps_to[1]:
             return self.t_end < other.t_end

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -20,8 +20,14 @@ LEAST_QUALITY = 0.5
 class PosePath(SequencePath):
     """A path of poses, whose samples have the body twist; see `brachis.path.protocol.PathSample`."""
 
-    def _sample(self, s: Array) -> PathSample:
-        """Return poses and body twists at K values of s, (K,)."""
+    def sample(self, s: Sequence[float] | Array) -> PathSample:
+        """Return the path at K values of s; beyond its ends as the first or last piece continues.
+
+        Parameters
+        ----------
+        s : array_like, shape (K,)
+            Path coordinates.
+        """
         derivatives = self.derivatives(s)
         return PathSample(derivatives[0], *body_twists(derivatives))
 

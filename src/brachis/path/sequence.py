@@ -11,7 +11,6 @@ from typing import Self
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import Last
 from brachis.errors import PathError
 from brachis.path.protocol import Array, Curve, Path, PathSample
 from brachis.robot import TaskMap, task_map_of
@@ -202,14 +201,6 @@ class SequencePath:
         s : array_like, shape (K,)
             Path coordinates.
         """
-        return self._last(np.atleast_1d(np.asarray(s, dtype=float)))
-
-    @cached_property
-    def _last(self) -> Last[PathSample]:
-        return Last(self._sample)
-
-    def _sample(self, s: Array) -> PathSample:
-        """Return the path at K values of s, (K,)."""
         return PathSample(*self.derivatives(s))
 
     @cached_property

@@ -238,7 +238,7 @@ class Decomposition(Summary):
 
 
 class Decompositions(Sequence[Decomposition]):
-    """The choices that the task allows, which are found when they are first asked for; see `decompositions_of`.
+    """The decompositions that the task allows. They are computed when first used; see `decompositions_of`.
 
     Searches in charts that begin at a given posture never ask for them.
 

@@ -67,16 +67,19 @@ def run_in_processes(
     """
     count = process_count(jobs, deadline)
     is_alone = count == 1 or len(given) <= 1 or _within_a_worker()
-    began = time.perf_counter()
+    taken = 0.0
     done = 0
     for item in given:
-        taken = (time.perf_counter() - began) / max(done, 1)
-        pays = jobs != "auto" or taken * (len(given) - done) > _PAYS
+        left = taken / max(done, 1) * (len(given) - done)
+        pays = jobs != "auto" or (left > _PAYS and deadline.left >= _START)
         if not is_alone and pays:
             break
         interrupts.check()
-        yield function(item, *others, listener)
+        began = time.perf_counter()
+        made_here = function(item, *others, listener)
+        taken += time.perf_counter() - began
         done += 1
+        yield made_here
     given = given[done:]
     if not given:
         return

@@ -112,7 +112,7 @@ def _improve(
     charts: int,
     _listener: Listener,
 ) -> InitialGuess:
-    """Improve a guess over the path; one that cannot be, and was not before, gets an infinite estimate."""
+    """Improve a guess over the path. If that fails, its estimate stays; one never improved gets infinity."""
     if not start.is_improved:
         start = dataclasses.replace(start, estimate=np.inf)
     if deadline.passed:

@@ -35,7 +35,7 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
     name = kind.capitalize()
     shapes: list[Any] = [*models_in(model.model_fields[kind].annotation)]
     fields = {
-        key: describe_fields(part)[key]
+        key: describe_fields(part).get(key, "")
         for part in (*shapes, model)
         for key in part.model_fields
         if key != kind

@@ -120,7 +120,7 @@ class Model(BaseModel):
 
 
 def describe_fields(model: type) -> dict[str, str]:
-    """Return what is said of the fields of a model, or of a dataclass: by their types, or by the docstrings below."""
+    """Return the description of every field of a model or dataclass: from `Field`, else from the docstring below it."""
     found: dict[str, str] = {}
     for base in model.__mro__[::-1]:
         found |= _docstrings_in(base.__module__).get(base.__name__, {})
@@ -135,7 +135,11 @@ def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
     """Read the docstrings below the fields of the classes of one of our modules: by class, then by field."""
     if not module.startswith("brachis."):
         return {}
-    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    try:
+        source = inspect.getsource(sys.modules[module])
+    except OSError:  # installed without source
+        return {}
+    tree = ast.parse(source)
     classes = (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
     return {own.name: dict(_docstrings_of(own)) for own in classes}
 
