@@ -37,6 +37,14 @@ _STOPPED = {
 }
 
 
+_FAR = 0.5
+"""Violation of a limit beyond which a restoration is far from feasible motions, as a part of the limit."""
+_LOST_AFTER = 30
+"""Iterations of a restoration after which it is given up,"""
+_LOST = 0.8
+"""if more than this part of the violation is left."""
+
+
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
     _solve_first_problem()
@@ -57,6 +65,8 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     status = _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
     if stall.seen:
         status = SolveStatus.STALLED
+    elif stall.is_lost:
+        status = SolveStatus.INFEASIBLE
     elif ending == "USER_TERMINATION":
         status = SolveStatus.ITERATION_LIMIT
     message = f"{ending.lower()}, {found.lower()}"
@@ -113,13 +123,17 @@ class _Stall:
     Now and then the first steps wreck the Hessian approximation: steps then stay tiny for hundreds of iterations, far
     from stationarity. Or a subproblem fails, and Uno restores at a feasible point for ever, where its stationarity says
     nothing. A new approximation, scaled variables and a smaller trust region cure it.
+
+    Nothing cures a restoration that creeps far beyond a limit: there is no feasible motion near the start.
     """
 
     def __init__(self, monitor: SolveMonitor, units: np.ndarray) -> None:
         self._monitor = monitor
         self._units = units
         self._objectives: list[float] = []
+        self._restored: list[float] = []
         self.seen = False
+        self.is_lost = False
 
     def __call__(self, point: np.ndarray, *rest: Any) -> bool:
         *_, objective_multiplier, infeasibility, stationarity, _complementarity = rest
@@ -138,7 +152,11 @@ class _Stall:
         recent = self._objectives[-7:]
         creeps = len(recent) == 7 and max(recent) - min(recent) < 1e-3 * abs(objective)
         self.seen = creeps and infeasibility < 1e-3 and not is_near and not stop
-        return stop or self.seen
+        self._restored = [*self._restored, infeasibility] if restores else []
+        if len(self._restored) > _LOST_AFTER:
+            before = self._restored[-_LOST_AFTER]
+            self.is_lost = infeasibility > max(_FAR, _LOST * before)
+        return stop or self.seen or self.is_lost
 
 
 def _run(
