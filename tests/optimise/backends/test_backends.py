@@ -21,6 +21,7 @@ from brachis.optimise.backends import (
     SolveStatus,
     residual,
     solvers_for,
+    uno,
 )
 from brachis.optimise.backends.monitor import SolveMonitor
 from support.programs import bounded, corner, curved, disc, impossible
@@ -298,3 +299,18 @@ def test_an_answer_does_not_depend_on_what_the_process_solved_before():
         return done.stdout
 
     assert plan(others_first=True) == plan(others_first=False)
+
+
+@pytest.mark.parametrize(
+    ("left", "is_lost"), [(0.995, True), (0.9, False)], ids=["creeps", "gains"]
+)
+def test_a_restoration_that_creeps_far_beyond_a_limit_is_given_up(left, is_lost):
+    """Uno's callback: multiplier of the objective 0 in a restoration, violation, stationarity."""
+    problem = corner()
+    x = np.zeros(len(problem.x_lower))
+    stall = uno._Stall(SolveMonitor(problem, OPTIONS, None), np.ones(len(x)))
+    violations = 3.0 * left ** np.arange(40)
+    stops = [stall(x, 0.0, own, 1e3, 0.0) for own in violations]
+    assert stall.is_lost == is_lost
+    assert any(stops) == is_lost
+    assert not any(stops[:30])
