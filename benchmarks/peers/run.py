@@ -1,7 +1,9 @@
 """Other ways to the fastest motion along two lines, in one run: ``python benchmarks/peers/run.py [--save]``.
 
 Each has its extra: ``pip install -e ".[peers]"`` brings all. One that is not installed is left out. All start from the
-joint path of the pseudo-inverse, or search for a better one; one checker looks at every answer at 5,001 times.
+joint path of the pseudo-inverse, or search for a better one; one checker looks at every answer at 5,001 times. Limits
+hold everywhere in the answers of brachis, which are verified, at 61 places in those of CasADi and Drake, and at 401 in
+those of toppra. Drake's SNOPT ends without an answer on the second line, after 20,000 iterations of this formulation.
 """
 
 from __future__ import annotations

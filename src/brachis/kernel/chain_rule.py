@@ -137,7 +137,7 @@ def find_entries(
     if not 0 <= curve < width:
         raise ValueError(f"curve {curve} does not exist; there are {width}")
     table = as_doubles(slopes, slopes.shape)
-    kept = np.ascontiguousarray(points, dtype=np.int_)
+    kept = np.ascontiguousarray(points, dtype="l")
     factors = as_doubles(basis, (orders, len(points)))
     found = np.empty((len(points), columns))
     load().brachis_entries(

@@ -15,7 +15,7 @@ def largest_parts(rows: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.
         raise ValueError(f"origin has the shape {origin.shape}; needed: {(steps,)}")
     if steps and not 0 <= origin.min() <= origin.max() < count:
         raise ValueError("a step begins nowhere")
-    given = (as_doubles(rows, rows.shape), np.ascontiguousarray(origin, dtype=np.int_))
+    given = (as_doubles(rows, rows.shape), np.ascontiguousarray(origin, dtype="l"))
     own = as_doubles(step, (steps, n))
     found = np.empty(steps)
     load().brachis_largest_parts(steps, values, n, *map(address, (*given, own, found)))
