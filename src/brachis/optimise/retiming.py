@@ -76,8 +76,8 @@ class PathEffort:
 
 
 COARSE = PathEffort(
-    intervals=(8,),
-    limit_places=28,
+    intervals=(12,),
+    limit_places=42,
     places=200,
     margin=MARGINS[1],
     options=SolverOptions(
