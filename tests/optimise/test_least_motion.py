@@ -114,6 +114,16 @@ def test_bottlenecks_are_those_of_the_fastest_motion(result):
         assert other.derivative == pytest.approx(entry.derivative, rel=1e-6, abs=1e-9)
 
 
+def test_with_many_variables_only_a_slower_one_is_looked_for(monkeypatch):
+    monkeypatch.setattr(least_motion, "_MANY", 20)
+    kept = brachis.plan(scara()).least_motion
+    assert kept.reports == ()
+    assert "variables" in kept.status
+    slower = brachis.plan(scara(slower=0.05))
+    assert slower.least_motion.reduction > 0.2
+    assert slower.verified
+
+
 def test_it_can_be_switched_off():
     result = brachis.plan(scara(least_motion=False))
     assert result.least_motion is None
