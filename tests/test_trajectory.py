@@ -206,7 +206,7 @@ def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(
 def test_the_torque_that_holds_the_end_posture_is_the_static_one(trajectory):
     heavy = replace(trajectory, robot=Robot.from_urdf(SCARA, gravity=[0.0, -9.81, 0.0]))
     held = heavy.sample(0.3, last="hold")
-    lever = dynamics.rigid_torque(
+    lever = dynamics.torque(
         heavy.robot, held.q[-1:], np.zeros((1, 3)), np.zeros((1, 3))
     )[0]
     assert np.abs(lever).max() > 10.0

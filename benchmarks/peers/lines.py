@@ -144,7 +144,9 @@ def check(line: Line, answer: Answer) -> Findings:
             for state in zip(q, qdot, qddot, strict=True)
         ]
     )
-    torque += robot.friction.torque(qdot, qddot)
+    f = robot.friction
+    torque += f.armature * qddot + f.viscous * qdot
+    torque += f.coulomb * np.tanh(qdot / f.v_eps)
     worst = np.abs(torque / robot.limits.torque).max()
     if np.isfinite(robot.limits.velocity).all():
         worst = max(worst, np.abs(qdot / robot.limits.velocity).max())

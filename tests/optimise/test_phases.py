@@ -16,7 +16,7 @@ from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.path.time_law import TimeLaw
-from brachis.robot.dynamics import rigid_torque
+from brachis.robot import dynamics
 from support.jacobians import dense, differences, differences_of, told
 from support.phases import phase_of, reachable_points
 
@@ -223,7 +223,7 @@ def test_mean_over_phases_and_pause_is_the_integral():
         if phase.pause:
             still = np.zeros_like(state.q[-1:])
             robot = phase.joint_map.robot
-            load = rigid_torque(robot, state.q[-1:], still, still)[0]
+            load = dynamics.torque(robot, state.q[-1:], still, still)[0]
             sums = sums + PAUSE * (load / 70.0) ** 2
     np.testing.assert_allclose(
         program.mean_values(x), sums / program.end_time(x), rtol=1e-6

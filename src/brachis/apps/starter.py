@@ -22,8 +22,7 @@ from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, write_count
 from brachis.ik.registry import default_task_space
 from brachis.result import Result
-from brachis.robot import Robot, TaskMap, bind
-from brachis.robot.dynamics import rigid_torque
+from brachis.robot import Robot, TaskMap, bind, dynamics
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.task_map.protocol import AXES
@@ -115,7 +114,7 @@ def _quality(
         alone = np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1]
         quality = np.minimum(quality, alone)
     still = np.zeros_like(postures)
-    torque = rigid_torque(robot, postures, still, still)
+    torque = dynamics.torque(robot, postures, still, still)
     limits = robot.limits
     shares = np.maximum(torque / limits.torque_upper, torque / limits.torque_lower)
     quality[shares.max(axis=1) >= 0.7] = 0.0

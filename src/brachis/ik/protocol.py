@@ -130,7 +130,8 @@ class FormulaSolver(FormulaMargins):
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Evaluate the answers of all branches."""
-        return _discard_incomplete(self._answers_formula(targets, q_r)(targets, q_r))
+        formula = self._answers_formula(targets, q_r)
+        return formula(targets, q_r, is_whole=True)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
@@ -139,17 +140,11 @@ class FormulaSolver(FormulaMargins):
         formula = self._formula(
             branch, self._answers_formula(targets, q_r).part, branch
         )
-        return _discard_incomplete(formula(targets, q_r))
+        return formula(targets, q_r, is_whole=True)
 
     def _answers_formula(self, *at: np.ndarray) -> Formula:
         counts = [own.shape[1] for own in at]
         return self._formula("answers", Formula.of, self.answers, *counts)
-
-
-def _discard_incomplete(answers: np.ndarray) -> np.ndarray:
-    """Replace answers, (..., m), of which a part is missing by NaN."""
-    answers[~np.isfinite(answers).all(axis=-1)] = np.nan
-    return answers
 
 
 class NotApplicableError(Exception):

@@ -14,6 +14,7 @@ from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Conditions, PathMotion, find_least_singular
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
+from brachis.kernel.turns import count_turns, follow_turns
 
 __all__ = [
     "Chain",
@@ -25,9 +26,11 @@ __all__ = [
     "apply_chain_rule",
     "body_twists",
     "bounds_of_pairs",
+    "count_turns",
     "find_entries",
     "find_least_singular",
     "find_postures",
+    "follow_turns",
     "go_backwards",
     "go_forwards",
     "halve_intervals",

@@ -28,6 +28,7 @@ class _Chain(ctypes.Structure):
                 "centers",
                 "inertias",
                 "gravity",
+                "friction",
             )
         ),
     ]
@@ -56,6 +57,9 @@ class Chain:
         About the centers of mass, kg m^2: xx, xy, xz, yy, yz, zz.
     gravity : (3,) ndarray, optional
         m/s^2.
+    friction : (n, 4) ndarray, optional
+        Of each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; speed over which this one changes
+        sign, rad/s. Of a prismatic joint kg, N s/m, N, m/s.
     """
 
     revolute: np.ndarray
@@ -67,6 +71,7 @@ class Chain:
     centers: np.ndarray | None = None
     inertias: np.ndarray | None = None
     gravity: np.ndarray | None = None
+    friction: np.ndarray | None = None
 
     @property
     def n(self) -> int:
@@ -87,6 +92,7 @@ class Chain:
             _as_doubles_or_zero(self.centers, (n, 3)),
             _as_doubles_or_zero(self.inertias, (n, 6)),
             _as_doubles_or_zero(self.gravity, (3,)),
+            _as_doubles_or_zero(self.friction, (n, 4)),
         ]
 
     @cached_property
@@ -103,7 +109,7 @@ class Chain:
         return {name: value for name, value in vars(self).items() if name[0] != "_"}
 
     def torques(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
-        """Torques, (K, n), Nm or N, of the rigid bodies in K states, (K, n) each."""
+        """Torques, (K, n), Nm or N, of rigid bodies, rotors and friction in K states, (K, n) each."""
         found = np.empty((len(q), self.n))
         self._call("brachis_torques", (q, qdot, qddot), found)
         return found
@@ -118,7 +124,7 @@ class Chain:
         return by_q, by_qdot, by_qddot
 
     def mass_matrices(self, q: np.ndarray) -> np.ndarray:
-        """Mass matrices, (K, n, n), of K postures, (K, n)."""
+        """Mass matrices with rotors, (K, n, n), of K postures, (K, n)."""
         found = np.empty((len(q), self.n, self.n))
         self._call("brachis_mass_matrices", (q,), found)
         return found

@@ -12,7 +12,9 @@ the body before it, f, I and B force, inertia and Coriolis matrix of all bodies 
 
 About the world's origin B needs no 6 x 6 matrix. For one body of inertia J, momentum l and first moment h, which moves
 with (w, v), it is 2 B (a, b) = (E a, 2 a x l) with E a = tr(J) a x w + 2 w x (J a) + 2 h x (a x v): all else cancels by
-Jacobi's identity. E and l are summed over the bodies. */
+Jacobi's identity. E and l are summed over the bodies.
+
+Rotors and friction of each joint come on top: armature qddot + viscous qdot + coulomb tanh(qdot / speed). */
 
 #include "chain.h"
 
@@ -175,6 +177,20 @@ static inline void pass_joint(
     move_body(own, *v, *a);
 }
 
+/* Torque of joint i against rotor and friction, and its slope by the joint's velocity. */
+static inline pack resist(const chain *arm, long i, pack rate, pack acceleration, pack *slope)
+{
+    const double *own = arm->friction + 4 * i;
+    pack torque = own[0] * acceleration + own[1] * rate;
+    *slope = all(own[1]);
+    if (own[2] != 0.0) {
+        pack part = tanhs(rate / own[3]);
+        torque += own[2] * part;
+        *slope += own[2] / own[3] * (1.0 - part * part);
+    }
+    return torque;
+}
+
 /* Torques, (K, n), of K states, (K, n). */
 void brachis_torques(
     const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *torques
@@ -184,12 +200,15 @@ void brachis_torques(
     for (long k = 0; k < count; k += LANES) {
         twist axes[n];
         bodies moved[n];
+        pack resisted[n];
         displacement placed = at_zero();
         twist v = {0};
         twist a = gravity_upwards(arm);
         for (long i = 0; i < n; i++) {
             pack rate = gather(qdot, count, n, k, i);
             pack acceleration = gather(qddot, count, n, k, i);
+            pack slope;
+            resisted[i] = resist(arm, i, rate, acceleration, &slope);
             axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
             twist psi = cross_twists(v, axes[i]);
             pass_joint(arm, i, &placed, axes[i], psi, rate, acceleration, &v, &a, &moved[i]);
@@ -201,7 +220,7 @@ void brachis_torques(
                 torque = add(torque, moved[i].torque);
                 force = add(force, moved[i].force);
             }
-            scatter(pair(axes[i], torque, force), torques, count, n, k, i);
+            scatter(pair(axes[i], torque, force) + resisted[i], torques, count, n, k, i);
         }
     }
 }
@@ -217,12 +236,14 @@ void brachis_torque_derivatives(
     for (long k = 0; k < count; k += LANES) {
         twist axes[n], psi[n], phi[n];
         bodies moved[n];
+        pack slopes[n];
         displacement placed = at_zero();
         twist v = {0};
         twist a = gravity_upwards(arm);
         for (long i = 0; i < n; i++) {
             pack rate = gather(qdot, count, n, k, i);
             pack acceleration = gather(qddot, count, n, k, i);
+            resist(arm, i, rate, acceleration, &slopes[i]);
             axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
             psi[i] = cross_twists(v, axes[i]);
             phi[i] = add_twists(cross_twists(a, axes[i]), cross_twists(v, psi[i]));
@@ -247,6 +268,10 @@ void brachis_torque_derivatives(
                 pack q_part = pair(phi[j], turning, pushing) + dot(bent, psi[j].w);
                 pack rate_part = 2.0 * pair(psi[j], turning, pushing) + dot(bent, axes[j].w);
                 pack mass_part = pair(axes[j], turning, pushing);
+                if (j == i) {
+                    rate_part += slopes[i];
+                    mass_part += arm->friction[4 * i];
+                }
                 scatter(q_part, by_q, count, size, k, place);
                 scatter(rate_part, by_qdot, count, size, k, place);
                 scatter(mass_part, by_qddot, count, size, k, place);
@@ -270,7 +295,7 @@ void brachis_torque_derivatives(
     }
 }
 
-/* Mass matrices, (K, n, n), of K postures, (K, n). */
+/* Mass matrices with rotors, (K, n, n), of K postures, (K, n). */
 void brachis_mass_matrices(const chain *arm, long count, const double *q, double *matrices)
 {
     long n = arm->joints;
@@ -292,6 +317,7 @@ void brachis_mass_matrices(const chain *arm, long count, const double *q, double
             vec pushing = subtract(scale(S.v, own->mass), cross(own->moment, S.w));
             for (long j = 0; j <= i; j++) {
                 pack part = pair(axes[j], turning, pushing);
+                part += j == i ? arm->friction[4 * i] : 0.0;
                 scatter(part, matrices, count, n * n, k, i * n + j);
                 scatter(part, matrices, count, n * n, k, j * n + i);
             }

@@ -14,10 +14,12 @@ enum { ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2,
     break
 
 /* Evaluate at K points, (K, inputs). Numbers are the inputs, then the constants, then what each step gives; those that
-are wanted are found, (K, outputs). `numbers` has room for all of them. */
+are wanted are found, (K, outputs). `numbers` has room for all of them. Of `together` of them, one after the other, all
+are NaN if one is not finite; with 0 they stay. */
 void brachis_formula(
     long inputs, long constants, const double *constant, long steps, const step *step_of, long count,
-    const double *points, long outputs, const int *wanted, double (*numbers)[SIDE_BY_SIDE], double *found
+    const double *points, long outputs, const int *wanted, long together, double (*numbers)[SIDE_BY_SIDE],
+    double *found
 )
 {
     for (long i = 0; i < constants; i++) {
@@ -56,4 +58,19 @@ void brachis_formula(
             }
         }
     }
+    for (long i = 0; together && i < count * outputs; i += together) {
+        double sum = 0.0; /* of zeros, or NaN */
+        for (long j = i; j < i + together; j++) {
+            sum += 0.0 * found[j];
+        }
+        for (long j = i; j < i + together && sum != 0.0; j++) {
+            found[j] = NAN;
+        }
+    }
+}
+
+/* Points that are computed side by side. */
+long brachis_side_by_side(void)
+{
+    return SIDE_BY_SIDE;
 }

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,6 @@ from brachis.kernel.library import address, as_doubles, load
 _OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 ceil"
 _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
 """In the order of formula.c."""
-_SIDE_BY_SIDE = 16
-"""Points that the library computes side by side."""
-
 
 class Number:
     """A number of a formula: an input, a constant, or what an operation gives.
@@ -328,27 +326,44 @@ class Formula:
             self.counts, wanted.shape, constants, steps, place[wanted].ravel()
         )
 
-    def __call__(self, *points: np.ndarray) -> np.ndarray:
-        """Evaluate at K points, (K, count) for every argument; returns (K, ...)."""
+    def __call__(self, *points: np.ndarray, is_whole: bool = False) -> np.ndarray:
+        """Evaluate at K points, (K, count) for every argument; returns (K, ...).
+
+        With `is_whole` a row of the last axis is found as a whole: it is NaN where one of its numbers is not finite.
+        """
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
         given = [as_doubles(own, (count, size)) for own, size in pairs]
-        inputs = np.concatenate(given, axis=1)
-        found = np.empty((count, len(self.wanted)))
-        numbers = np.empty(
-            (inputs.shape[1] + len(self.constants) + len(self.steps), _SIDE_BY_SIDE)
-        )
+        inputs = given[0] if len(given) == 1 else np.concatenate(given, axis=1)
+        found = np.empty((count, *self.shape))
+        numbers = np.empty(self._room)
+        constants, steps, wanted = self._addresses
         load().brachis_formula(
             inputs.shape[1],
             len(self.constants),
-            address(self.constants),
+            constants,
             len(self.steps),
-            address(self.steps),
+            steps,
             count,
             address(inputs),
             len(self.wanted),
-            address(self.wanted),
+            wanted,
+            self.shape[-1] if is_whole else 0,
             address(numbers),
             address(found),
         )
-        return found.reshape(count, *self.shape)
+        return found
+
+    @cached_property
+    def _addresses(self) -> tuple[int, ...]:
+        return tuple(map(address, (self.constants, self.steps, self.wanted)))
+
+    @cached_property
+    def _room(self) -> int:
+        """Numbers of all inputs, constants and steps, as many as are computed side by side."""
+        numbers = sum(self.counts) + len(self.constants) + len(self.steps)
+        return numbers * int(load().brachis_side_by_side())
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave addresses behind."""
+        return {name: value for name, value in vars(self).items() if name[0] != "_"}

@@ -38,10 +38,14 @@ FUNCTIONS = {
     "brachis_least_singular": "- llppp",
     "brachis_chain_rule": "- llllppplllp",
     "brachis_entries": "- llllpllppp",
+    "brachis_follow_turns": "- llppp",
+    "brachis_count_turns": "i llppppppp",
     "brachis_largest_parts": "- lllpppp",
-    "brachis_formula": "- llplplplppp",
+    "brachis_formula": "- llplplplplpp",
+    "brachis_side_by_side": "l ",
 }
 """What functions return and take: pointer, long, double, int, or nothing."""
+_DOUBLE = np.dtype(np.float64)
 
 
 @cache
@@ -75,7 +79,7 @@ def _open(path: Path) -> ctypes.CDLL:
         )
     for name, kinds in FUNCTIONS.items():
         function = getattr(library, name)
-        returned, taken = kinds.split()
+        returned, _, taken = kinds.partition(" ")
         function.restype = _KINDS[returned]
         function.argtypes = [_KINDS[kind] for kind in taken]
     return library
@@ -100,7 +104,10 @@ def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
     TypeError
         It is complex.
     """
-    if np.iscomplexobj(values):
+    if type(values) is np.ndarray and values.dtype is _DOUBLE:
+        if values.shape == shape and values.flags.c_contiguous:
+            return values
+    elif np.iscomplexobj(values):
         raise TypeError("an array is complex; needed: real numbers")
     found = np.ascontiguousarray(values, dtype=np.float64)
     if found.shape != shape:

@@ -30,6 +30,11 @@ static inline pack cosines(pack a)
     return (pack){cos(a[0]), cos(a[1]), cos(a[2]), cos(a[3])};
 }
 
+static inline pack tanhs(pack a)
+{
+    return (pack){tanh(a[0]), tanh(a[1]), tanh(a[2]), tanh(a[3])};
+}
+
 static inline vec constant(const double *a)
 {
     return (vec){all(a[0]), all(a[1]), all(a[2])};

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -44,11 +45,15 @@ class _Given:
     turning: np.ndarray | None = None
     drift: np.ndarray | None = None
 
+    @cached_property
     def structure(self) -> _Course:
         """Return the addresses; they hold as long as this object lives."""
-        parts = vars(self).items()
-        known = {name: address(own) for name, own in parts if own is not None}
-        return _Course(**known)
+        parts = (getattr(self, own.name) for own in fields(self))
+        return _Course(*(None if own is None else address(own) for own in parts))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave addresses behind."""
+        return {own.name: getattr(self, own.name) for own in fields(self)}
 
 
 class _Course(ctypes.Structure):
@@ -130,7 +135,7 @@ class PathMotion:
         load().brachis_path_motion(
             chain.address,
             ctypes.addressof(prescribed.structure),
-            ctypes.byref(given.structure()),
+            ctypes.byref(given.structure),
             count,
             address(postures),
             *map(address, found),
@@ -144,7 +149,7 @@ class PathMotion:
         load().brachis_path_derivatives(
             self.chain.n,
             ctypes.addressof(self.prescribed.structure),
-            ctypes.byref(self.given.structure()),
+            ctypes.byref(self.given.structure),
             len(self.qdot),
             *map(address, (*own, qdot_y, qddot_ydot, qddot_y)),
         )

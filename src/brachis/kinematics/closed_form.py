@@ -20,12 +20,12 @@ import numpy as np
 from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
-from brachis.kernel import Conditions
+from brachis.kernel import Conditions, count_turns, follow_turns
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
-from brachis.robot.joints import TURN, complement, difference, in_turn_of
+from brachis.robot.joints import complement, difference, in_turn_of
 
 
 class ClosedFormMap(PathMap):
@@ -71,10 +71,10 @@ class ClosedFormMap(PathMap):
         self.start = start
         self._rows = np.eye(robot.n)[self.redundant]
         self._turning = robot.revolute[self.nonredundant]
-        self._turns = np.array(self.nonredundant)[self._turning]
-        lower = robot.limits.position_lower
-        upper = robot.limits.position_upper
-        self._ranged = (np.isfinite(lower) | np.isfinite(upper))[self._turns]
+        self._turns = np.isin(np.arange(robot.n), self.nonredundant) & robot.revolute
+        limits = robot.limits
+        ends = limits.position_lower, limits.position_upper
+        self._ranged = self._turns & np.isfinite(ends).any(axis=0)
 
     def branch_margins(self, q: np.ndarray) -> np.ndarray:
         """Margins of the branch, (K, b), in postures (K, n)."""
@@ -120,14 +120,10 @@ class ClosedFormMap(PathMap):
             answers = self._track(answers)
         else:
             answers = self._pick_nearest(answers, near[:, self.nonredundant])
-        turning = self._turning
-        if turning.any() and np.isfinite(answers).all():
-            start = self.start[self._turns]
-            turns = np.vstack([start, answers[:, turning]])
-            answers[:, turning] = np.unwrap(turns, axis=0)[1:]
         q = np.empty((len(y), self.robot.n))
         q[:, self.redundant] = y[:, 1:]
         q[:, self.nonredundant] = answers
+        follow_turns(q, self._turns, self.start)
         return q
 
     def _pick_nearest(self, answers: np.ndarray, near: np.ndarray) -> np.ndarray:
@@ -160,23 +156,13 @@ class ClosedFormMap(PathMap):
         near: np.ndarray | None,
     ) -> np.ndarray:
         """Choose turns that follow `near`, or the angles' own velocities; the quintic's rule predicts each step."""
-        turns = self._turns
         if near is not None:
-            return in_turn_of(q, near, np.isin(np.arange(self.robot.n), turns))
+            return in_turn_of(q, near, self._turns)
         if t is None or not self._ranged.any():
             return q  # no limit asks which turn an angle is in
-        h = np.diff(t)[:, None]
-        v = qdot[:, turns]
-        predicted = 0.5 * h * (v[1:] + v[:-1])
-        predicted -= h**2 / 12.0 * np.diff(qddot[:, turns], axis=0)
-        gap = (predicted - np.diff(q[:, turns], axis=0)) / TURN
-        counted = np.round(gap)
-        # More than a quarter of a turn beside the prediction, nothing can be counted.
-        if np.any((np.abs(gap - counted) > 0.25) & self._ranged):
+        masks = self._turns, self._ranged
+        if not count_turns(q, (qdot, qddot), t, self.start, *masks):
             raise UnreachableError(
                 "a joint turns too far between collocation points to count its turns"
             )
-        first = np.round((self.start[turns] - q[0, turns]) / TURN)
-        counts = np.vstack([0.0 * first, np.cumsum(counted, axis=0)])
-        q[:, turns] += TURN * (first + counts)
         return q

@@ -56,6 +56,7 @@ class JointLimit(Limit):
         row = LIMIT_KINDS[self.kind]
         self._robot = robot
         self._joints = joints
+        self._is_of_all = len(joints) == robot.n
         self._ends = robot.limits.both_ways(self.kind)[:, joints]
         self._measure(*self._ends)
         units = [robot.position_units[i] for i in joints]
@@ -126,11 +127,16 @@ class JointLimit(Limit):
 
     def _normalise(self, quantity: np.ndarray) -> np.ndarray:
         """Values, (K, c), from a quantity of all joints, (K, n)."""
-        return np.asarray((quantity[:, self._joints] - self._middle) * self._scale)
+        own = self._of_joints(quantity)
+        return np.asarray((own - self._middle) * self._scale)
+
+    def _of_joints(self, every: np.ndarray) -> np.ndarray:
+        """Rows of the limited joints, (K, c, ...), from those of all joints, (K, n, ...)."""
+        return every if self._is_of_all else every.take(self._joints, axis=1)
 
     def _scale_rows(self, slopes: np.ndarray) -> np.ndarray:
         """Turn into derivatives of the values, (K, c, n), those of the quantity, (K, n, n)."""
-        return np.asarray(slopes[:, self._joints] * self._scale[:, None])
+        return np.asarray(self._of_joints(slopes) * self._scale[:, None])
 
 
 class _DerivativeLimit(JointLimit):

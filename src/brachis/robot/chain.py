@@ -8,7 +8,9 @@ import pinocchio as pin
 from brachis.kernel import Chain
 
 
-def chain_of(model: pin.Model, tool_frame: int) -> Chain:
+def chain_of(
+    model: pin.Model, tool_frame: int, friction: np.ndarray | None = None
+) -> Chain:
     """Describe the joints, the bodies and a frame of a serial model at its zero posture.
 
     The columns (v, w) of the world Jacobian are the joints' screws: w is an axis, and w x v a point on it.
@@ -18,6 +20,8 @@ def chain_of(model: pin.Model, tool_frame: int) -> Chain:
     model : pinocchio.Model
     tool_frame : int
         Index of the tool frame.
+    friction : (n, 4) ndarray, optional
+        See `Chain`.
     """
     data = model.createData()
     zero = np.zeros(model.nq)
@@ -45,4 +49,5 @@ def chain_of(model: pin.Model, tool_frame: int) -> Chain:
         centers=np.array(centers),
         inertias=np.array(turned)[:, *np.triu_indices(3)],
         gravity=np.array(model.gravity.linear),
+        friction=friction,
     )

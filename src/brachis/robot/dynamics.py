@@ -79,33 +79,16 @@ def torque(
     (K, n) ndarray
         ``rnea + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``, Nm or N.
     """
-    return rigid_torque(robot, q, qdot, qddot) + robot.friction.torque(qdot, qddot)
-
-
-def rigid_torque(
-    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-) -> np.ndarray:
-    """Joint torques of K states without friction and armature; parameters as for `torque`."""
     return robot.chain.torques(q, qdot, qddot)
 
 
 def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Mass matrices with armature, (K, n, n), of K postures (K, n)."""
-    matrices = robot.chain.mass_matrices(q)
-    _diagonals(matrices)[:] += robot.friction.armature
-    return matrices
+    return robot.chain.mass_matrices(q)
 
 
 def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    by_q, by_qdot, by_qddot = robot.chain.torque_derivatives(q, qdot, qddot)
-    _diagonals(by_qdot)[:] += robot.friction.velocity_derivative(qdot)
-    _diagonals(by_qddot)[:] += robot.friction.armature
-    return TorqueDerivatives(by_q, by_qdot, by_qddot)
-
-
-def _diagonals(matrices: np.ndarray) -> np.ndarray:
-    """Diagonals, (K, n), of matrices, (K, n, n), to be written to."""
-    return np.einsum("kii->ki", matrices)
+    return TorqueDerivatives(*robot.chain.torque_derivatives(q, qdot, qddot))

@@ -143,19 +143,7 @@ class Friction(Summary):
                 hint=hint,
             )
 
-    def torque(self, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
-        """Torque of these terms, (..., n), for velocities and accelerations (..., n)."""
-        return (
-            self.armature * qddot
-            + self.viscous * qdot
-            + self.coulomb * np.tanh(qdot / self.v_eps)
-        )
-
-    def velocity_derivative(self, qdot: np.ndarray) -> np.ndarray:
-        """Differentiate `torque` with respect to qdot (diagonal), (..., n)."""
-        return (
-            self.viscous
-            + self.coulomb
-            / self.v_eps
-            / np.cosh(np.clip(qdot / self.v_eps, -350.0, 350.0)) ** 2
-        )
+    @property
+    def table(self) -> np.ndarray:
+        """All terms, (n, 4), in the order of the attributes."""
+        return np.column_stack([self.armature, self.viscous, self.coulomb, self.v_eps])

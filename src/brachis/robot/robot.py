@@ -427,7 +427,7 @@ class Robot(Summary):
     @cached_property
     def chain(self) -> Chain:
         """The chain as the compiled kernel takes it."""
-        return chain_of(self.model, self.frame_id)
+        return chain_of(self.model, self.frame_id, self.friction.table)
 
     def place_joints(self, q: np.ndarray) -> Iterator[pin.Data]:
         """Yield Pinocchio's placements of all joints and of the tool frame in postures (K, n), one after the other.
