@@ -210,13 +210,17 @@ def test_the_chain_rule(with_jerk):
 
     points = np.array([0, 0, 4, POINTS - 1])
     basis = rng.normal(size=(len(found), 4))
-    entries = find_entries(found, 1, points, basis)
-    known = np.einsum("oz,ozc->zc", basis, found[..., 1][:, points])
-    np.testing.assert_allclose(entries, known, atol=1e-12)
+    curves = np.array([1, 0, 2, 1])
+    every = rng.normal(size=(2, len(found), POINTS, width))
+    entries = find_entries(found, every, points, curves, basis)
+    known = np.einsum("bokw,okcw->bkc", every, found).reshape(2 * POINTS, -1)
+    np.testing.assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
+    by_one = np.einsum("oz,zoc->zc", basis, found[:, points, :, curves])
+    np.testing.assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
     with pytest.raises(ValueError, match="point"):
-        find_entries(found, 1, points + 1, basis)
+        find_entries(found, every, points + 1, curves, basis)
     with pytest.raises(ValueError, match="curve"):
-        find_entries(found, width, points, basis)
+        find_entries(found, every, points, curves + 1, basis)
 
 
 def test_partials_by_the_jerk_need_its_slopes():

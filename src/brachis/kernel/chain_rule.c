@@ -7,6 +7,13 @@ typedef struct {
     long step;
 } partial;
 
+/* A group of values: its partials by q, qdot, qddot and qdddot, and by s, (K, values), or null. */
+typedef struct {
+    partial by[4];
+    const double *by_s;
+    long values;
+} group;
+
 /* Derivatives of the joint motion by the curves, (K, n, width) each; see kinematics/joint_map.py. The last one counts only
 where a partial by the jerk is given. */
 typedef struct {
@@ -32,63 +39,79 @@ static void add_product(
     }
 }
 
-/* Slopes by y, ydot, yddot and, with 4 orders, ydddot of `values` values from those by q, qdot, qddot, qdddot, and by s,
-(K, values). They go into the columns from `first` on of a table, (orders, K, columns, width). */
+/* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width). */
 void brachis_chain_rule(
-    long count, long values, long n, long width, const partial *by, const double *by_s, const motion_slopes *motion,
-    long orders, long columns, long first, double *table
+    long count, long n, long width, long groups, const group *of, const motion_slopes *motion, long orders, long columns,
+    double *table
 )
 {
+    for (long i = 0; i < orders * count * columns * width; i++) {
+        table[i] = 0.0;
+    }
     for (long k = 0; k < count; k++) {
         double *found[4];
         for (long order = 0; order < orders; order++) {
-            found[order] = table + ((order * count + k) * columns + first) * width;
-            for (long i = 0; i < values * width; i++) {
-                found[order][i] = 0.0;
-            }
+            found[order] = table + (order * count + k) * columns * width;
         }
         long at = k * n * width;
-        for (long i = 0; i < values && by_s; i++) {
-            found[0][i * width] = by_s[k * values + i];
-        }
-        if (by[0].numbers) {
-            add_product(&by[0], k, values, n, width, 1.0, motion->gradient + at, found[0]);
-        }
-        if (by[1].numbers) {
-            add_product(&by[1], k, values, n, width, 1.0, motion->qdot_y + at, found[0]);
-            add_product(&by[1], k, values, n, width, 1.0, motion->gradient + at, found[1]);
-        }
-        if (by[2].numbers) {
-            add_product(&by[2], k, values, n, width, 1.0, motion->qddot_y + at, found[0]);
-            add_product(&by[2], k, values, n, width, 1.0, motion->qddot_ydot + at, found[1]);
-            add_product(&by[2], k, values, n, width, 1.0, motion->gradient + at, found[2]);
-        }
-        if (by[3].numbers) {
-            add_product(&by[3], k, values, n, width, 1.0, motion->qdddot_y + at, found[0]);
-            add_product(&by[3], k, values, n, width, 3.0, motion->qddot_y + at, found[1]);
-            add_product(&by[3], k, values, n, width, 3.0, motion->qdot_y + at, found[2]);
-            add_product(&by[3], k, values, n, width, 1.0, motion->gradient + at, found[3]);
+        for (const group *own = of; own < of + groups; own++) {
+            const partial *by = own->by;
+            long values = own->values;
+            for (long i = 0; i < values && own->by_s; i++) {
+                found[0][i * width] = own->by_s[k * values + i];
+            }
+            if (by[0].numbers) {
+                add_product(&by[0], k, values, n, width, 1.0, motion->gradient + at, found[0]);
+            }
+            if (by[1].numbers) {
+                add_product(&by[1], k, values, n, width, 1.0, motion->qdot_y + at, found[0]);
+                add_product(&by[1], k, values, n, width, 1.0, motion->gradient + at, found[1]);
+            }
+            if (by[2].numbers) {
+                add_product(&by[2], k, values, n, width, 1.0, motion->qddot_y + at, found[0]);
+                add_product(&by[2], k, values, n, width, 1.0, motion->qddot_ydot + at, found[1]);
+                add_product(&by[2], k, values, n, width, 1.0, motion->gradient + at, found[2]);
+            }
+            if (by[3].numbers) {
+                add_product(&by[3], k, values, n, width, 1.0, motion->qdddot_y + at, found[0]);
+                add_product(&by[3], k, values, n, width, 3.0, motion->qddot_y + at, found[1]);
+                add_product(&by[3], k, values, n, width, 3.0, motion->qdot_y + at, found[2]);
+                add_product(&by[3], k, values, n, width, 1.0, motion->gradient + at, found[3]);
+            }
+            for (long order = 0; order < orders; order++) {
+                found[order] += values * width;
+            }
         }
     }
 }
 
-/* Entries, (z, columns), of the variables of one curve, each of which matters at one point: `basis`, (orders, z), is the
-slope of the curve and its time derivatives there. */
+/* Entries of a Jacobian, (broad K + z, columns). The first ones are of what moves all curves, at each of the K points: by
+`every`, (broad, orders, K, width), which are slopes of the curves and their time derivatives. Each of the others moves one
+curve at one point, by `basis`, (orders, z). */
 void brachis_entries(
-    long orders, long count, long columns, long width, const double *table, long curve, long entries,
-    const long *points, const double *basis, double *found
+    long orders, long count, long columns, long width, const double *table, long broad, const double *every,
+    long entries, const long *points, const long *curves, const double *basis, double *found
 )
 {
-    for (long z = 0; z < entries; z++) {
-        double *own = found + z * columns;
-        for (long i = 0; i < columns; i++) {
-            own[i] = 0.0;
+    double *of_one = found + broad * count * columns;
+    for (double *own = found; own < of_one + entries * columns; own++) {
+        *own = 0.0;
+    }
+    for (long order = 0; order < orders; order++) {
+        for (long row = 0; row < broad * count; row++) {
+            const double *slopes = table + (order * count + row % count) * columns * width;
+            const double *factors = every + ((row / count * orders + order) * count + row % count) * width;
+            for (long i = 0; i < columns; i++) {
+                for (long j = 0; j < width; j++) {
+                    found[row * columns + i] += slopes[i * width + j] * factors[j];
+                }
+            }
         }
-        for (long order = 0; order < orders; order++) {
-            const double *slopes = table + (order * count + points[z]) * columns * width + curve;
+        for (long z = 0; z < entries; z++) {
+            const double *slopes = table + (order * count + points[z]) * columns * width + curves[z];
             double factor = basis[order * entries + z];
             for (long i = 0; i < columns; i++) {
-                own[i] += factor * slopes[i * width];
+                of_one[z * columns + i] += factor * slopes[i * width];
             }
         }
     }

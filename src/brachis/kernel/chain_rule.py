@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.kernel.library import address, as_doubles, load
-
-
-class _Partial(ctypes.Structure):
-    """`partial` of chain_rule.c."""
-
-    _fields_ = [("numbers", ctypes.c_void_p), ("step", ctypes.c_long)]
-
-
-class _MotionSlopes(ctypes.Structure):
-    """`motion_slopes` of chain_rule.c."""
-
-    _fields_ = [
-        (name, ctypes.c_void_p)
-        for name in ("gradient", "qdot_y", "qddot_y", "qddot_ydot", "qdddot_y")
-    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,89 +53,96 @@ def apply_chain_rule(
     (3 or 4, K, sum of sizes, c) ndarray
         Slopes by y, ydot, yddot and, with `qdddot_y`, ydddot.
     """
-    shape = motion.gradient.shape
-    count, n, width = shape
+    count, n, width = motion.gradient.shape
     asks_for_jerk = any(by_joints[3] is not None for by_joints, _ in partials)
     if asks_for_jerk and motion.qdddot_y is None:
         raise ValueError("partials by qdddot need qdddot_y")
-    parts = vars(motion).values()
-    kept = [None if own is None else as_doubles(own, shape) for own in parts]
-    slopes = _MotionSlopes(*map(_address, kept))
+    kept: list[np.ndarray] = []
+    groups = []
+    for (by_joints, by_s), size in zip(partials, sizes, strict=True):
+        of_joints = [_place_partials(own, (count, size, n), kept) for own in by_joints]
+        along = _place(by_s, (count, size), kept)
+        groups.append([*itertools.chain.from_iterable(of_joints), along, size])
+    parts = [_place(own, (count, n, width), kept) for own in vars(motion).values()]
+    # As `group` and `motion_slopes` of chain_rule.c are in memory.
+    own_groups = np.array(groups, dtype=np.int64)
+    slopes = np.array(parts, dtype=np.int64)
     orders = 3 if motion.qdddot_y is None else 4
     table = np.empty((orders, count, sum(sizes), width))
-    first = 0
-    for (by_joints, by_s), size in zip(partials, sizes, strict=True):
-        given = [_prepare(own, (count, size, n)) for own in by_joints]
-        along = None if by_s is None else as_doubles(by_s, (count, size))
-        structures = (_Partial * 4)(*(_Partial(*own[:2]) for own in given))
-        load().brachis_chain_rule(
-            count,
-            size,
-            n,
-            width,
-            ctypes.byref(structures),
-            _address(along),
-            ctypes.byref(slopes),
-            orders,
-            table.shape[2],
-            first,
-            address(table),
-        )
-        first += size
+    load().brachis_chain_rule(
+        count,
+        n,
+        width,
+        len(groups),
+        address(own_groups),
+        address(slopes),
+        orders,
+        table.shape[2],
+        address(table),
+    )
     return table
 
 
-def _prepare(
-    values: Partial, shape: tuple[int, ...]
-) -> tuple[int | None, int, np.ndarray | None]:
-    """Return where partials are, how far those of one point are from those of the next, and what keeps them alive."""
+def _place(values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]) -> int:
+    """Return where numbers are, 0 where there are none; what is added to `kept` has to stay alive."""
     if values is None:
-        return None, 0, None
-    is_constant = values.shape == shape and values.strides[0] == 0
-    kept = (
-        as_doubles(values[0], shape[1:]) if is_constant else as_doubles(values, shape)
-    )
-    return address(kept), 0 if is_constant else kept[0].size, kept
+        return 0
+    kept.append(as_doubles(values, shape))
+    return address(kept[-1])
 
 
-def _address(values: Partial) -> int | None:
-    return None if values is None else address(values)
+def _place_partials(
+    values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]
+) -> tuple[int, int]:
+    """Return the same, and how far the numbers of one point are from those of the next."""
+    is_constant = values is not None and values.strides[0] == 0 and shape[0] > 1
+    if is_constant and values is not None and values.shape == shape:
+        return _place(values[0], shape[1:], kept), 0
+    return _place(values, shape, kept), math.prod(shape[1:])
 
 
 def find_entries(
-    slopes: np.ndarray, curve: int, points: np.ndarray, basis: np.ndarray
+    slopes: np.ndarray,
+    every: np.ndarray,
+    points: np.ndarray,
+    curves: np.ndarray,
+    basis: np.ndarray,
 ) -> np.ndarray:
-    """Entries of a Jacobian, (z, c), of variables that each matter at one point.
+    """Entries of a Jacobian, (b K + z, c), of what moves all curves, and of what moves one of them at one point.
 
     Parameters
     ----------
     slopes : (orders, K, c, width) ndarray
         As of `apply_chain_rule`.
-    curve : int
-        To which the variables belong.
-    points : (z,) int64 ndarray
+    every : (b, orders, K, width) ndarray
+        Slopes of the curves and their time derivatives, at every point, by what moves all of them.
+    points, curves : (z,) int64 ndarray
+        Where the others matter.
     basis : (orders, z) ndarray
-        Slopes of the curve and its time derivatives by the variables.
+        Slopes of the curve and its time derivatives by them.
     """
     orders, count, columns, width = slopes.shape
-    if len(points) and not 0 <= points.min() <= points.max() < count:
-        raise ValueError("a point does not exist")
-    if not 0 <= curve < width:
-        raise ValueError(f"curve {curve} does not exist; there are {width}")
+    for numbers, most, name in (points, count, "point"), (curves, width, "curve"):
+        if len(numbers) and not 0 <= numbers.min() <= numbers.max() < most:
+            raise ValueError(f"a {name} does not exist; there are {most}")
+    broad = len(every)
+    entries = len(points)
     table = as_doubles(slopes, slopes.shape)
-    kept = np.ascontiguousarray(points, dtype="l")
-    factors = as_doubles(basis, (orders, len(points)))
-    found = np.empty((len(points), columns))
+    factors = as_doubles(every, (broad, orders, count, width))
+    places = [np.ascontiguousarray(own, dtype="l") for own in (points, curves)]
+    own_basis = as_doubles(basis, (orders, entries))
+    found = np.empty((broad * count + entries, columns))
     load().brachis_entries(
         orders,
         count,
         columns,
         width,
         address(table),
-        curve,
-        len(points),
-        address(kept),
+        broad,
         address(factors),
+        entries,
+        *map(address, places),
+        address(own_basis),
         address(found),
     )
     return found

@@ -24,6 +24,7 @@ _OPERATIONS = "add subtract multiply divide negate sqrt sin cos arccos arctan2 c
 _CODES = {name: code for code, name in enumerate(_OPERATIONS.split())}
 """In the order of formula.c."""
 
+
 class Number:
     """A number of a formula: an input, a constant, or what an operation gives.
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
@@ -158,8 +159,12 @@ class _DerivativeLimit(JointLimit):
 
     def _rows(self, count: int) -> np.ndarray:
         """Differentiate the values by the quantity, (K, c, n), at `count` moments."""
-        rows = np.eye(self._robot.n)[self._joints] * self._scale[:, None]
+        rows = self._rows_of_all
         return np.broadcast_to(rows, (count, *rows.shape))
+
+    @cached_property
+    def _rows_of_all(self) -> np.ndarray:
+        return np.eye(self._robot.n)[self._joints] * self._scale[:, None]
 
 
 def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

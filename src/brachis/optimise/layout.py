@@ -121,6 +121,8 @@ class Layout:
         Where the variables of each curve matter.
     point, variable : (z,) int ndarray
         Where variables matter at all, by T, by each curve, then by h.
+    curve : (z',) int ndarray
+        Which curve each of those between T and h moves.
     progress : Progress
         Differences of control points of s; empty without a path.
     limit_rows : tuple of (K, c) int ndarray
@@ -137,6 +139,7 @@ class Layout:
     patterns: tuple[SparsityPattern, ...]
     point: np.ndarray
     variable: np.ndarray
+    curve: np.ndarray
     progress: Progress
     limit_rows: tuple[np.ndarray, ...]
     x_lower: np.ndarray
@@ -188,6 +191,8 @@ class Layout:
         of_time = np.zeros(count, dtype=int)
         of_lengths = grid.variable + lengths.start
         variable = np.concatenate([of_time, *of_curves, of_lengths])
+        numbers = np.arange(len(splines)) + int(time_law is not None)
+        curve = np.repeat(numbers, [len(pattern.point) for pattern in patterns])
 
         limit_rows = []
         first = 0
@@ -221,6 +226,7 @@ class Layout:
             patterns,
             point,
             variable,
+            curve,
             progress,
             tuple(limit_rows),
             x_lower,

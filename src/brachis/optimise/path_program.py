@@ -16,12 +16,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
 from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
+from brachis.kernel import find_entries
 from brachis.limits import Limit, Moments
 from brachis.optimise.bspline import basis_matrix, clamped_knots, local_basis
 from brachis.optimise.evaluator import Evaluation, Evaluator
@@ -56,6 +58,7 @@ _MORE = 1.2
 """Factor on a violation by which limits are narrowed."""
 _STATIONS_A_PIECE = 4
 """Stations in every piece of a path, at most as far apart as others."""
+_Number = TypeVar("_Number", int, np.ndarray)
 
 
 def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
@@ -164,12 +167,18 @@ class PathPhase:
 
     def _set_pattern(self, columns: np.ndarray) -> None:
         """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
-        numbers = self._number[:, None]
-        of_curves = [self.place_of(j, 0) + columns for j in range(self.curves_count)]
-        every = np.hstack([numbers, numbers + 1, *of_curves])
-        shape = (*self._bounds.shape[1:], every.shape[1])
-        self.jacobian_columns = np.broadcast_to(every[:, None], shape).ravel()
-        self.jacobian_rows = np.repeat(np.arange(len(self.lower)), every.shape[1])
+        places, values = self._bounds.shape[1:]
+        curves = np.arange(self.curves_count)
+        of_curves = self.place_of(curves, 0)[:, None, None] + columns
+        variable = np.concatenate([self._number, self._number + 1, of_curves.ravel()])
+        every = np.arange(places)
+        of_each = np.repeat(every, columns.shape[1])
+        self._points = np.tile(of_each, self.curves_count)
+        self._curves = np.repeat(curves + 1, columns.size)
+        rows = np.arange(places * values).reshape(places, values)
+        self.jacobian_columns = np.repeat(variable, values)
+        point = np.concatenate([every, every, self._points])
+        self.jacobian_rows = rows[point].ravel()
 
     def _set_variables(self, squares: np.ndarray, points: np.ndarray) -> None:
         """Set the variables at the beginning, and their bounds: X at the ends stays, and values that are given."""
@@ -209,7 +218,7 @@ class PathPhase:
         inner = slice(1, len(self._s) - 1)
         self.start[inner] = np.maximum(found[inner], _SLOWEST)
 
-    def place_of(self, curve: int, end: int) -> int:
+    def place_of(self, curve: _Number, end: int) -> _Number:
         """Return the number of the variable that is a redundant curve's value at the start (0) or end (-1)."""
         return len(self._s) + curve * self._count + end % self._count
 
@@ -320,29 +329,29 @@ class PathPhase:
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,)."""
         _, y_ds, y_dds, square, u = self._motion(x)
-        by_y, by_rate, by_second = self.evaluate(x).slopes[:3]
         rate = np.sqrt(square)
         # X is given where it vanishes.
         half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
-        of_square = np.einsum("mcj,mj->mc", by_rate, y_ds * half)
-        of_square += np.einsum("mcj,mj->mc", by_second, y_dds)
-        of_u = np.einsum("mcj,mj->mc", by_second, y_ds)
         number = self._number
-        of_step = of_u / (2.0 * self._steps[number, None])
-        before = self._ahead * of_square - of_step
-        behind = (1.0 - self._ahead) * of_square + of_step
-        parts = [
-            (before * self._units[number, None])[:, :, None],
-            (behind * self._units[number + 1, None])[:, :, None],
-        ]
+        of_step = y_ds / (2.0 * self._steps[number, None])
+        by_squares = np.zeros((2, 3, *y_ds.shape))
+        for own, station, share, sign in (
+            (by_squares[0], number, self._ahead, -1.0),
+            (by_squares[1], number + 1, 1.0 - self._ahead, 1.0),
+        ):
+            units = self._units[station, None]
+            own[1] = units * share * half * y_ds
+            own[2] = units * (share * y_dds + sign * of_step)
         value, first, second, _ = self._basis
-        of_rate = first * rate
-        of_second = second * square + first * u
-        for j in range(1, self.curves_count + 1):
-            own = by_y[:, :, j, None] * value[:, None]
-            own = own + by_rate[:, :, j, None] * of_rate[:, None]
-            parts.append(own + by_second[:, :, j, None] * of_second[:, None])
-        return np.concatenate(parts, axis=2).ravel()
+        basis = np.array([value, first * rate, second * square + first * u])
+        slopes = self.evaluate(x).slopes[:3]
+        return find_entries(
+            slopes,
+            by_squares,
+            self._points,
+            self._curves,
+            np.tile(basis.reshape(3, -1), self.curves_count),
+        ).ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:
         """Take s and the redundant curves at many places, (S, c)."""

@@ -119,7 +119,7 @@ class Phase:
         self.upper = layout.upper
         self.jacobian_rows = layout.jacobian_rows
         self.jacobian_columns = layout.jacobian_columns
-        self._entries: tuple[LocalBasis, list[np.ndarray]] | None = None
+        self._entries: tuple[LocalBasis, np.ndarray] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
 
@@ -417,13 +417,12 @@ class Phase:
         slopes = np.zeros((ORDERS, curves, len(layout.point)))
         slopes[:, :, number] = [own[number] for own in self._by_duration(x)]
         begin = len(self.t_norm)
-        pairs = zip(layout.patterns, self._bases(x), strict=True)
-        for j, (pattern, basis) in enumerate(pairs, first):
-            end = begin + len(pattern.point)
-            slopes[:, j, begin:end] = per_second(basis, x[0])
-            begin = end
+        of_curves = np.arange(begin, begin + len(layout.curve))
+        slopes[:, layout.curve, of_curves] = self._basis(x)
         by_h = self.grid.slopes(self._h(x), self._control_points(x))
-        slopes[:, first:, begin:] = np.swapaxes(per_second(by_h, x[0]), 1, 2)
+        slopes[:, first:, begin + len(layout.curve) :] = np.swapaxes(
+            per_second(by_h, x[0]), 1, 2
+        )
         return slopes[:, :, self._at_end(point)]
 
     def _at_end(self, point: int) -> np.ndarray:
@@ -443,41 +442,43 @@ class Phase:
     def _chain_rule(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""
         orders = len(by)
-        pairs = zip(by, self._by_duration(x), strict=False)
-        of_time = sum(np.einsum("kcj,kj->kc", slope, own) for slope, own in pairs)
-        first = self.boundary.given
-        bases = zip(self._layout.patterns, self._bases(x), strict=True)
-        of_curves = [
-            find_entries(
-                by, j, pattern.point, np.array(per_second(basis[:orders], x[0]))
-            )
-            for j, (pattern, basis) in enumerate(bases, first)
-        ]
+        layout = self._layout
+        basis = self._basis(x)
+        points = layout.point[len(self.t_norm) :][: basis.shape[1]]
+        entries = find_entries(
+            by,
+            self._by_duration(x)[None, :orders],
+            points,
+            layout.curve,
+            basis[:orders],
+        )
         if not len(self.grid.point):
-            return np.concatenate([of_time, *of_curves])
+            return entries
         by_h = self.grid.slopes(self._h(x), self._control_points(x))[:orders]
-        together = np.concatenate(by[..., first:], axis=2)[self.grid.point]
-        of_lengths = together @ np.hstack(per_second(by_h, x[0]))[:, :, None]
-        return np.concatenate([of_time, *of_curves, of_lengths[:, :, 0]])
+        together = np.concatenate(by[..., self.boundary.given :], axis=2)
+        of_lengths = (
+            together[self.grid.point] @ np.hstack(per_second(by_h, x[0]))[:, :, None]
+        )
+        return np.concatenate([entries, of_lengths[:, :, 0]])
 
-    def _by_duration(self, x: np.ndarray) -> list[np.ndarray]:
-        """Slopes of the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
-        slower = [-i / x[0] * part for i, part in enumerate(self.state(x).curves)]
+    def _by_duration(self, x: np.ndarray) -> np.ndarray:
+        """Slopes of the curves and their time derivatives by T, (4, K, c): a longer time slows them down."""
+        rates = -np.arange(ORDERS) / x[0]
+        slower = np.array(self.state(x).curves) * rates[:, None, None]
         if not self._ends_by_duration:
             return slower
         given = [spline.given_points(x[0], slope=True) for spline in self.splines]
-        rates = np.reshape(given, (len(self.splines), self.intervals + self.degree))
-        moving = per_second(self._orders(x, rates, is_slope=True), x[0])
-        return [rate + less for rate, less in zip(moving, slower, strict=True)]
+        points = np.reshape(given, (len(self.splines), self.intervals + self.degree))
+        moving = per_second(self._orders(x, points, is_slope=True), x[0])
+        return np.array(moving) + slower
 
-    def _bases(self, x: np.ndarray) -> list[np.ndarray]:
-        """Basis functions of every curve's free variables, (4, z) each; computed anew where the grid's change."""
+    def _basis(self, x: np.ndarray) -> np.ndarray:
+        """Slopes of the curves and their time derivatives by the variables between T and h, (4, z)."""
         basis = self.grid.basis(self._h(x))
         if self._entries is None or self._entries[0] is not basis:
-            patterns = self._layout.patterns
-            own = [pattern.entries(basis.values) for pattern in patterns]
-            self._entries = (basis, own)
-        return self._entries[1]
+            own = [part.entries(basis.values) for part in self._layout.patterns]
+            self._entries = (basis, np.concatenate([np.empty((ORDERS, 0)), *own], 1))
+        return np.array(per_second(self._entries[1], x[0]))
 
 
 def is_checked_at_points(limit: Limit) -> bool:
