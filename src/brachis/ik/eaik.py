@@ -154,9 +154,10 @@ class EaikSolver(DeterminantSolver):
         self, q: np.ndarray, wanted: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """By how much postures miss their targets, m or an element of a rotation, and det J_nr; both (N,)."""
-        screws = self._chain.screws_at(q)
-        miss = np.abs(wanted - Poses.of_tool(screws).targets()).max(axis=1)
-        return miss, screws.determinant(self._joints)
+        positions, rotations, twists = self._chain.tool(q, in_tool_axes=False)
+        targets = np.concatenate([positions, rotations.reshape(-1, 9)], axis=1)
+        columns = np.moveaxis(twists[:, :, self._joints], 0, 1)
+        return np.abs(wanted - targets).max(axis=1), np.linalg.det(columns)
 
     def _ask(
         self, targets: np.ndarray, values: np.ndarray

@@ -14,7 +14,7 @@ from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Conditions, PathMotion, find_least_singular
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
-from brachis.kernel.turns import count_turns, follow_turns
+from brachis.kernel.turns import count_turns, follow_turns, pick_nearest
 
 __all__ = [
     "Chain",
@@ -35,6 +35,7 @@ __all__ = [
     "go_forwards",
     "halve_intervals",
     "largest_parts",
+    "pick_nearest",
     "rotation_derivatives",
     "rotation_vectors",
     "tool_derivatives",

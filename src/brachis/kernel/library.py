@@ -38,6 +38,7 @@ FUNCTIONS = {
     "brachis_least_singular": "- llppp",
     "brachis_chain_rule": "- llllppllp",
     "brachis_entries": "- llllplplpppp",
+    "brachis_pick_nearest": "- lllppipp",
     "brachis_follow_turns": "- llppp",
     "brachis_count_turns": "i llppppppp",
     "brachis_largest_parts": "- lllpppp",

@@ -1,4 +1,4 @@
-/* Turns of angles by 2 pi along a motion. */
+/* Turns of angles by 2 pi along a motion, and which of several answers goes on with it. */
 
 #include <math.h>
 
@@ -61,4 +61,37 @@ int brachis_count_turns(
         }
     }
     return 1;
+}
+
+/* Of answers at successive times, (K, answers, columns), take those nearest to `near`, (K, columns); or, if `follows` is not
+0, nearest to the one taken before, at first to its first row. Columns where `turns` is not 0 count modulo turns. Where no
+answer is finite, the first one is taken. */
+void brachis_pick_nearest(
+    long count, long answers, long columns, const double *turns, const double *near, int follows, const double *table,
+    double *found
+)
+{
+    const double *before = near;
+    for (long k = 0; k < count; k++) {
+        const double *of_one = table + k * answers * columns;
+        long best = 0;
+        double least = INFINITY;
+        before = follows ? before : near + k * columns;
+        for (long i = 0; i < answers; i++) {
+            double square = 0.0;
+            for (long j = 0; j < columns; j++) {
+                double gap = of_one[i * columns + j] - before[j];
+                gap -= turns[j] != 0.0 ? TURN * nearbyint(gap / TURN) : 0.0;
+                square += gap * gap;
+            }
+            if (square < least) {
+                least = square;
+                best = i;
+            }
+        }
+        for (long j = 0; j < columns; j++) {
+            found[k * columns + j] = of_one[best * columns + j];
+        }
+        before = least < INFINITY ? found + k * columns : before;
+    }
 }

@@ -1,4 +1,4 @@
-"""Turns of angles by 2 pi along a motion."""
+"""Turns of angles by 2 pi along a motion, and which of several answers goes on with it."""
 
 from __future__ import annotations
 
@@ -52,3 +52,38 @@ def count_turns(
     kept.append(as_doubles(t, (count,)))
     kept.extend(as_doubles(own, (count, n)) for own in motion)
     return bool(load().brachis_count_turns(count, n, *map(address, kept), address(q)))
+
+
+def pick_nearest(
+    answers: np.ndarray, turning: np.ndarray, near: np.ndarray, *, follows: bool
+) -> np.ndarray:
+    """Take one of several answers at each of K successive times, (K, m), the nearest one modulo turns.
+
+    Parameters
+    ----------
+    answers : (K, A, m) ndarray
+        Not finite where there is none; without any the first is taken.
+    turning : (m,) ndarray
+        Columns that are angles, 1; else 0.
+    near : (K, m) ndarray
+        To which they are nearest; one row is enough where each follows its predecessor.
+    follows : bool
+        Whether each is the nearest to its predecessor, and the first one to the first row of `near`.
+    """
+    count, alternatives, columns = answers.shape
+    given = (
+        as_doubles(turning, (columns,)),
+        as_doubles(near, (1 if follows else count, columns)),
+    )
+    table = as_doubles(answers, answers.shape)
+    found = np.empty((count, columns))
+    load().brachis_pick_nearest(
+        count,
+        alternatives,
+        columns,
+        *map(address, given),
+        follows,
+        address(table),
+        address(found),
+    )
+    return found

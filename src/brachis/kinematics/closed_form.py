@@ -20,12 +20,12 @@ import numpy as np
 from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
-from brachis.kernel import Conditions, count_turns, follow_turns
+from brachis.kernel import Conditions, count_turns, follow_turns, pick_nearest
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
-from brachis.robot.joints import complement, difference, in_turn_of
+from brachis.robot.joints import complement, in_turn_of
 
 
 class ClosedFormMap(PathMap):
@@ -114,34 +114,18 @@ class ClosedFormMap(PathMap):
         """
         sample = sample or self.path.sample(y[:, 0])
         answers = self.solver.solve_branch(sample.target, y[:, 1:], self.branch)
+        beside = self.start[None] if near is None else near
         if self.solver.alternatives == 1:
             answers = answers[:, 0]
-        elif near is None:
-            answers = self._track(answers)
         else:
-            answers = self._pick_nearest(answers, near[:, self.nonredundant])
+            beside = beside[:, self.nonredundant]
+            follows = near is None
+            answers = pick_nearest(answers, self._turning, beside, follows=follows)
         q = np.empty((len(y), self.robot.n))
         q[:, self.redundant] = y[:, 1:]
         q[:, self.nonredundant] = answers
         follow_turns(q, self._turns, self.start)
         return q
-
-    def _pick_nearest(self, answers: np.ndarray, near: np.ndarray) -> np.ndarray:
-        """Choose from answers (K, A, m) those nearest to postures (K, m), modulo 2 pi."""
-        gap = difference(answers, near[:, None], self._turning)
-        distance = np.linalg.norm(gap, axis=2)
-        choice = np.argmin(np.where(np.isfinite(distance), distance, np.inf), axis=1)
-        return answers[np.arange(len(answers)), choice]
-
-    def _track(self, answers: np.ndarray) -> np.ndarray:
-        """Choose from answers (K, A, m) at successive times a joint path, each nearest to its predecessor."""
-        joint_path = np.empty((len(answers), len(self.nonredundant)))
-        previous = self.start[self.nonredundant]
-        for k in range(len(answers)):
-            joint_path[k] = self._pick_nearest(answers[k : k + 1], previous[None])[0]
-            if np.isfinite(joint_path[k]).all():
-                previous = joint_path[k]
-        return joint_path
 
     def conditions(self, s: np.ndarray, _q: np.ndarray) -> Conditions:
         """Return rows that each select a redundant joint."""

@@ -291,7 +291,10 @@ class SolverSession:
             )
             return self.backend.solve(problem, x, options, self.progress)
 
-        report = solve_near_rows(program, x, solve)
+        is_interior = self.backend.is_interior
+        report = (
+            solve(program, x) if is_interior else solve_near_rows(program, x, solve)
+        )
         if report.status.usable or report.violation > self.acceptable:
             return report
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)

@@ -27,7 +27,8 @@ __all__ = [
     "solvers_for",
 ]
 TABLE = {
-    backend.NAME: Solver(backend.NAME, backend.run) for backend in (uno, ipopt, slsqp)
+    backend.NAME: Solver(backend.NAME, backend.run, is_interior=backend is ipopt)
+    for backend in (uno, ipopt, slsqp)
 }
 AUTO_ORDER = tuple(TABLE)
 """The order in which ``auto`` tries them."""

@@ -58,10 +58,13 @@ class Solver:
     name : str
     run : callable
         ``run(monitor, x)`` solves the monitor's problem from x; see `SolveMonitor`.
+    is_interior : bool, optional
+        Whether it is an interior-point method: it goes away from bounds at first, and cannot use how near the start is.
     """
 
     name: str
     run: Run
+    is_interior: bool = False
 
     def solve(
         self,
