@@ -206,7 +206,8 @@ class PathPhase:
         squares, _ = self._split(self.start)
         course = self.course(self.start, self._s)
         try:
-            timed = TimedCourse(course, phase.joint_map, phase.limits)
+            rate = np.sqrt(squares)
+            timed = TimedCourse(course, phase.joint_map, phase.limits, rate)
         except UnreachableError:
             return
         first, last = timed.speeds[[0, -1]] * np.sqrt(squares[[0, -1]])

@@ -21,6 +21,8 @@ _PLACES_A_PIECE = 24
 """Places in every piece of a path, unless there are very many of these."""
 _MOST_PLACES = 40_000
 """Places in all pieces together, about."""
+_ROUGHLY = 1e-3
+"""Change of the time, as a part of it, with which a first timing ends: it only tells where stations are needed."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
 _MOVES = 1e-3
@@ -120,24 +122,28 @@ class PhaseTiming:
         sides = phase.boundary.start[0], phase.boundary.end[0]
         rates = np.array([side.derivatives[:1].sum() for side in sides])
 
-        def lay(s: np.ndarray) -> tuple[TimedCourse, tuple[float, float]]:
+        def lay(
+            s: np.ndarray, known: tuple[np.ndarray, np.ndarray] | None = None
+        ) -> tuple[TimedCourse, tuple[float, float]]:
             coarse = course_at(s)
             derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
             state = phase.joint_map.state(*derivatives, t=s - begin)
             course = course_at(divide_turns(s, state.qdot))
-            timed = TimedCourse(course, phase.joint_map, phase.limits)
+            rate = None if known is None else np.interp(course.p, *known)
+            timed = TimedCourse(course, phase.joint_map, phase.limits, rate)
             return timed, tuple(timed.speeds[[0, -1]] * rates)
 
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
-        timing = course.solve(by_length)
+        timing = course.solve(by_length, agreement=_ROUGHLY)
         if timing is None:
             return cls(course, by_length, None)
         # Stations where the motion takes its time.
         t = np.linspace(0.0, timing.t_end, count)
-        s = np.union1d(course.curves(timing, t)[0][:, 0].clip(begin, end), pieces)
+        known, rate = (own[:, 0] for own in course.curves(timing, t))
+        s = np.union1d(known.clip(begin, end), pieces)
         s = s[np.append(np.diff(s) > tolerances.PATH, True)]
         s[0] = begin
-        course, by_length = lay(s)
+        course, by_length = lay(s, (known, rate))
         law = phase.time_law
         given = None if law is None else law.duration
         return cls(course, by_length, course.solve(by_length), given)

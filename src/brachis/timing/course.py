@@ -11,7 +11,7 @@ import numpy as np
 from brachis.kinematics import JointMap
 from brachis.limits import Limit
 from brachis.timing.joint_path import JointPath, Passage, Timing
-from brachis.timing.phase_plane import PhasePlane
+from brachis.timing.phase_plane import AGREEMENT, PhasePlane
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ class TimedCourse:
     joint_map : JointMap
         Of its curves.
     limits : sequence of Limit
+    rate : (P,) ndarray, optional
+        About how fast the parameter of the course will grow at its stations, 1/s.
 
     Attributes
     ----------
@@ -69,14 +71,19 @@ class TimedCourse:
     """
 
     def __init__(
-        self, course: Course, joint_map: JointMap, limits: Sequence[Limit]
+        self,
+        course: Course,
+        joint_map: JointMap,
+        limits: Sequence[Limit],
+        rate: np.ndarray | None = None,
     ) -> None:
         still = np.zeros_like(course.y)
         curves = (course.y, course.y_dp, course.y_ddp, still)
         state = joint_map.state(*curves, t=course.p - course.p[0])
         self.path, kept = JointPath.of_state(course.p, state).by_length()
         self.speeds = np.linalg.norm(state.qdot, axis=1)
-        self._plane = PhasePlane(limits, self.path)
+        by_length = None if rate is None else (rate * self.speeds)[kept]
+        self._plane = PhasePlane(limits, self.path, by_length)
         y_dp = course.y_dp[kept]
         slopes = y_dp / np.maximum(self.speeds[kept], 1e-300)[:, None]
         for end, beside in ((0, 1), (-1, -2)):
@@ -90,10 +97,11 @@ class TimedCourse:
         rates: tuple[float, float],
         narrower: Mapping[Limit, np.ndarray] = MappingProxyType({}),
         most_acceleration: float = np.inf,
+        agreement: float = AGREEMENT,
     ) -> Timing | None:
-        """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane.narrow`."""
+        """Find the fastest timing with the rates of the path's length at both ends, 1/s; see `PhasePlane`."""
         self._plane.narrow(narrower, most_acceleration)
-        return self._plane.solve(rates)
+        return self._plane.solve(rates, agreement)
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Curves and their rates, (K, c), at times of a timing, (K,), s: cubics between the stations."""

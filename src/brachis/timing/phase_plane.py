@@ -46,8 +46,8 @@ _LOOKS_AT_END = 4
 """Linearisations for the largest rate at an end."""
 _CREDIBLE = 1e-2
 """Difference of rows from values, as a part of the limit, above which a timing is not believed."""
-_AGREE = 1e-6
-"""Change of the time, as a part of it, with which linearisations end."""
+AGREEMENT = 1e-6
+"""Change of the time, as a part of it, with which linearisations end, unless stated."""
 _HELD_BACK = 0.8
 """Part of what a limit leaves at rest that may be taken."""
 
@@ -145,9 +145,17 @@ class PhasePlane:
     limits : sequence of Limit
     path : JointPath
         At least three stations.
+    rate : (P,) ndarray, optional
+        About how fast it will be, dp/dt at the stations, 1/s: limits are linearised there first. By default the path
+        takes 1 s.
     """
 
-    def __init__(self, limits: Sequence[Limit], path: JointPath) -> None:
+    def __init__(
+        self,
+        limits: Sequence[Limit],
+        path: JointPath,
+        rate: np.ndarray | None = None,
+    ) -> None:
         self.path = path
         self._middles = path.middles()
         self._limits = [
@@ -159,8 +167,10 @@ class PhasePlane:
         self._narrower: Mapping[Limit, np.ndarray] = {}
         self._most_acceleration = np.inf
         self._rounds: list[list[_Rows]] = []
-        rate = np.full(len(self._steps), path.p[-1] - path.p[0])
-        self._linearise(Passage(self._middles, rate, np.zeros_like(rate)))
+        if rate is None:
+            rate = np.full(len(path.p), path.p[-1] - path.p[0])
+        middle = _not_too_slow(0.5 * (rate[1:] + rate[:-1]))
+        self._linearise(Passage(self._middles, middle, np.zeros_like(middle)))
 
     def _linearise(self, motion: Passage) -> None:
         """Write the limits at a motion half-way between the stations, and the bounds that follow."""
@@ -276,8 +286,13 @@ class PhasePlane:
                 found.append(np.median(np.abs(by_qddot), axis=0).max(axis=0))
         return np.max(found, axis=0)
 
-    def solve(self, rates: tuple[float, float] = (0.0, 0.0)) -> Timing | None:
-        """Find the fastest timing with dp/dt given at both ends, 1/s; None if the joint path cannot be followed."""
+    def solve(
+        self, rates: tuple[float, float] = (0.0, 0.0), agreement: float = AGREEMENT
+    ) -> Timing | None:
+        """Find the fastest timing with dp/dt given at both ends, 1/s; None if the joint path cannot be followed.
+
+        Linearisations end where they change the time by no more than a part of it, `agreement`.
+        """
         best: Timing | None = None
         error = np.inf
         factor = 1.0
@@ -296,7 +311,8 @@ class PhasePlane:
             best = timing
             motion = self._pass(timing)
             error = max((own.error(motion) for own in self._rounds[0]), default=0.0)
-            if change < _AGREE or error < _AGREE:
+            is_enough = change < agreement and error < _CREDIBLE
+            if is_enough or change < AGREEMENT or error < agreement:
                 break
             factor = 1.0
             self._linearise(motion)
@@ -304,8 +320,7 @@ class PhasePlane:
 
     def _pass(self, timing: Timing) -> Passage:
         """Pass the path half-way between its stations; nowhere so slow that friction vanishes."""
-        rate = timing.middle_rate
-        rate = np.maximum(rate, _SLOWEST * np.median(rate))
+        rate = _not_too_slow(timing.middle_rate)
         return Passage(self._middles, rate, timing.acceleration)
 
     def _slow_down(self, motion: Passage, factor: float) -> Passage:
@@ -318,7 +333,7 @@ class PhasePlane:
         """Whether another linearisation would give other rows."""
         motion = self._slow_down(self._motion, 0.5)
         rows = (own for own in self._rounds[0] if own.by_u is not None)
-        return any(own.error(motion) > _AGREE for own in rows)
+        return any(own.error(motion) > AGREEMENT for own in rows)
 
     def times(self, rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray | None:
         """Find when the stations are passed, (P,), s; see `solve`."""
@@ -413,6 +428,11 @@ class PhasePlane:
             rates = np.full(len(self._steps), rate)
             self._linearise(Passage(self._middles, rates, np.zeros_like(rates)))
         return rate, label
+
+
+def _not_too_slow(rate: np.ndarray) -> np.ndarray:
+    """Return rates nowhere so slow that friction vanishes."""
+    return np.maximum(rate, _SLOWEST * np.median(rate))
 
 
 def is_left_out(limit: Limit) -> bool:
