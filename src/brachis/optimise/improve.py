@@ -15,6 +15,7 @@ import numpy as np
 from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
+from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.backends import (
     Problem,
@@ -24,6 +25,7 @@ from brachis.optimise.backends import (
     SolverReport,
     SolveStatus,
 )
+from brachis.optimise.guess import worst_time_scaling_ratio
 from brachis.optimise.near_rows import solve_near_rows
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
@@ -203,6 +205,29 @@ def with_last(
     return (*(report for report in reports if report is not last), last)
 
 
+def _slow_down(program: Program, x: np.ndarray) -> np.ndarray:
+    """Return the motion as much slower as limits are exceeded by, if that is little.
+
+    The first subproblem of a solver then has a feasible point. Without one, a trust region shrinks to nothing, and from
+    a motion that is all but optimal on a coarser mesh it takes tens of iterations to grow again.
+    """
+    try:
+        for _ in range(_TIMES_SLOWED):
+            ratio = worst_time_scaling_ratio(program, x)
+            if not 1.0 + _NOTHING < ratio < _TOO_FAST:
+                break
+            x = program.with_time_scaled(x, np.sqrt(ratio) * (1.0 + _NOTHING))
+    except UnreachableError:
+        pass
+    return x
+
+
+_NOTHING = 1e-7
+"""Part of a limit by which it may be exceeded at the start of a solve."""
+_TOO_FAST = 1.1
+"""Ratio to a limit from which on a start is another motion, and not one that is nearly within the limits."""
+_TIMES_SLOWED = 4
+"""Times that a start is slowed down: with friction and gravity torques do not fall with the square of the time."""
 _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
@@ -280,6 +305,8 @@ class SolverSession:
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,)."""
+        if isinstance(program, Program):
+            x = _slow_down(program, x)
         # Only the time that is not given can get shorter.
         share = program.free_time(x) / program.end_time(x) or 1.0
         progress = share * self.options.progress

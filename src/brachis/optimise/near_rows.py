@@ -35,6 +35,8 @@ _FIRST_VIOLATION = 0.15
 """Largest violation of a first point that counts as a fast motion."""
 _LAST_VIOLATION = 0.5
 """Violation of other rows above which an answer is another motion: then all rows are needed."""
+_LOSS = 1e-3
+"""Part of the objective by which a motion may be worse than the first one, which exceeds limits by a little."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
 
@@ -106,6 +108,7 @@ def solve_near_rows(
     kept = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
     if len(kept) > _MOST_KEPT * len(slack):
         return solve(program, x)
+    first = program.objective(x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
         report = solve(NearRows(program, kept), x)
@@ -113,7 +116,11 @@ def solve_near_rows(
         slack = _slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
         is_over = report.status is SolveStatus.TIME_LIMIT
-        if is_over or (report.status.usable and not len(missing)):
+        # With all rows a solve that used up its iterations would take no fewer.
+        is_spent = report.status is SolveStatus.ITERATION_LIMIT and report.feasible
+        is_good = is_spent and report.objective <= first * (1.0 + _LOSS)
+        is_done = report.status.usable or is_good
+        if is_over or (is_done and not len(missing)):
             return _complete(program, kept, reports)
         if not report.status.usable or slack.min() < -_LAST_VIOLATION:
             break

@@ -25,6 +25,9 @@ _STATUS = {
     -13: SolveStatus.EVALUATION_ERROR,
 }
 
+_SMALL_BARRIER = 1e-5
+"""Barrier parameter up to which an iterate tells whether the solve has settled."""
+
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
@@ -43,10 +46,18 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         return write
 
     def intermediate(
-        _mode: int, _iteration: int, objective: float, infeasibility: float, *_: float
+        _mode: int,
+        _iteration: int,
+        objective: float,
+        infeasibility: float,
+        _slope: float,
+        barrier: float,
+        *_: float,
     ) -> bool:
         stop = monitor.between_iterations(objective)
-        return not (monitor.has_settled(objective, infeasibility) or stop)
+        # From a fast motion the barrier leads to a slower one first.
+        own = infeasibility if barrier <= _SMALL_BARRIER else np.inf
+        return not (monitor.has_settled(objective, own) or stop)
 
     def clip(bounds: np.ndarray) -> np.ndarray:
         return np.clip(bounds, -2e19, 2e19)  # IPOPT takes 1e19 for infinity
