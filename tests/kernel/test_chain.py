@@ -59,6 +59,28 @@ def test_mass_matrices(case):
         assert agrees(matrix, upper + np.triu(upper, 1).T)
 
 
+def test_rotors_and_friction(case):
+    model, frame, bare, (q, qdot, qddot) = case
+    table = np.random.default_rng(7).uniform(0.1, 3.0, (bare.n, 4))
+    table[0, 2] = 0.0  # no Coulomb friction
+    armature, viscous, coulomb, speed = table.T
+    chain = chain_of(model, frame, table)
+    own = armature * qddot + viscous * qdot + coulomb * np.tanh(qdot / speed)
+    assert agrees(chain.torques(q, qdot, qddot), bare.torques(q, qdot, qddot) + own)
+    slope = viscous + coulomb / speed / np.cosh(qdot / speed) ** 2
+    diagonal = np.eye(bare.n)
+    more = (0.0, slope[:, None] * diagonal, armature * diagonal)
+    parts = zip(
+        chain.torque_derivatives(q, qdot, qddot),
+        bare.torque_derivatives(q, qdot, qddot),
+        more,
+        strict=True,
+    )
+    for found, rigid, added in parts:
+        assert agrees(found, rigid + added)
+    assert agrees(chain.mass_matrices(q), bare.mass_matrices(q) + armature * diagonal)
+
+
 @pytest.mark.parametrize("in_tool_axes", [True, False])
 def test_tool(case, in_tool_axes):
     model, frame, chain, (q, *_) = case

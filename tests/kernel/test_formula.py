@@ -73,6 +73,15 @@ def test_what_has_no_value_is_not_finite():
     assert not np.isfinite(found).any()
 
 
+def test_a_row_is_found_as_a_whole():
+    whole = Formula.of(lambda a: np.stack([sqrt(a[:, 0]), a[:, 1]], axis=1), 2)
+    points = np.array([[4.0, 5.0], [-1.0, 5.0], [4.0, np.inf]])
+    found = whole(points, is_whole=True)
+    np.testing.assert_array_equal(found[0], [2.0, 5.0])
+    assert np.isnan(found[1:]).all()
+    assert whole(points)[1, 1] == 5.0
+
+
 def test_points_of_another_size_are_refused(points):
     with pytest.raises(ValueError, match="needed"):
         Formula.of(everything, 2, 1)(*points[::-1])

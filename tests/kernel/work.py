@@ -12,10 +12,14 @@ from brachis.kernel import (
     PathMotion,
     Prescribed,
     apply_chain_rule,
+    count_turns,
+    find_entries,
     find_least_singular,
     find_postures,
+    follow_turns,
     formula,
     library,
+    pick_nearest,
 )
 
 POINTS, N = 61, 7
@@ -36,6 +40,7 @@ def work() -> None:
         centers=rng.normal(size=(N, 3)),
         inertias=np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 1.0], (N, 1)),
         gravity=np.array([0.0, 0.0, -9.81]),
+        friction=rng.uniform(0.1, 1.0, (N, 4)),
     )
     q, qdot, qddot = rng.normal(size=(3, POINTS, N))
     chain.torques(q, qdot, qddot)
@@ -49,7 +54,14 @@ def work() -> None:
     slopes = motion.derivatives()
     find_least_singular(motion.inverse)
     whole = MotionSlopes(motion.gradient, *slopes)
-    apply_chain_rule([((*partials, None), None)], [N], whole)
+    table = apply_chain_rule([((*partials, None), None)], [N], whole)
+    every = np.ones((2, 3, POINTS, 2))
+    places = np.arange(POINTS)
+    find_entries(table, every, places, places % 2, np.ones((3, POINTS)))
+    mask = np.ones(N)
+    follow_turns(q.copy(), mask, q[0])
+    count_turns(q.copy(), (qdot, qddot), places, q[0], mask, 0.0 * mask)
+    pick_nearest(rng.normal(size=(POINTS, 8, N)), mask, q[:1], follows=True)
     positions, rotations, _ = chain.tool(q, in_tool_axes=True)
     targets = np.concatenate([positions, rotations.reshape(POINTS, 9)], axis=1)
     find_postures(

@@ -7,9 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from brachis.common.deadline import Deadline
-from brachis.optimise.backends import SolverReport, SolveStatus
-from brachis.optimise.improve import SolvedProgram, attempt_once, improve
+from brachis.common.deadline import NEVER, Deadline
+from brachis.optimise.backends import (
+    Solver,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
+from brachis.optimise.guess import shortest_time, worst_time_scaling_ratio
+from brachis.optimise.improve import (
+    SolvedProgram,
+    SolverSession,
+    attempt_once,
+    improve,
+)
+from brachis.optimise.program import Program
+from support.phases import phase_of
+from support.starts import starting_points
 
 
 @dataclass(frozen=True)
@@ -145,3 +159,21 @@ def test_the_answer_is_lengthened_by_the_factor():
     lengthened = SolvedProgram(Fake(5.0), FIRST.reports, time_scaled=1.01)
     assert lengthened.t_end == pytest.approx(5.05)
     assert lengthened.report.x[0] == 5.0
+
+
+@pytest.mark.parametrize(("factor", "moved"), [(0.99, True), (1.02, False)])
+def test_a_solve_begins_within_the_limits(factor, moved):
+    program = Program([phase_of("r1")])
+    held = shortest_time(program, next(starting_points(program)))
+    ratio = worst_time_scaling_ratio(program, held)
+    x = program.with_time_scaled(held, factor * np.sqrt(ratio))
+    begun = []
+
+    def run(monitor, x):
+        begun.append(x)
+        return monitor.report("fake", SolveStatus.OPTIMAL, x, None, "")
+
+    session = SolverSession(Solver("fake", run), SolverOptions(), NEVER)
+    session(program, x)
+    assert worst_time_scaling_ratio(program, begun[0]) <= 1.0 + 1e-6
+    assert bool(begun[0][0] > x[0]) == moved

@@ -1,5 +1,7 @@
 """A solve that sees the rows near their bounds ends where one ends that sees all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,3 +111,19 @@ def test_never_fewer_than_a_fifth_of_the_rows(solve, monkeypatch):
     report = solve_near_rows(Disc(), start, solve)
     assert COUNT / 5 <= solve.rows[0] < COUNT / 4
     assert report.objective == pytest.approx(-1.0, abs=1e-8)
+
+
+def test_all_iterations_are_not_used_up_again():
+    solves = []
+
+    def solve(problem, x):
+        solves.append(len(problem.lower))
+        (uno,) = solvers_for("uno")
+        report = uno.solve(problem, x, SolverOptions(max_iterations=2), None)
+        spent = SolveStatus.ITERATION_LIMIT
+        return replace(report, status=spent, objective=-1.0, violation=0.0)
+
+    start = 0.999 * np.array([np.cos(-1.5), np.sin(-1.5), 0.0])
+    report = solve_near_rows(Disc(), start, solve)
+    assert report.status is SolveStatus.ITERATION_LIMIT
+    assert len(solves) == 1
