@@ -64,6 +64,7 @@ def test_a_part_has_fewer_steps_and_the_same_values(points):
 
 def test_a_formula_comes_back_from_another_process(points):
     whole = Formula.of(everything, 2, 1)
+    whole(*points)
     again = pickle.loads(pickle.dumps(whole))  # noqa: S301  (our own)
     np.testing.assert_array_equal(again(*points), whole(*points))
 
@@ -76,7 +77,7 @@ def test_what_has_no_value_is_not_finite():
 def test_a_row_is_found_as_a_whole():
     whole = Formula.of(lambda a: np.stack([sqrt(a[:, 0]), a[:, 1]], axis=1), 2)
     points = np.array([[4.0, 5.0], [-1.0, 5.0], [4.0, np.inf]])
-    found = whole(points, is_whole=True)
+    found = whole(points, discard_incomplete=True)
     np.testing.assert_array_equal(found[0], [2.0, 5.0])
     assert np.isnan(found[1:]).all()
     assert whole(points)[1, 1] == 5.0

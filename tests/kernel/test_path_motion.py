@@ -221,6 +221,10 @@ def test_the_chain_rule(with_jerk):
         find_entries(found, every, points + 1, curves, basis)
     with pytest.raises(ValueError, match="curve"):
         find_entries(found, every, points, curves + 1, basis)
+    with pytest.raises(ValueError, match="as many"):
+        find_entries(found, every, points, curves[:-1], basis)
+    with pytest.raises(TypeError, match="cast"):
+        find_entries(found, every, 1.0 * points, curves, basis)
 
 
 def test_partials_by_the_jerk_need_its_slopes():

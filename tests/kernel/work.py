@@ -12,7 +12,6 @@ from brachis.kernel import (
     PathMotion,
     Prescribed,
     apply_chain_rule,
-    count_turns,
     find_entries,
     find_least_singular,
     find_postures,
@@ -20,6 +19,7 @@ from brachis.kernel import (
     formula,
     library,
     pick_nearest,
+    set_turns,
 )
 
 POINTS, N = 61, 7
@@ -60,7 +60,7 @@ def work() -> None:
     find_entries(table, every, places, places % 2, np.ones((3, POINTS)))
     mask = np.ones(N)
     follow_turns(q.copy(), mask, q[0])
-    count_turns(q.copy(), (qdot, qddot), places, q[0], mask, 0.0 * mask)
+    set_turns(q.copy(), (qdot, qddot), places, q[0], mask, 0.0 * mask)
     pick_nearest(rng.normal(size=(POINTS, 8, N)), mask, q[:1], follows=True)
     positions, rotations, _ = chain.tool(q, in_tool_axes=True)
     targets = np.concatenate([positions, rotations.reshape(POINTS, 9)], axis=1)

@@ -131,7 +131,7 @@ class FormulaSolver(FormulaMargins):
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Evaluate the answers of all branches."""
         formula = self._answers_formula(targets, q_r)
-        return formula(targets, q_r, is_whole=True)
+        return formula(targets, q_r, discard_incomplete=True)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
@@ -140,7 +140,7 @@ class FormulaSolver(FormulaMargins):
         formula = self._formula(
             branch, self._answers_formula(targets, q_r).part, branch
         )
-        return formula(targets, q_r, is_whole=True)
+        return formula(targets, q_r, discard_incomplete=True)
 
     def _answers_formula(self, *at: np.ndarray) -> Formula:
         counts = [own.shape[1] for own in at]

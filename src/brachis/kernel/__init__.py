@@ -14,7 +14,7 @@ from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Conditions, PathMotion, find_least_singular
 from brachis.kernel.rotations import body_twists, rotation_derivatives
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
-from brachis.kernel.turns import count_turns, follow_turns, pick_nearest
+from brachis.kernel.turns import follow_turns, pick_nearest, set_turns
 
 __all__ = [
     "Chain",
@@ -26,7 +26,6 @@ __all__ = [
     "apply_chain_rule",
     "body_twists",
     "bounds_of_pairs",
-    "count_turns",
     "find_entries",
     "find_least_singular",
     "find_postures",
@@ -38,5 +37,6 @@ __all__ = [
     "pick_nearest",
     "rotation_derivatives",
     "rotation_vectors",
+    "set_turns",
     "tool_derivatives",
 ]

@@ -18,7 +18,7 @@ typedef struct {
     const double *centers;       /* (n, 3): of mass, m */
     const double *inertias;      /* (n, 6): xx, xy, xz, yy, yz, zz about the center of mass, kg m^2 */
     const double *gravity;       /* (3), m/s^2 */
-    const double *friction;      /* (n, 4): armature, viscous and Coulomb term, and the speed over which that changes sign */
+    const double *friction;      /* (n, 4): rotor inertia, viscous and Coulomb term, and v_eps of tanh(qdot / v_eps) */
 } chain;
 
 /* Motion of a body, or the axis of a joint: angular part, and linear part at the world's origin. */

@@ -58,8 +58,8 @@ class Chain:
     gravity : (3,) ndarray, optional
         m/s^2.
     friction : (n, 4) ndarray, optional
-        Of each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; speed over which this one changes
-        sign, rad/s. Of a prismatic joint kg, N s/m, N, m/s.
+        Of each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; v_eps of ``tanh(qdot / v_eps)``,
+        rad/s. Of a prismatic joint kg, N s/m, N, m/s.
     """
 
     revolute: np.ndarray

@@ -85,11 +85,11 @@ void brachis_chain_rule(
     }
 }
 
-/* Entries of a Jacobian, (broad K + z, columns). The first ones are of what moves all curves, at each of the K points: by
-`every`, (broad, orders, K, width), which are slopes of the curves and their time derivatives. Each of the others moves one
+/* Entries of a Jacobian, (broad K + z, columns). First those of variables that move all curves, at each of the K points:
+`shared`, (broad, orders, K, width), are slopes of the curves and their time derivatives by them. Each of the others moves one
 curve at one point, by `basis`, (orders, z). */
 void brachis_entries(
-    long orders, long count, long columns, long width, const double *table, long broad, const double *every,
+    long orders, long count, long columns, long width, const double *table, long broad, const double *shared,
     long entries, const long *points, const long *curves, const double *basis, double *found
 )
 {
@@ -100,7 +100,7 @@ void brachis_entries(
     for (long order = 0; order < orders; order++) {
         for (long row = 0; row < broad * count; row++) {
             const double *slopes = table + (order * count + row % count) * columns * width;
-            const double *factors = every + ((row / count * orders + order) * count + row % count) * width;
+            const double *factors = shared + ((row / count * orders + order) * count + row % count) * width;
             for (long i = 0; i < columns; i++) {
                 for (long j = 0; j < width; j++) {
                     found[row * columns + i] += slopes[i * width + j] * factors[j];

@@ -11,6 +11,9 @@ import numpy as np
 
 from brachis.kernel.library import address, as_doubles, load
 
+_PARTIAL = (("numbers", np.intp), ("step", "l"))
+"""`partial` of chain_rule.c."""
+
 
 @dataclass(frozen=True, eq=False)
 class MotionSlopes:
@@ -31,6 +34,15 @@ class MotionSlopes:
 
 
 Partial = np.ndarray | None
+_PARTS = ("q", "qdot", "qddot", "qdddot")
+_GROUP = np.dtype(
+    [
+        *((f"{part}_{name}", kind) for part in _PARTS for name, kind in _PARTIAL),
+        ("s", np.intp),
+        ("values", "l"),
+    ]
+)
+"""`group` of chain_rule.c."""
 
 
 def apply_chain_rule(
@@ -54,19 +66,25 @@ def apply_chain_rule(
         Slopes by y, ydot, yddot and, with `qdddot_y`, ydddot.
     """
     count, n, width = motion.gradient.shape
-    asks_for_jerk = any(by_joints[3] is not None for by_joints, _ in partials)
+    flat = [
+        (by_joints, by_s, size)
+        for (by_joints, by_s), size in zip(partials, sizes, strict=True)
+    ]
+    asks_for_jerk = any(by_joints[-1] is not None for by_joints, *_ in flat)
     if asks_for_jerk and motion.qdddot_y is None:
         raise ValueError("partials by qdddot need qdddot_y")
     kept: list[np.ndarray] = []
     groups = []
-    for (by_joints, by_s), size in zip(partials, sizes, strict=True):
-        of_joints = [_place_partials(own, (count, size, n), kept) for own in by_joints]
+    for (q, qdot, qddot, qdddot), by_s, size in flat:
+        parts = (q, qdot, qddot, qdddot)
+        places = [_place_partials(own, (count, size, n), kept) for own in parts]
         along = _place(by_s, (count, size), kept)
-        groups.append([*itertools.chain.from_iterable(of_joints), along, size])
-    parts = [_place(own, (count, n, width), kept) for own in vars(motion).values()]
-    # As `group` and `motion_slopes` of chain_rule.c are in memory.
-    own_groups = np.array(groups, dtype=np.int64)
-    slopes = np.array(parts, dtype=np.int64)
+        groups.append((*itertools.chain.from_iterable(places), along, size))
+    own_groups = np.array(groups, dtype=_GROUP)
+    slopes = np.array(
+        [_place(own, (count, n, width), kept) for own in vars(motion).values()],
+        dtype=np.intp,
+    )
     orders = 3 if motion.qdddot_y is None else 4
     table = np.empty((orders, count, sum(sizes), width))
     load().brachis_chain_rule(
@@ -84,7 +102,7 @@ def apply_chain_rule(
 
 
 def _place(values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]) -> int:
-    """Return where numbers are, 0 where there are none; what is added to `kept` has to stay alive."""
+    """Return where numbers are, 0 if there are none; what is added to `kept` has to stay alive."""
     if values is None:
         return 0
     kept.append(as_doubles(values, shape))
@@ -94,42 +112,46 @@ def _place(values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]) -> i
 def _place_partials(
     values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]
 ) -> tuple[int, int]:
-    """Return the same, and how far the numbers of one point are from those of the next."""
-    is_constant = values is not None and values.strides[0] == 0 and shape[0] > 1
-    if is_constant and values is not None and values.shape == shape:
+    """Return where partials are, and how far those of one point are from those of the next; see `_place`."""
+    if values is None:
+        return 0, 0
+    is_constant = values.strides[0] == 0 and shape[0] > 1
+    if is_constant and values.shape == shape:
         return _place(values[0], shape[1:], kept), 0
     return _place(values, shape, kept), math.prod(shape[1:])
 
 
 def find_entries(
     slopes: np.ndarray,
-    every: np.ndarray,
+    shared: np.ndarray,
     points: np.ndarray,
     curves: np.ndarray,
     basis: np.ndarray,
 ) -> np.ndarray:
-    """Entries of a Jacobian, (b K + z, c), of what moves all curves, and of what moves one of them at one point.
+    """Entries of a Jacobian, (b K + z, c): first of b variables that move all curves, then of variables of one curve.
 
     Parameters
     ----------
     slopes : (orders, K, c, width) ndarray
         As of `apply_chain_rule`.
-    every : (b, orders, K, width) ndarray
-        Slopes of the curves and their time derivatives, at every point, by what moves all of them.
+    shared : (b, orders, K, width) ndarray
+        Slopes of the curves and their time derivatives by the b variables, at all points.
     points, curves : (z,) int64 ndarray
-        Where the others matter.
+        At which point the others matter, and for which curve.
     basis : (orders, z) ndarray
-        Slopes of the curve and its time derivatives by them.
+        Slopes of this curve and its time derivatives by them.
     """
     orders, count, columns, width = slopes.shape
+    if not points.shape == curves.shape == basis.shape[1:]:
+        raise ValueError("points, curves and basis are not as many")
     for numbers, most, name in (points, count, "point"), (curves, width, "curve"):
         if len(numbers) and not 0 <= numbers.min() <= numbers.max() < most:
             raise ValueError(f"a {name} does not exist; there are {most}")
-    broad = len(every)
+    broad = len(shared)
     entries = len(points)
     table = as_doubles(slopes, slopes.shape)
-    factors = as_doubles(every, (broad, orders, count, width))
-    places = [np.ascontiguousarray(own, dtype="l") for own in (points, curves)]
+    factors = as_doubles(shared, (broad, orders, count, width))
+    places = [own.astype("l", casting="same_kind") for own in (points, curves)]
     own_basis = as_doubles(basis, (orders, entries))
     found = np.empty((broad * count + entries, columns))
     load().brachis_entries(

@@ -177,7 +177,7 @@ static inline void pass_joint(
     move_body(own, *v, *a);
 }
 
-/* Torque of joint i against rotor and friction, and its slope by the joint's velocity. */
+/* Torque for rotor inertia and friction of joint i, and its slope by the joint's velocity. */
 static inline pack resist(const chain *arm, long i, pack rate, pack acceleration, pack *slope)
 {
     const double *own = arm->friction + 4 * i;

@@ -14,8 +14,8 @@ enum { ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SQRT, SIN, COS, ARCCOS, ARCTAN2,
     break
 
 /* Evaluate at K points, (K, inputs). Numbers are the inputs, then the constants, then what each step gives; those that
-are wanted are found, (K, outputs). `numbers` has room for all of them. Of `together` of them, one after the other, all
-are NaN if one is not finite; with 0 they stay. */
+are wanted are found, (K, outputs). `numbers` has room for all of them. They come in groups of
+`together`: a group with a number that is not finite becomes NaN throughout; 0 turns this off. */
 void brachis_formula(
     long inputs, long constants, const double *constant, long steps, const step *step_of, long count,
     const double *points, long outputs, const int *wanted, long together, double (*numbers)[SIDE_BY_SIDE],

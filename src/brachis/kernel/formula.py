@@ -327,10 +327,12 @@ class Formula:
             self.counts, wanted.shape, constants, steps, place[wanted].ravel()
         )
 
-    def __call__(self, *points: np.ndarray, is_whole: bool = False) -> np.ndarray:
+    def __call__(
+        self, *points: np.ndarray, discard_incomplete: bool = False
+    ) -> np.ndarray:
         """Evaluate at K points, (K, count) for every argument; returns (K, ...).
 
-        With `is_whole` a row of the last axis is found as a whole: it is NaN where one of its numbers is not finite.
+        With `discard_incomplete` a row of the last axis becomes NaN throughout if one of its numbers is not finite.
         """
         count = len(points[0])
         pairs = zip(points, self.counts, strict=True)
@@ -349,7 +351,7 @@ class Formula:
             address(inputs),
             len(self.wanted),
             wanted,
-            self.shape[-1] if is_whole else 0,
+            self.shape[-1] if discard_incomplete else 0,
             address(numbers),
             address(found),
         )

@@ -40,7 +40,7 @@ FUNCTIONS = {
     "brachis_entries": "- llllplplpppp",
     "brachis_pick_nearest": "- lllppipp",
     "brachis_follow_turns": "- llppp",
-    "brachis_count_turns": "i llppppppp",
+    "brachis_set_turns": "i llppppppp",
     "brachis_largest_parts": "- lllpppp",
     "brachis_formula": "- llplplplplpp",
     "brachis_side_by_side": "l ",
@@ -93,6 +93,22 @@ def address(values: np.ndarray) -> int:
     except (TypeError, ValueError):  # read-only, or empty
         place, _ = values.__array_interface__["data"]
         return int(place)
+
+
+def where_written(values: np.ndarray, shape: tuple[int, ...]) -> int:
+    """Return where the numbers of an array begin that the library writes to.
+
+    Raises
+    ------
+    ValueError
+        It is not a writeable, contiguous array of doubles of this shape.
+    """
+    flags = values.flags
+    if values.dtype is not _DOUBLE or not (flags.c_contiguous and flags.writeable):
+        raise ValueError("an array is not writeable, contiguous and of doubles")
+    if values.shape != shape:
+        raise ValueError(f"an array has the shape {values.shape}; needed: {shape}")
+    return address(values)
 
 
 def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:

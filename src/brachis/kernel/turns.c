@@ -4,9 +4,8 @@
 
 static const double TURN = 6.283185307179586476925;
 
-/* Put angles at successive times, columns of a table (K, columns), into the turns nearest to the ones before; the first
-ones into those nearest to `start`, (columns). Other columns, where `turns` is 0, stay, and so do all if one number is not
-finite. */
+/* Put angles at successive times, columns of a table (K, columns), into the turns nearest to the ones before. The first row
+gets those nearest to `start`, (columns). Columns whose `turns` is 0 stay, and so do all if one number is not finite. */
 void brachis_follow_turns(long count, long columns, const double *turns, const double *start, double *table)
 {
     double sum = 0.0;
@@ -26,14 +25,14 @@ void brachis_follow_turns(long count, long columns, const double *turns, const d
     }
 }
 
-/* Put angles, columns of q, (K, n), into the turns that their own velocities and accelerations lead to at times t, (K);
-the first ones into those nearest to `start`, (n). The step of an angle is that of the quintic through both ends,
+/* Put angles, columns of q, (K, n), into the turns to which their velocities and accelerations lead at times t, (K). The first
+row gets those nearest to `start`, (n). The predicted step of an angle is that of the quintic through both ends,
 
     h (v0 + v1) / 2 - h^2 (a1 - a0) / 12.
 
-Columns are left alone where `turns` is 0. Returns 0 where a number of turns cannot be told: it is more than a quarter of a
-turn beside this, at an angle whose `ranged` is not 0. */
-int brachis_count_turns(
+Columns whose `turns` is 0 stay. Returns 0 if the predicted step of a joint with `ranged` differs from every possible step by
+more than a quarter turn; q is then of no use. */
+int brachis_set_turns(
     long count, long n, const double *turns, const double *ranged, const double *start, const double *t,
     const double *qdot, const double *qddot, double *q
 )
@@ -63,8 +62,8 @@ int brachis_count_turns(
     return 1;
 }
 
-/* Of answers at successive times, (K, answers, columns), take those nearest to `near`, (K, columns); or, if `follows` is not
-0, nearest to the one taken before, at first to its first row. Columns where `turns` is not 0 count modulo turns. Where no
+/* Take the nearest of several answers, (K, answers, columns), at each time: nearest to `near`, (K, columns), or, if `follows`
+is not 0, to the answer before, at first to the first row of `near`. Columns whose `turns` is not 0 count modulo turns. If no
 answer is finite, the first one is taken. */
 void brachis_pick_nearest(
     long count, long answers, long columns, const double *turns, const double *near, int follows, const double *table,

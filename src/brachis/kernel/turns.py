@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import address, as_doubles, load, where_written
 
 
 def follow_turns(angles: np.ndarray, turning: np.ndarray, start: np.ndarray) -> None:
@@ -13,18 +13,19 @@ def follow_turns(angles: np.ndarray, turning: np.ndarray, start: np.ndarray) -> 
     Parameters
     ----------
     angles : (K, m) ndarray
-        Contiguous; is written to. If a number is not finite, nothing is done.
+        Is written to. If a number is not finite, it stays as it is.
     turning : (m,) ndarray
-        Columns that are angles, 1; else 0.
+        1 for columns that are angles; else 0.
     start : (m,) ndarray
-        To which the first ones are nearest.
+        The first row gets the turns nearest to these.
     """
     count, columns = angles.shape
     kept = as_doubles(turning, (columns,)), as_doubles(start, (columns,))
-    load().brachis_follow_turns(count, columns, *map(address, kept), address(angles))
+    place = where_written(angles, (count, columns))
+    load().brachis_follow_turns(count, columns, *map(address, kept), place)
 
 
-def count_turns(
+def set_turns(
     q: np.ndarray,
     motion: tuple[np.ndarray, np.ndarray],
     t: np.ndarray,
@@ -32,45 +33,50 @@ def count_turns(
     turning: np.ndarray,
     ranged: np.ndarray,
 ) -> bool:
-    """Put joints into the turns to which their velocities and accelerations lead; tell whether that is possible.
+    """Put joints into the turns to which their velocities and accelerations lead; return whether that was possible.
 
     Parameters
     ----------
     q : (K, n) ndarray
-        Contiguous; is written to.
+        Is written to; if the turns are not certain, it is of no use afterwards.
     motion : tuple of (K, n) ndarray
         Velocities and accelerations.
     t : (K,) ndarray
         Times, ascending.
     start : (n,) ndarray
-        To which the first posture is nearest.
-    turning, ranged : (n,) ndarray
-        Joints whose turns are counted, 1; those of them that must be told with certainty, 1.
+        The first row gets the turns nearest to this posture.
+    turning : (n,) ndarray
+        1 for joints whose turns are counted; else 0.
+    ranged : (n,) ndarray
+        1 for joints with a finite range: their turns must be certain.
     """
     count, n = q.shape
     kept = [as_doubles(own, (n,)) for own in (turning, ranged, start)]
     kept.append(as_doubles(t, (count,)))
     kept.extend(as_doubles(own, (count, n)) for own in motion)
-    return bool(load().brachis_count_turns(count, n, *map(address, kept), address(q)))
+    place = where_written(q, (count, n))
+    return bool(load().brachis_set_turns(count, n, *map(address, kept), place))
 
 
 def pick_nearest(
     answers: np.ndarray, turning: np.ndarray, near: np.ndarray, *, follows: bool
 ) -> np.ndarray:
-    """Take one of several answers at each of K successive times, (K, m), the nearest one modulo turns.
+    """Take the nearest of several answers, modulo turns, at each of K successive times, (K, m).
 
     Parameters
     ----------
     answers : (K, A, m) ndarray
-        Not finite where there is none; without any the first is taken.
+        A answers, of which at least one; those that do not exist are not finite. If none exists, the first is taken.
     turning : (m,) ndarray
-        Columns that are angles, 1; else 0.
+        1 for columns that are angles; else 0.
     near : (K, m) ndarray
-        To which they are nearest; one row is enough where each follows its predecessor.
+        The answers nearest to these are taken; with `follows` (1, m).
     follows : bool
-        Whether each is the nearest to its predecessor, and the first one to the first row of `near`.
+        Whether the answer nearest to the one before is taken, at first the one nearest to `near`.
     """
     count, alternatives, columns = answers.shape
+    if not alternatives:
+        raise ValueError("there are no answers to choose from")
     given = (
         as_doubles(turning, (columns,)),
         as_doubles(near, (1 if follows else count, columns)),

@@ -20,7 +20,7 @@ import numpy as np
 from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
-from brachis.kernel import Conditions, count_turns, follow_turns, pick_nearest
+from brachis.kernel import Conditions, follow_turns, pick_nearest, set_turns
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
@@ -114,13 +114,16 @@ class ClosedFormMap(PathMap):
         """
         sample = sample or self.path.sample(y[:, 0])
         answers = self.solver.solve_branch(sample.target, y[:, 1:], self.branch)
-        beside = self.start[None] if near is None else near
         if self.solver.alternatives == 1:
             answers = answers[:, 0]
         else:
-            beside = beside[:, self.nonredundant]
-            follows = near is None
-            answers = pick_nearest(answers, self._turning, beside, follows=follows)
+            reference = self.start[None] if near is None else near
+            answers = pick_nearest(
+                answers,
+                self._turning,
+                reference[:, self.nonredundant],
+                follows=near is None,
+            )
         q = np.empty((len(y), self.robot.n))
         q[:, self.redundant] = y[:, 1:]
         q[:, self.nonredundant] = answers
@@ -145,7 +148,7 @@ class ClosedFormMap(PathMap):
         if t is None or not self._ranged.any():
             return q  # no limit asks which turn an angle is in
         masks = self._turns, self._ranged
-        if not count_turns(q, (qdot, qddot), t, self.start, *masks):
+        if not set_turns(q, (qdot, qddot), t, self.start, *masks):
             raise UnreachableError(
                 "a joint turns too far between collocation points to count its turns"
             )

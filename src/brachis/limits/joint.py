@@ -57,7 +57,7 @@ class JointLimit(Limit):
         row = LIMIT_KINDS[self.kind]
         self._robot = robot
         self._joints = joints
-        self._is_of_all = len(joints) == robot.n
+        self._is_of_all = np.array_equal(joints, np.arange(robot.n))
         self._ends = robot.limits.both_ways(self.kind)[:, joints]
         self._measure(*self._ends)
         units = [robot.position_units[i] for i in joints]

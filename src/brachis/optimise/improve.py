@@ -25,7 +25,6 @@ from brachis.optimise.backends import (
     SolverReport,
     SolveStatus,
 )
-from brachis.optimise.guess import worst_time_scaling_ratio
 from brachis.optimise.near_rows import solve_near_rows
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
@@ -205,29 +204,50 @@ def with_last(
     return (*(report for report in reports if report is not last), last)
 
 
+_START_TOLERANCE = 1e-7
+"""Part of a limit by which a solve may exceed it at its start."""
+_LARGEST_START_RATIO = 1.1
+"""Ratio to a limit above which a start is not made to hold it."""
+_SLOWED = 4
+"""Number of times that a start is slowed down: gravity and friction do not get less."""
+
+
 def _slow_down(program: Program, x: np.ndarray) -> np.ndarray:
-    """Return the motion as much slower as limits are exceeded by, if that is little.
+    """Slow a motion, (v,), down until it is within the limits, if it exceeds them by less than 10 %.
 
-    The first subproblem of a solver then has a feasible point. Without one, a trust region shrinks to nothing, and from
-    a motion that is all but optimal on a coarser mesh it takes tens of iterations to grow again.
+    The first subproblem of a solver then has a feasible point. Without one a trust region shrinks to nothing, and needs
+    tens of iterations to grow again.
     """
+    best = x
     try:
-        for _ in range(_TIMES_SLOWED):
-            ratio = worst_time_scaling_ratio(program, x)
-            if not 1.0 + _NOTHING < ratio < _TOO_FAST:
+        least = _worst_ratio(program, x)
+        power = 2.0  # of the time with which the ratio falls, by the last step
+        for _ in range(_SLOWED):
+            if not 1.0 + _START_TOLERANCE < least < _LARGEST_START_RATIO:
                 break
-            x = program.with_time_scaled(x, np.sqrt(ratio) * (1.0 + _NOTHING))
+            factor = least ** (1.0 / power) * (1.0 + _START_TOLERANCE)
+            slower = program.with_time_scaled(best, factor)
+            ratio = _worst_ratio(program, slower)
+            if ratio >= least or np.any(slower > program.x_upper):
+                break
+            power = max(np.log(least / ratio) / np.log(factor), 0.1)
+            best = slower
+            least = ratio
     except UnreachableError:
-        pass
-    return x
+        return x
+    return best
 
 
-_NOTHING = 1e-7
-"""Part of a limit by which it may be exceeded at the start of a solve."""
-_TOO_FAST = 1.1
-"""Ratio to a limit from which on a start is another motion, and not one that is nearly within the limits."""
-_TIMES_SLOWED = 4
-"""Times that a start is slowed down: with friction and gravity torques do not fall with the square of the time."""
+def _worst_ratio(program: Program, x: np.ndarray) -> float:
+    """Largest ratio to a limit that a longer time relieves at single points, where the time is not given."""
+    ratios = [
+        np.abs(phase.time_scaling_ratios(part, with_means=False)).max(initial=0.0)
+        for phase, part in program.split(x)
+        if phase.time_law is None
+    ]
+    return float(max(ratios, default=0.0))
+
+
 _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
@@ -304,7 +324,7 @@ class SolverSession:
         return dataclasses.replace(self, options=own, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
-        """Solve a program from the point x, (v,)."""
+        """Solve a program from the point x, (v,), or from a slightly slower motion that is within the limits."""
         if isinstance(program, Program):
             x = _slow_down(program, x)
         # Only the time that is not given can get shorter.

@@ -121,8 +121,8 @@ class Layout:
         Where the variables of each curve matter.
     point, variable : (z,) int ndarray
         Where variables matter at all, by T, by each curve, then by h.
-    curve : (z',) int ndarray
-        Which curve each of those between T and h moves.
+    curve_point, curve : (z',) int ndarray
+        Point and number of the curve of each entry between those of T and h.
     progress : Progress
         Differences of control points of s; empty without a path.
     limit_rows : tuple of (K, c) int ndarray
@@ -139,6 +139,7 @@ class Layout:
     patterns: tuple[SparsityPattern, ...]
     point: np.ndarray
     variable: np.ndarray
+    curve_point: np.ndarray
     curve: np.ndarray
     progress: Progress
     limit_rows: tuple[np.ndarray, ...]
@@ -193,6 +194,7 @@ class Layout:
         variable = np.concatenate([of_time, *of_curves, of_lengths])
         numbers = np.arange(len(splines)) + int(time_law is not None)
         curve = np.repeat(numbers, [len(pattern.point) for pattern in patterns])
+        curve_point = point[count : count + len(curve)]
 
         limit_rows = []
         first = 0
@@ -226,6 +228,7 @@ class Layout:
             patterns,
             point,
             variable,
+            curve_point,
             curve,
             progress,
             tuple(limit_rows),

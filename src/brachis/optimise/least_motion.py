@@ -43,10 +43,10 @@ _KEPT_BACK = 0.1 * tolerances.END_TIME
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
 _MANY = 150
-"""Variables of a phase beyond which active sets take seconds an iteration. A smoother motion that is as fast is not
-looked for then: on 34 tasks with up to 5,000 variables an interior point found none in 20 iterations."""
+"""Number of variables of a phase above which active sets take seconds an iteration. No smoother motion that is as fast
+is then looked for."""
 _FOR_MANY = "ipopt"
-"""For more variables, where the motion may be slower: there an interior point has room."""
+"""Backend for phases with more variables, where the motion may be slower."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,7 +171,9 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
 def _reason(report: SolverReport) -> str:
     """Say why a solve found no smoother motion; the advice of its status is for other solves."""
     if report.status is SolveStatus.TIME_LIMIT:
-        return "the time was over before a smoother one was found"
+        return "time ran out before a smoother one was found"
+    if report.status in (SolveStatus.EVALUATION_ERROR, SolveStatus.FAILED):
+        return report.status.value
     return f"{report.iterations} iterations found no smoother one within the limits"
 
 

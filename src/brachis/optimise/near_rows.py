@@ -116,9 +116,9 @@ def solve_near_rows(
         slack = _slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
         is_over = report.status is SolveStatus.TIME_LIMIT
-        # With all rows a solve that used up its iterations would take no fewer.
+        # With all rows the solve would use up its iterations too.
         is_spent = report.status is SolveStatus.ITERATION_LIMIT and report.feasible
-        is_good = is_spent and report.objective <= first * (1.0 + _LOSS)
+        is_good = is_spent and report.objective <= first + _LOSS * abs(first)
         is_done = report.status.usable or is_good
         if is_over or (is_done and not len(missing)):
             return _complete(program, kept, reports)

@@ -205,8 +205,8 @@ class PathPhase:
         phase = self.phase
         squares, _ = self._split(self.start)
         course = self.course(self.start, self._s)
+        rate = np.sqrt(squares)
         try:
-            rate = np.sqrt(squares)
             timed = TimedCourse(course, phase.joint_map, phase.limits, rate)
         except UnreachableError:
             return
@@ -220,7 +220,7 @@ class PathPhase:
         self.start[inner] = np.maximum(found[inner], _SLOWEST)
 
     def place_of(self, curve: _Number, end: int) -> _Number:
-        """Return the number of the variable that is a redundant curve's value at the start (0) or end (-1)."""
+        """Return the numbers of the variables that are redundant curves' values at the start (0) or end (-1)."""
         return len(self._s) + curve * self._count + end % self._count
 
     def _part(self, s: np.ndarray) -> np.ndarray:
@@ -335,14 +335,12 @@ class PathPhase:
         half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
         number = self._number
         of_step = y_ds / (2.0 * self._steps[number, None])
+        share = np.array([self._ahead, 1.0 - self._ahead])
+        units = self._units[np.array([number, number + 1])][:, :, None]
+        sign = np.array([-1.0, 1.0])[:, None, None]
         by_squares = np.zeros((2, 3, *y_ds.shape))
-        for own, station, share, sign in (
-            (by_squares[0], number, self._ahead, -1.0),
-            (by_squares[1], number + 1, 1.0 - self._ahead, 1.0),
-        ):
-            units = self._units[station, None]
-            own[1] = units * share * half * y_ds
-            own[2] = units * (share * y_dds + sign * of_step)
+        by_squares[:, 1] = units * share * half * y_ds
+        by_squares[:, 2] = units * (share * y_dds + sign * of_step)
         value, first, second, _ = self._basis
         basis = np.array([value, first * rate, second * square + first * u])
         slopes = self.evaluate(x).slopes[:3]

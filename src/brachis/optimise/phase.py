@@ -361,19 +361,18 @@ class Phase:
         )
         return evaluation.violation(is_checked_at_points)
 
-    def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
-        """Ratios, (K, c), to the limits that a longer time relieves; see `Limit.ratio`.
-
-        Raises UnreachableError as `evaluate` does.
-        """
+    def time_scaling_ratios(
+        self, x: np.ndarray, *, with_means: bool = True
+    ) -> np.ndarray:
+        """Ratios, (K, c), to limits that a longer time relieves, see `Limit.ratio`; raises as `evaluate` does."""
         every = np.zeros((len(self.t_norm), 1))
-        ratios = []
+        weights = self.grid.mean_weights(self._h(x))[None]
+        ratios = [np.empty((len(self.t_norm), 0))]
         for limit, values in zip(self.limits, self.evaluate(x).by_limit, strict=True):
-            if limit.longer_time != "relieves":
+            is_left_out = limit.guarantee.is_mean and not with_means
+            if limit.longer_time != "relieves" or is_left_out:
                 continue
-            own = values
-            if limit.guarantee.is_mean:
-                own = self.grid.mean_weights(self._h(x))[None] @ values
+            own = weights @ values if limit.guarantee.is_mean else values
             ratios.append(limit.ratio(own) + every)
         return np.hstack(ratios)
 
@@ -443,14 +442,12 @@ class Phase:
         """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""
         orders = len(by)
         layout = self._layout
-        basis = self._basis(x)
-        points = layout.point[len(self.t_norm) :][: basis.shape[1]]
         entries = find_entries(
             by,
             self._by_duration(x)[None, :orders],
-            points,
+            layout.curve_point,
             layout.curve,
-            basis[:orders],
+            self._basis(x)[:orders],
         )
         if not len(self.grid.point):
             return entries

@@ -123,14 +123,14 @@ class PhaseTiming:
         rates = np.array([side.derivatives[:1].sum() for side in sides])
 
         def lay(
-            s: np.ndarray, known: tuple[np.ndarray, np.ndarray] | None = None
+            s: np.ndarray, estimate: tuple[np.ndarray, np.ndarray] | None = None
         ) -> tuple[TimedCourse, tuple[float, float]]:
             coarse = course_at(s)
             derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
             state = phase.joint_map.state(*derivatives, t=s - begin)
             course = course_at(divide_turns(s, state.qdot))
-            rate = None if known is None else np.interp(course.p, *known)
-            timed = TimedCourse(course, phase.joint_map, phase.limits, rate)
+            sdot = None if estimate is None else np.interp(course.p, *estimate)
+            timed = TimedCourse(course, phase.joint_map, phase.limits, sdot)
             return timed, tuple(timed.speeds[[0, -1]] * rates)
 
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
@@ -139,11 +139,12 @@ class PhaseTiming:
             return cls(course, by_length, None)
         # Stations where the motion takes its time.
         t = np.linspace(0.0, timing.t_end, count)
-        known, rate = (own[:, 0] for own in course.curves(timing, t))
-        s = np.union1d(known.clip(begin, end), pieces)
+        y, ydot = course.curves(timing, t)
+        passed = np.maximum.accumulate(y[:, 0])
+        s = np.union1d(passed.clip(begin, end), pieces)
         s = s[np.append(np.diff(s) > tolerances.PATH, True)]
         s[0] = begin
-        course, by_length = lay(s, (known, rate))
+        course, by_length = lay(s, (passed, ydot[:, 0]))
         law = phase.time_law
         given = None if law is None else law.duration
         return cls(course, by_length, course.solve(by_length), given)

@@ -146,8 +146,8 @@ class PhasePlane:
     path : JointPath
         At least three stations.
     rate : (P,) ndarray, optional
-        About how fast it will be, dp/dt at the stations, 1/s: limits are linearised there first. By default the path
-        takes 1 s.
+        Estimate of dp/dt at the stations, 1/s. The limits are first linearised there. Default: constant; the path takes
+        1 s.
     """
 
     def __init__(
@@ -291,7 +291,8 @@ class PhasePlane:
     ) -> Timing | None:
         """Find the fastest timing with dp/dt given at both ends, 1/s; None if the joint path cannot be followed.
 
-        Linearisations end where they change the time by no more than a part of it, `agreement`.
+        Linearisations end when they change the time, or differ from the limits, by no more than a part of these,
+        `agreement`.
         """
         best: Timing | None = None
         error = np.inf
@@ -311,8 +312,9 @@ class PhasePlane:
             best = timing
             motion = self._pass(timing)
             error = max((own.error(motion) for own in self._rounds[0]), default=0.0)
-            is_enough = change < agreement and error < _CREDIBLE
-            if is_enough or change < AGREEMENT or error < agreement:
+            has_converged = change < AGREEMENT or error < agreement
+            is_close_enough = change < agreement and error < _CREDIBLE
+            if has_converged or is_close_enough:
                 break
             factor = 1.0
             self._linearise(motion)

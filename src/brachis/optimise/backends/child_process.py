@@ -59,7 +59,7 @@ class Solver:
     run : callable
         ``run(monitor, x)`` solves the monitor's problem from x; see `SolveMonitor`.
     is_interior : bool, optional
-        Whether it is an interior-point method: it goes away from bounds at first, and cannot use how near the start is.
+        Whether it is an interior-point method. It leaves the bounds at first: a start near the optimum does not help.
     """
 
     name: str

@@ -26,7 +26,7 @@ _STATUS = {
 }
 
 _SMALL_BARRIER = 1e-5
-"""Barrier parameter up to which an iterate tells whether the solve has settled."""
+"""Largest barrier parameter at which iterates show whether the solve has settled."""
 
 
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
@@ -50,12 +50,12 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         _iteration: int,
         objective: float,
         infeasibility: float,
-        _slope: float,
+        _dual_infeasibility: float,
         barrier: float,
         *_: float,
     ) -> bool:
         stop = monitor.between_iterations(objective)
-        # From a fast motion the barrier leads to a slower one first.
+        # With a large barrier the motion is slower than its start: no sign that the solve has settled.
         own = infeasibility if barrier <= _SMALL_BARRIER else np.inf
         return not (monitor.has_settled(objective, own) or stop)
 
