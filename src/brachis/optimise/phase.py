@@ -366,13 +366,14 @@ class Phase:
     ) -> np.ndarray:
         """Ratios, (K, c), to limits that a longer time relieves, see `Limit.ratio`; raises as `evaluate` does."""
         every = np.zeros((len(self.t_norm), 1))
-        weights = self.grid.mean_weights(self._h(x))[None]
         ratios = [np.empty((len(self.t_norm), 0))]
         for limit, values in zip(self.limits, self.evaluate(x).by_limit, strict=True):
             is_left_out = limit.guarantee.is_mean and not with_means
             if limit.longer_time != "relieves" or is_left_out:
                 continue
-            own = weights @ values if limit.guarantee.is_mean else values
+            own = values
+            if limit.guarantee.is_mean:
+                own = self.grid.mean_weights(self._h(x))[None] @ values
             ratios.append(limit.ratio(own) + every)
         return np.hstack(ratios)
 
