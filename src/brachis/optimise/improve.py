@@ -206,14 +206,14 @@ def with_last(
 
 _START_TOLERANCE = 1e-7
 """Part of a limit by which a solve may exceed it at its start."""
-_LARGEST_START_RATIO = 1.1
+_LARGEST_START_RATIO = 1.01
 """Ratio to a limit above which a start is not made to hold it."""
 _SLOWED = 4
 """Number of times that a start is slowed down: gravity and friction do not get less."""
 
 
 def _slow_down(program: Program, x: np.ndarray) -> np.ndarray:
-    """Slow a motion, (v,), down until it is within the limits, if it exceeds them by less than 10 %.
+    """Slow a motion, (v,), down until it is within the limits, if it exceeds them by less than 1 %.
 
     The first subproblem of a solver then has a feasible point. Without one a trust region shrinks to nothing, and needs
     tens of iterations to grow again.
