@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from brachis import robots
 from brachis.errors import TaskError
 from brachis.task import FROM_URDF, LineBy, Task, load_task
 
@@ -66,6 +67,15 @@ def written(folder: Path, text: str) -> Path:
     file = folder / "task.yaml"
     file.write_text(text, encoding="utf-8")
     return file
+
+
+def test_a_robot_may_be_named(tmp_path: Path) -> None:
+    named = COMPLETE.replace("../robots/scara3/robot.urdf", "iiwa14")
+    file = written(tmp_path, named)
+    assert load_task(file).robot.urdf == str(robots.path_of("iiwa14"))
+    beside = tmp_path / "iiwa14"
+    beside.write_text("<robot/>", encoding="utf-8")
+    assert load_task(file).robot.urdf == str(beside)
 
 
 @pytest.fixture

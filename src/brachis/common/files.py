@@ -220,6 +220,14 @@ def shipped_folder(folder: str) -> Path:
     return installed if installed.is_dir() else package.parents[1] / folder
 
 
+def locate_urdf(name: str, folder: Path) -> str:
+    """Return the absolute path of a URDF: a file relative to `folder`, or, if there is none, an included robot."""
+    own = os.path.abspath(folder / name)  # noqa: PTH100  (a linked folder keeps its name; meshes may be beside it)
+    included = shipped_folder("robots") / name / "robot.urdf"
+    is_name = Path(name).name == name and not is_file(own)
+    return str(included) if is_name and is_file(included) else own
+
+
 def mesh_file(name: str, folder: Path) -> Path | None:
     """Find a mesh file that a URDF in `folder` names, plainly or as ``file://`` or ``package://``; None if it is not.
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from brachis.common.files import check_kind, read_text
+from brachis.common.files import check_kind, locate_urdf, read_text
 from brachis.errors import TaskError, UnknownNameError
 from brachis.task.fields import (
     Flag,
@@ -254,7 +254,7 @@ def _check_joints(
     words = all(isinstance(name, str | None) for name in (tool, base))
     if not words or not isinstance(locked, Mapping):
         return  # the robot's model says so
-    names, moving = _joints_of(folder / robot["urdf"], tool, base)
+    names, moving = _joints_of(Path(locate_urdf(robot["urdf"], folder)), tool, base)
     for name in sorted(limited if names else ()):
         if name not in names:
             raise UnknownNameError(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from brachis.common.files import read_text
+from brachis.common.files import locate_urdf, read_text
 from brachis.errors import TaskError
 from brachis.task.fields import Model
 from brachis.task.messages import show, validate
@@ -61,7 +61,7 @@ def with_absolute_files(task: Task, folder: Path) -> Task:
     """Return the task with the paths of a URDF, an SRDF and meshes, relative to `folder`, made absolute."""
     changes: dict[str, object] = {}
     if task.robot.urdf is not None:
-        urdf = {"urdf": _absolute(task.robot.urdf, folder)}
+        urdf = {"urdf": locate_urdf(task.robot.urdf, folder)}
         changes["robot"] = task.robot.model_copy(update=urdf)
     if task.scene:
         changes["scene"] = _with_paths(task.scene, folder)

@@ -157,7 +157,7 @@ class RobotSettings(Model):
     """The robot: its URDF and what the task adds to it."""
 
     urdf: Name | None = None
-    """URDF file, relative to the task file's folder. Required in a task file."""
+    """URDF file, relative to the task file's folder, or the name of an included robot. Required in a task file."""
     tool_frame: Name | None = None
     """Frame that follows the path. Null: the only leaf link."""
     tool_offset: Placement = Field(default_factory=Placement)
