@@ -6,6 +6,7 @@ Limits that a plan needs and the URDF does not state get placeholders, which the
 from __future__ import annotations
 
 import os
+import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -19,6 +20,7 @@ import yaml
 
 from brachis import planner
 from brachis.common.deadline import Deadline
+from brachis.common.files import locate_urdf
 from brachis.errors import PlanningError, write_count
 from brachis.ik.registry import default_task_space
 from brachis.result import Result
@@ -30,6 +32,7 @@ from brachis.robot.urdf import default_chain, read_chain, read_file
 from brachis.task import LimitSpec, load_task
 from brachis.task.fields import plain
 from brachis.task.yaml_reader import read_yaml
+from brachis.timing import SlowTimingWarning
 
 _INNER = 0.15
 """Part of a range, at each end, in which no motion begins."""
@@ -205,7 +208,7 @@ _TEXT = """\
 brachis: 1
 
 robot:
-  urdf: {urdf}    # relative to this file
+  urdf: {urdf}    # a file, relative to this one, or an included robot
   tool_frame: {tool}    # the link that follows the path{base}
 {limits}
   # payload: {{mass: 0.5, com: [0, 0, 0.05]}}    # kg, m in the tool frame
@@ -259,12 +262,15 @@ def task_text(
     source = Path(robot.source)
     redundant = robot.n - (6 if space == "pose" else len(space))
     base = f"\n  base_frame: {_inline(robot.base_frame)}"
+    name = source.parent.name if source.name == "robot.urdf" else source.name
     # Relative, if the URDF is in a folder near the task file.
     urdf = os.path.relpath(source.absolute(), folder.absolute())
-    if urdf.startswith("../../.."):
+    if locate_urdf(name, folder) == str(source.absolute()):
+        urdf = name  # an included robot
+    elif urdf.startswith("../../.."):
         urdf = str(source.absolute())
     return _TEXT.format(
-        name=source.parent.name if source.name == "robot.urdf" else source.name,
+        name=name,
         urdf=_inline(urdf),
         tool=_inline(robot.tool_frame),
         base=base if robot.settings.base_frame else "",
@@ -383,7 +389,9 @@ def starter_task(
             written = task_text(bound, space, choice, limits, Path(folder))
             content: Any = read_yaml(written, "starter task")
             task = load_task(content, changes=changes)
-            with suppress(PlanningError):
+            with suppress(PlanningError), warnings.catch_warnings():
+                # This plan has few intervals; the task has as many as it needs.
+                warnings.simplefilter("ignore", SlowTimingWarning)
                 result = planner.plan(task, listener=tell, check_advice=False)
                 if result.verified:
                     return Starter(written, bound, result)
