@@ -66,18 +66,13 @@ def apply_chain_rule(
         Slopes by y, ydot, yddot and, with `qdddot_y`, ydddot.
     """
     count, n, width = motion.gradient.shape
-    flat = [
-        (by_joints, by_s, size)
-        for (by_joints, by_s), size in zip(partials, sizes, strict=True)
-    ]
-    asks_for_jerk = any(by_joints[-1] is not None for by_joints, *_ in flat)
+    asks_for_jerk = any(by_joints[-1] is not None for by_joints, _ in partials)
     if asks_for_jerk and motion.qdddot_y is None:
         raise ValueError("partials by qdddot need qdddot_y")
     kept: list[np.ndarray] = []
     groups = []
-    for (q, qdot, qddot, qdddot), by_s, size in flat:
-        parts = (q, qdot, qddot, qdddot)
-        places = [_place_partials(own, (count, size, n), kept) for own in parts]
+    for (by_joints, by_s), size in zip(partials, sizes, strict=True):
+        places = [_place_partials(own, (count, size, n), kept) for own in by_joints]
         along = _place(by_s, (count, size), kept)
         groups.append((*itertools.chain.from_iterable(places), along, size))
     own_groups = np.array(groups, dtype=_GROUP)
@@ -151,7 +146,10 @@ def find_entries(
     entries = len(points)
     table = as_doubles(slopes, slopes.shape)
     factors = as_doubles(shared, (broad, orders, count, width))
-    places = [own.astype("l", casting="same_kind") for own in (points, curves)]
+    places = [
+        own.astype("l", order="C", casting="same_kind", copy=False)
+        for own in (points, curves)
+    ]
     own_basis = as_doubles(basis, (orders, entries))
     found = np.empty((broad * count + entries, columns))
     load().brachis_entries(

@@ -16,7 +16,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -58,7 +57,6 @@ _MORE = 1.2
 """Factor on a violation by which limits are narrowed."""
 _STATIONS_A_PIECE = 4
 """Stations in every piece of a path, at most as far apart as others."""
-_Number = TypeVar("_Number", int, np.ndarray)
 
 
 def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
@@ -169,7 +167,8 @@ class PathPhase:
         """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
         places, values = self._bounds.shape[1:]
         curves = np.arange(self.curves_count)
-        of_curves = self.place_of(curves, 0)[:, None, None] + columns
+        first = len(self._s) + curves * self._count
+        of_curves = first[:, None, None] + columns
         variable = np.concatenate([self._number, self._number + 1, of_curves.ravel()])
         every = np.arange(places)
         of_each = np.repeat(every, columns.shape[1])
@@ -219,8 +218,8 @@ class PathPhase:
         inner = slice(1, len(self._s) - 1)
         self.start[inner] = np.maximum(found[inner], _SLOWEST)
 
-    def place_of(self, curve: _Number, end: int) -> _Number:
-        """Return the numbers of the variables that are redundant curves' values at the start (0) or end (-1)."""
+    def place_of(self, curve: int, end: int) -> int:
+        """Return the number of the variable that is a redundant curve's value at the start (0) or end (-1)."""
         return len(self._s) + curve * self._count + end % self._count
 
     def _part(self, s: np.ndarray) -> np.ndarray:
