@@ -51,6 +51,19 @@ def test_trapezoid_to_five_digits():
     assert found == pytest.approx(LENGTH / 0.5 + 0.5 / 3.0, rel=1e-5)
 
 
+@pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
+@pytest.mark.parametrize("shape", [np.ones_like, lambda p: 1.0 - (2.0 * p - 1.0) ** 2])
+def test_an_estimate_of_the_rate_leaves_the_time(size, shape):
+    friction = {"coulomb": 5.0, "coulomb_velocity": 0.05, "viscous": 10.0}
+    robot = gantry(torque=20.0, velocity=1.0, friction=friction)
+    path = JointPath.through(P, np.outer(P, [LENGTH, 0.0]))
+    plane = PhasePlane(limits_of(robot), path, size * shape(P))
+    known = least_time(robot)
+    assert plane.solve().t_end == pytest.approx(known, rel=1e-5)
+    roughly = PhasePlane(limits_of(robot), path).solve(agreement=1e-3)
+    assert roughly.t_end == pytest.approx(known, rel=5e-3)
+
+
 def test_coulomb_friction_helps_to_brake():
     robot = gantry(torque=20.0, friction={"coulomb": 5.0, "coulomb_velocity": 1e-4})
     ways = mass_of(robot) / np.array([20.0 - 5.0, 20.0 + 5.0])

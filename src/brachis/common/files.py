@@ -221,7 +221,7 @@ def shipped_folder(folder: str) -> Path:
 
 
 def locate_urdf(name: str, folder: Path) -> str:
-    """Return the absolute path of a URDF: a file relative to `folder`, or, if there is none, an included robot."""
+    """Return the absolute path of a URDF: a file relative to `folder`; without such a file, an included robot's."""
     own = os.path.abspath(folder / name)  # noqa: PTH100  (a linked folder keeps its name; meshes may be beside it)
     included = shipped_folder("robots") / name / "robot.urdf"
     is_name = Path(name).name == name and not is_file(own)

@@ -97,7 +97,7 @@ def apply_chain_rule(
 
 
 def _place(values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]) -> int:
-    """Return where numbers are, 0 if there are none; what is added to `kept` has to stay alive."""
+    """Return where numbers are, 0 without any; what is added to `kept` has to stay alive."""
     if values is None:
         return 0
     kept.append(as_doubles(values, shape))

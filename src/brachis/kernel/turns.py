@@ -76,7 +76,7 @@ def pick_nearest(
     """
     count, alternatives, columns = answers.shape
     if not alternatives:
-        raise ValueError("there are no answers to choose from")
+        raise ValueError("no answers to choose from")
     given = (
         as_doubles(turning, (columns,)),
         as_doubles(near, (1 if follows else count, columns)),
