@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.timing import TimingGap
 from support.effort import QUICK
 
 LIMITS = {
@@ -73,3 +74,13 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
     assert result.verified
     assert result.candidate.reports[-1].solver == "phase plane"
     assert -1e-3 < result.timing_gap.gap < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("part", "where"),
+    [((0.2, 0.31), "mostly at s = 0.2 to 0.31;"), ((0.0, 1.0), "all along the path;")],
+)
+def test_the_warning_says_where_time_is_lost(part, where):
+    gap = TimingGap(2.0, 1.8, 100, (), part)
+    (issue,) = gap.issues(intervals_are_given=True)
+    assert where in issue.message

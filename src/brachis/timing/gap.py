@@ -29,6 +29,8 @@ _STILL = 1e-9
 """Part of the largest speed below which a phase begins or ends at rest."""
 _SHARE = 0.8
 """Part of the lost time that lies in the s-interval that is named."""
+_EVERYWHERE = 0.7
+"""Length of an s-interval from which on it is not named: the time is lost all along the path."""
 
 
 class SlowTimingWarning(BrachisWarning):
@@ -98,12 +100,15 @@ class TimingGap(Summary):
             return ()
         low, high = (round(s, 4) for s in self.s_interval)
         saved = 100.0 * (1.0 - self.least_time / self.t_end)
+        where = "all along the path"
+        if high - low < _EVERYWHERE:
+            where = f"mostly at s = {low:.3g} to {high:.3g}"
         advice = "raise search.time_limit"
         if intervals_are_given:
             advice = "set spline.intervals: auto, or a larger number"
         message = (
-            f"another timing of the same joint path is {saved:.1f} % faster: {self.least_time:.4g} s; most of this "
-            f"is lost at s = {low:.3g} to {high:.3g}; to come closer, {advice}"
+            f"another timing of the same joint path is {saved:.1f} % faster: {self.least_time:.4g} s; this is lost "
+            f"{where}; to come closer, {advice}"
         )
         found = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
