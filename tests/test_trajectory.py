@@ -15,7 +15,7 @@ from brachis.errors import InputError, ResultFileError
 from brachis.planner import plan
 from brachis.robot import Robot, dynamics
 from brachis.trajectory import Trajectory
-from brachis.trajectory.trajectory import piece_coefficients
+from brachis.trajectory.pieces import piece_coefficients
 from support.effort import QUICK
 from support.result_files import with_parts
 

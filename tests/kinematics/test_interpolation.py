@@ -9,7 +9,7 @@ from scipy.interpolate import BPoly
 from brachis.errors import UnreachableError
 from brachis.kinematics import interpolate
 from brachis.robot import Robot
-from brachis.trajectory.trajectory import piece_coefficients
+from brachis.trajectory.pieces import piece_coefficients
 from support.chains import planar_robot
 from support.motions import Sway, joint_map
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -47,3 +48,25 @@ def test_turns(scale):
     np.testing.assert_array_equal(column, [0])
     np.testing.assert_allclose(u, [2.0 / 3.0], rtol=1e-12)
     np.testing.assert_allclose(value, [scale * 4.0 / 27.0], rtol=1e-12)
+
+
+def test_roots_in_the_middle_of_parts_and_roots_that_nearly_meet():
+    """Roots at 1/2, 1/4 and 5/8; then two that are 1e-6 apart, and two that a polynomial does not quite reach."""
+    cubic = from_roots(0.5, 0.25, 0.625)
+    np.testing.assert_allclose(roots(cubic[:, None])[1], [0.25, 0.5, 0.625], atol=1e-15)
+    near = from_roots(0.3, 0.300001)
+    np.testing.assert_allclose(roots(near[:, None])[1], [0.3, 0.300001], atol=1e-9)
+    assert not len(roots(near[:, None] + 1e-9)[1])
+
+
+def from_roots(*places):
+    """Bernstein coefficients of the polynomial with these roots, by the polar form."""
+    m = len(places)
+    values = []
+    for ones in range(m + 1):
+        terms = [
+            math.prod((place in chosen) - place for place in places)
+            for chosen in itertools.combinations(places, ones)
+        ]
+        values.append(sum(terms) / len(terms))
+    return np.array(values)

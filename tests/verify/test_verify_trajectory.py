@@ -11,7 +11,7 @@ from brachis.errors import InputError
 from brachis.robot import Robot
 from brachis.robot.limits import MAGNITUDES
 from brachis.task import Posture
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Pieces, Trajectory
 from brachis.verify import VerifyOptions, verify_trajectory
 
 MIDDLE = 60
@@ -69,7 +69,7 @@ def torn(trajectory, row, by):
     torn = replace(trajectory)
     c = torn.pieces.c.copy()
     c[row, MIDDLE, 0] += by
-    torn.pieces.c = c
+    vars(torn)["pieces"] = Pieces(c, torn.times)
     return torn
 
 

@@ -42,6 +42,7 @@ FUNCTIONS = {
     "brachis_follow_turns": "- llppp",
     "brachis_set_turns": "i llppppppp",
     "brachis_largest_parts": "- lllpppp",
+    "brachis_solve_band": "- lllpp",
     "brachis_formula": "- llplplplplpp",
     "brachis_side_by_side": "l ",
 }

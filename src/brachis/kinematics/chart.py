@@ -15,21 +15,17 @@ that brings its basis nearest to the one before (orthogonal Procrustes problem; 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton
-from brachis.kernel import Conditions
+from brachis.kernel import Conditions, Spline
 from brachis.kinematics.joint_map import apply_each
 from brachis.kinematics.path_map import PathMap, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 CHART = "chart"
 """Label in the place of a branch's."""
@@ -66,13 +62,10 @@ class ChartRows:
     @classmethod
     def along(cls, s: np.ndarray, rows: np.ndarray, reference: np.ndarray) -> ChartRows:
         """Lead splines through rows, (S, r, n), and C q_ref = p, with reference postures (S, n), at S places."""
-        from scipy.interpolate import make_interp_spline
-
         offset = np.einsum("sij,sj->si", rows, reference)
-        spline = make_interp_spline(
-            s, np.concatenate([rows, offset[:, :, None]], axis=2), k=DEGREE
-        )
-        return cls(np.asarray(spline.c), np.asarray(spline.t))
+        values = np.concatenate([rows, offset[:, :, None]], axis=2)
+        spline = Spline.through(s, values, DEGREE)
+        return cls(spline.control_points, spline.knots)
 
     @classmethod
     def of_arrays(cls, coefficients: np.ndarray, knots: np.ndarray) -> ChartRows:
@@ -102,10 +95,8 @@ class ChartRows:
         )
         return tuple(int(joint) for joint in np.argmax(rows, axis=1)) if unit else ()
 
-    def _spline(self) -> BSpline:
-        from scipy.interpolate import BSpline
-
-        return BSpline(np.asarray(self.knots), self.coefficients, DEGREE)
+    def _spline(self) -> Spline:
+        return Spline(np.asarray(self.knots), self.coefficients, DEGREE)
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """C, (K, r, n), and p, (K, r), at path coordinates (K,)."""
@@ -160,8 +151,6 @@ class ChartMap(PathMap):
         s: np.ndarray,
         reference: np.ndarray,
     ) -> None:
-        from scipy.interpolate import make_interp_spline
-
         robot = task_map.robot
         self.robot = robot
         self.task_map = task_map
@@ -177,9 +166,8 @@ class ChartMap(PathMap):
         inverse = np.linalg.pinv(augmented, rcond=_SINGULAR)  # not regular throughout
         self_motion = inverse[:, :, task_map.m :].reshape(len(s), -1)
         sigma = rows.values(s, reference)
-        self._lines = make_interp_spline(
-            s, np.concatenate([reference, sigma, self_motion], axis=1), k=1
-        )
+        table = np.concatenate([reference, sigma, self_motion], axis=1)
+        self._lines = Spline.through(s, table, 1)
         self.sample_at = LastCall(path.sample)
         self._rows_at = LastCall(rows.at)
         self._reference_at = LastCall(self._between)

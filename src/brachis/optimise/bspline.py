@@ -6,17 +6,15 @@ The NURBS Book, A2.2). Its denominators are never less than the point's own inte
 zero: beyond the ends of a clamped knot vector they do. The recursion is rational and takes complex lengths; a step
 along the imaginary axis gives derivatives without cancellation (Squire and Trapp, 1998).
 
-Knot insertion gives the same curves over a finer knot vector.
-
-A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots
-behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). For a finer knot vector the blossom of the old piece is evaluated at
-the new knots by de Boor's recursion with another argument in every step (the Oslo algorithm of Cohen, Lyche and
-Riesenfeld, 1980).
+Knot insertion gives the same curves over a finer knot vector: the control points are blossoms of the old pieces at the
+new knots (see `brachis.kernel`).
 """
 
 from __future__ import annotations
 
 import numpy as np
+
+from brachis.kernel import blossom
 
 ORDERS = 4
 """Value and three derivatives."""
@@ -195,12 +193,5 @@ def insert_knots(
     """
     new = np.arange(len(finer) - degree - 1)
     piece = np.searchsorted(knots, finer[new], side="right") - 1
-    window = piece[:, None] + np.arange(-degree, 1)
-    points = control_points[:, window]
-    for level in range(1, degree + 1):
-        at = finer[new + level][:, None]
-        left = knots[window[:, level:]]
-        right = knots[window[:, level:] + degree - level + 1]
-        share = (at - left) / (right - left)
-        points = share * points[..., 1:] + (1.0 - share) * points[..., :-1]
-    return np.asarray(points[..., 0])
+    arguments = [finer[new + level] for level in range(1, degree + 1)]
+    return blossom(knots, control_points.T, piece, arguments).T

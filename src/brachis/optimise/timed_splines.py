@@ -11,7 +11,9 @@ import numpy as np
 
 from brachis import kernel
 from brachis.common import tolerances
+from brachis.kernel import Spline, collocation
 from brachis.optimise.boundary import greville
+from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.motion import Motion
 from brachis.timing import TimedCourse, Timing
 
@@ -231,7 +233,9 @@ def splines_along(
 def _smoothly(
     anchors: np.ndarray, values: np.ndarray, places: np.ndarray
 ) -> np.ndarray:
-    """Interpolate values, (A, c), at anchors without a slope at the ends, at places, (P,)."""
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(anchors, values, bc_type="clamped")(places))
+    """Interpolate values, (A, c), at anchors from 0 to 1, without a slope at the ends, at places, (P,)."""
+    knots = clamped_knots(3, anchors)
+    slopes = collocation(knots, 3, np.array([0.0, 1.0]), 1)
+    matrix = np.vstack([collocation(knots, 3, anchors), slopes])
+    wanted = np.vstack([values, np.zeros((2, values.shape[1]))])
+    return Spline(knots, np.linalg.solve(matrix, wanted), 3)(places)

@@ -18,6 +18,7 @@ from brachis.common.arrays import interpolate_columns
 from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Listener
 from brachis.errors import PathError, UnreachableError
+from brachis.kernel import Spline, collocation
 from brachis.kinematics import (
     CHART,
     JointMap,
@@ -144,17 +145,16 @@ def lattice_starts(
 
 def _smooth(joint_path: JointPath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; at last linear interpolation."""
-    from scipy.interpolate import make_lsq_spline
-
     s = joint_path.s
     # More finely than at the lattice's stations.
     fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, 97))
-    weights = np.ones(len(s))
+    weights = np.ones((len(s), 1))
     weights[[0, -1]] = 1e3  # nearly exact at both ends
     for pieces in (3, 8):
         knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, pieces + 1), np.ones(3)]
-        spline = make_lsq_spline(s, joint_path.q, knots, k=3, w=weights)
-        yield fine, np.asarray(spline(fine))
+        matrix = weights * collocation(knots, 3, s)
+        points = np.linalg.lstsq(matrix, weights * joint_path.q, rcond=None)[0]
+        yield fine, Spline(knots, points, 3)(fine)
     yield fine, interpolate_columns(fine, s, joint_path.q)
 
 

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from brachis.kernel import Spline
 from brachis.kinematics import JointMap
 from brachis.limits import Limit
 from brachis.timing.joint_path import JointPath, Passage, Timing
@@ -33,14 +34,12 @@ class Course:
     @classmethod
     def through(cls, curves: np.ndarray, s: np.ndarray) -> Course:
         """Lay cubic splines through curves, (S, c), the first of them the path coordinate, and take them at s, (P,)."""
-        from scipy.interpolate import CubicSpline
-
         y = np.column_stack([s, np.empty((len(s), curves.shape[1] - 1))])
         y_dp = np.zeros_like(y)
         y_ddp = np.zeros_like(y)
         y_dp[:, 0] = 1.0
         if curves.shape[1] > 1:
-            spline = CubicSpline(curves[:, 0], curves[:, 1:])
+            spline = Spline.through(curves[:, 0], curves[:, 1:])
             y[:, 1:], y_dp[:, 1:], y_ddp[:, 1:] = (spline(s, nu) for nu in range(3))
         return cls(s, y, y_dp, y_ddp)
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.kernel import Spline
 from brachis.kinematics import JointState
 from brachis.robot.dynamics import SharedTorques
 
@@ -60,9 +61,7 @@ class JointPath:
     @classmethod
     def through(cls, s: np.ndarray, q: np.ndarray) -> JointPath:
         """Lay cubic splines through postures, (P, n), at path coordinates, (P,)."""
-        from scipy.interpolate import CubicSpline
-
-        spline = CubicSpline(s, q)
+        spline = Spline.through(s, q)
         return cls(s, s, q, spline(s, 1), spline(s, 2))
 
     @classmethod

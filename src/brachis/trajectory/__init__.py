@@ -8,6 +8,7 @@ from brachis.trajectory.phases import (
     phase_rows,
     split_splines,
 )
+from brachis.trajectory.pieces import Pieces
 from brachis.trajectory.recovered import Recovered, check_tolerance
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
@@ -26,6 +27,7 @@ __all__ = [
     "Motion",
     "MotionPhase",
     "PhaseSpline",
+    "Pieces",
     "Recovered",
     "Samples",
     "Trajectory",

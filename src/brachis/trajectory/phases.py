@@ -15,6 +15,7 @@ import numpy as np
 
 from brachis.common.arrays import bisect
 from brachis.common.summary import Summary
+from brachis.kernel import Spline
 from brachis.task import ProcessSpeed
 
 
@@ -49,9 +50,7 @@ class PhaseSpline(Summary):
 
         At knots those just after them.
         """
-        from scipy.interpolate import BSpline
-
-        spline = BSpline(self.knots, self.control_points.T, self.degree)
+        spline = Spline(self.knots, self.control_points.T, self.degree)
         t_norm = np.clip(t / self.t_end, 0.0, 1.0)
         return tuple(spline(t_norm, nu=order) / self.t_end**order for order in range(4))
 

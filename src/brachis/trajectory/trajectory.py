@@ -1,22 +1,4 @@
-"""Joint motion along a path, evaluated at any time; also as an argument: a trajectory, what has one, or its file.
-
-Quintic Hermite pieces in Bernstein form, each relative to its first node, and their jerk.
-
-Positions are of the order of 1 rad, and the second differences of the coefficients are divided by h^2. Were the node's
-own position part of the coefficients, its rounding alone would be an error of 1e-16 / h^2 in the acceleration, which is
-visible for motions of milliseconds.
-
-With x = 2 u - 1, from -1 to 1 over a piece of length h, the jerk is j(x) = m + a x + b (3 x^2 - 1) / 2 with
-
-    m = (qddot1 - qddot0) / h
-    a = 3 (qddot0 + qddot1) / h - 6 (qdot1 - qdot0) / h^2
-    b = 60 miss / h^3,   miss = q1 - q0 - h / 2 (qdot0 + qdot1) + h^2 / 12 (qddot1 - qddot0)
-
-Positions enter b alone. They are numbers of 64 bits: a piece's travel q1 - q0 is known to eps |q| and no better, which
-over 0.1 ms is a jerk of 0.02 rad/s^3, over 1 us one of 20,000. A piece therefore travels what has the least |b| within
-this rounding: what the positions do not say is not read into them, and all that they do say counts. This is the
-definition of the motion, for all who evaluate it, the verification included.
-"""
+"""Joint motion along a path, evaluated at any time; also as an argument: a trajectory, what has one, or its file."""
 
 from __future__ import annotations
 
@@ -35,6 +17,7 @@ from brachis.common.arguments import file_name, number, numbers
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError, UnknownNameError, write_apart, write_count
+from brachis.kernel import Spline
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
 from brachis.trajectory.phases import (
@@ -44,69 +27,13 @@ from brachis.trajectory.phases import (
     split_splines,
     times_of_knots,
 )
+from brachis.trajectory.pieces import Pieces, piece_coefficients
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples, tool_motion
 
 if TYPE_CHECKING:
     import pandas as pd
-    from scipy.interpolate import BPoly, BSpline
-
-
-def piece_coefficients(
-    times: np.ndarray,
-    q: np.ndarray,
-    qdot: np.ndarray,
-    after: np.ndarray,
-    before: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Bernstein coefficients of ``q(t) - q[i]`` and of the jerk on every piece i between nodes i and i + 1.
-
-    A Bezier curve of degree 5 and length h begins with q = c0, qdot = 5 (c1 - c0) / h and
-    qddot = 20 (c2 - 2 c1 + c0) / h^2, and ends likewise. The jerk comes from the nodes themselves: third differences
-    of the coefficients of the positions would multiply their rounding.
-
-    Parameters
-    ----------
-    times : (L + 1,) ndarray
-        Nodes, s.
-    q, qdot : (L + 1, n) ndarray
-        Motion at the nodes.
-    after, before : (L + 1, n) ndarray
-        Acceleration just after and just before the nodes.
-
-    Returns
-    -------
-    positions : (6, L, n) ndarray
-        rad or m.
-    jerks : (3, L, n) ndarray
-        rad/s^3 or m/s^3.
-    """
-    h = np.diff(times)[:, None]
-    v0 = qdot[:-1]
-    v1 = qdot[1:]
-    a0 = after[:-1]
-    a1 = before[1:]
-    linear = 0.5 * h * (v0 + v1) - h**2 / 12.0 * (a1 - a0)  # travel if b were zero
-    far, fast = (np.maximum(np.abs(part[1:]), np.abs(part[:-1])) for part in (q, qdot))
-    rounding = np.finfo(float).eps * (far + h * fast)
-    miss = np.diff(q, axis=0) - linear
-    miss = miss - np.clip(miss, -rounding, rounding)
-    travel = linear + miss
-    slope = h / 5.0
-    bend = h**2 / 20.0
-    positions = [
-        np.zeros_like(travel),
-        slope * v0,
-        2.0 * slope * v0 + bend * a0,
-        travel - 2.0 * slope * v1 + bend * a1,
-        travel - slope * v1,
-        travel,
-    ]
-    m = (a1 - a0) / h
-    a = 3.0 * (a0 + a1) / h - 6.0 * np.diff(qdot, axis=0) / h**2
-    b = 60.0 * miss / h**3
-    return np.stack(positions), np.stack([m - a + b, m - 2.0 * b, m + a + b])
 
 
 CONTINUOUS_TORQUE = 3
@@ -194,43 +121,34 @@ class Trajectory(Summary):
         return self.robot.joint_names
 
     @cached_property
-    def pieces(self) -> BPoly:
-        """Joint positions less those of the node before, as SciPy's piecewise polynomial over time; see `position`."""
+    def pieces(self) -> Pieces:
+        """Joint positions less those of the node before; see `position`."""
         return self._polynomials[0]
 
     @cached_property
-    def jerk_pieces(self) -> BPoly:
-        """Joint jerks as SciPy's piecewise polynomial over time: the third derivative of `pieces`, to rounding."""
+    def jerk_pieces(self) -> Pieces:
+        """Joint jerks: the third derivative of `pieces`, to rounding."""
         return self._polynomials[1]
 
     @cached_property
-    def _polynomials(self) -> tuple[BPoly, ...]:
-        from scipy.interpolate import BPoly
-
+    def _polynomials(self) -> tuple[Pieces, Pieces]:
         nodes = (self.times, self.q, self.qdot, self.qddot, self.qddot_before)
-        polynomials = tuple(
-            BPoly(coefficients, self.times)
-            for coefficients in piece_coefficients(*nodes)
-        )
-        for polynomial in polynomials:
-            polynomial.c.setflags(write=False)
-        return polynomials
+        positions, jerks = piece_coefficients(*nodes)
+        return Pieces(positions, self.times), Pieces(jerks, self.times)
 
     @cached_property
-    def path_spline(self) -> BSpline:
-        """s(t) as SciPy's B-spline over time in seconds."""
+    def path_spline(self) -> Spline:
+        """s(t), over time in seconds."""
         return self._spline(self.control_points[0])
 
     @cached_property
-    def redundant_spline(self) -> BSpline:
-        """Positions of the r redundant joints, or sigma of the chart, as SciPy's B-spline over time in seconds."""
+    def redundant_spline(self) -> Spline:
+        """Positions of the r redundant joints, or sigma of the chart, over time in seconds."""
         return self._spline(self.control_points[1:].T)
 
-    def _spline(self, control_points: np.ndarray) -> BSpline:
-        from scipy.interpolate import BSpline
-
+    def _spline(self, control_points: np.ndarray) -> Spline:
         knots = times_of_knots(self.knots, self.degree, self.phase_ends)
-        return BSpline(knots, control_points, self.degree)
+        return Spline(knots, control_points, self.degree)
 
     @cached_property
     def phase_splines(self) -> tuple[PhaseSpline, ...]:
@@ -261,19 +179,19 @@ class Trajectory(Summary):
         """
         times = self._check_times(t)
         node = np.searchsorted(self.times[1:-1], times, side="right")
-        return self.q[node] + np.asarray(self.pieces(times))
+        return self.q[node] + self.pieces(times)
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
         """Joint velocities, as `position`; rad/s or m/s."""
-        return np.asarray(self.pieces(self._check_times(t), nu=1))
+        return self.pieces(self._check_times(t), nu=1)
 
     def acceleration(self, t: ArrayLike) -> np.ndarray:
         """Joint accelerations, as `position`; rad/s^2 or m/s^2."""
-        return np.asarray(self.pieces(self._check_times(t), nu=2))
+        return self.pieces(self._check_times(t), nu=2)
 
     def jerk(self, t: ArrayLike) -> np.ndarray:
         """Joint jerks, as `position`; rad/s^3 or m/s^3. At a node the value behind it."""
-        return np.asarray(self.jerk_pieces(self._check_times(t)))
+        return self.jerk_pieces(self._check_times(t))
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""

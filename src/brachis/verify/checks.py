@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.kernel import Spline, blossom
 from brachis.robot import TaskMap
 from brachis.trajectory import CONTINUOUS_TORQUE, PhaseSpline
-from brachis.verify.motion import Given, MotionStates
+from brachis.verify.motion import Given, MotionStates, roots
 from brachis.verify.phases import check_joints, derivatives_at_rest, times_of_stops
 from brachis.verify.report import Check
 
@@ -46,15 +47,25 @@ def _path_speeds(
     curves: PhaseSpline, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return ds/dt, 1/s, of a phase at times since its beginning, s, at its knots, and wherever it turns."""
-    from scipy.interpolate import BSpline, PPoly
-
     knots = curves.knots * curves.t_end
-    spline = BSpline(knots, curves.control_points[0], curves.degree)
-    curvature = PPoly.from_spline(spline.derivative(2).tck)
-    turning = curvature.roots(discontinuity=True, extrapolate=False)
-    found = [times, np.unique(knots), turning[np.isfinite(turning)]]
-    times = np.concatenate(found).clip(0.0, curves.t_end)
+    spline = Spline(knots, curves.control_points[0], curves.degree)
+    bend = spline.derivative().derivative()
+    begins = np.unique(knots)
+    piece, u = roots(_bernstein_coefficients(bend, begins))
+    turning = begins[piece] + u * np.diff(begins)[piece]
+    times = np.concatenate([times, begins, turning]).clip(0.0, curves.t_end)
     return times, spline(times, nu=1)
+
+
+def _bernstein_coefficients(spline: Spline, breaks: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients, (d + 1, F), of the polynomials of a spline between its knots, (F + 1,)."""
+    begins = breaks[:-1]
+    ends = breaks[1:]
+    piece = np.searchsorted(spline.knots, begins, side="right") - 1
+    points = spline.control_points[:, None]
+    degree = spline.degree
+    sides = ([begins] * (degree - i) + [ends] * i for i in range(degree + 1))
+    return np.hstack([blossom(spline.knots, points, piece, own) for own in sides]).T
 
 
 def check_ends(given: Given) -> list[Check]:

@@ -28,6 +28,9 @@ from brachis.trajectory import Trajectory
 from brachis.verify.mechanics import torques
 from brachis.verify.report import VerifyOptions
 
+_HALVINGS = 30
+"""After so many halves no two roots are in one part, unless they are nearer than `SAME_PLACE`."""
+
 
 def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,), by de Casteljau's algorithm."""
@@ -53,20 +56,42 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u : (Z,) ndarray
         Root; ascending within a polynomial.
     """
-    from scipy.interpolate import BPoly, PPoly
+    column = np.arange(coefficients.shape[1])
+    low = np.zeros(len(column))
+    width = 1.0
+    found = [(column[:0], low[:0])]
+    for _ in range(_HALVINGS):
+        # Coefficients that do not change their sign have no root.
+        changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
+        coefficients = coefficients[:, changing]
+        column = np.tile(column[changing], 2)
+        low = low[changing]
+        if not len(low):
+            break
+        width *= 0.5
+        low = np.concatenate([low, low + width])
+        coefficients = _halve(coefficients)
+        right = slice(len(column) // 2, None)
+        is_root = coefficients[0, right] == 0.0
+        found.append((column[right][is_root], low[right][is_root]))
+    first, last = coefficients[[0, -1]]
+    crossing = first * last < 0.0
+    share = first[crossing] / (first[crossing] - last[crossing])
+    found.append((column[crossing], low[crossing] + width * share))
+    number, u = (np.concatenate(part) for part in zip(*found, strict=True))
+    order = np.lexsort((u, number))
+    return number[order], u[order]
 
-    # Coefficients that do not change their sign have no root, which decides nearly every case.
-    changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
-    kept = np.flatnonzero(changing)
-    if not len(kept):
-        return kept, np.empty(0)
-    side_by_side = BPoly(coefficients[:, kept], np.arange(len(kept) + 1.0))
-    polynomials = PPoly.from_bernstein_basis(side_by_side)
-    places = np.sort(polynomials.roots(discontinuity=False, extrapolate=False))
-    number = np.floor(places).astype(int)
-    u = places - number
-    inside = (u > 0.0) & (number < len(kept))
-    return kept[number[inside]], u[inside]
+
+def _halve(coefficients: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients, (m + 1, 2 F), of the left and then of the right halves of F polynomials."""
+    left = [coefficients[0]]
+    right = [coefficients[-1]]
+    while len(coefficients) > 1:
+        coefficients = 0.5 * (coefficients[:-1] + coefficients[1:])
+        left.append(coefficients[0])
+        right.append(coefficients[-1])
+    return np.hstack([left, right[::-1]])
 
 
 def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

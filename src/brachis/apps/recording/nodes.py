@@ -28,7 +28,7 @@ import numpy as np
 from brachis.apps.recording.recording import FEWEST_ROWS, Recording
 from brachis.common import tolerances
 from brachis.errors import write_count
-from brachis.trajectory.trajectory import piece_coefficients
+from brachis.trajectory.pieces import piece_coefficients
 
 _TINY = np.finfo(float).tiny
 _DEGREE = 5

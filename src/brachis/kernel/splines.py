@@ -1,0 +1,147 @@
+"""Splines without SciPy, whose import takes longer than an ordinary plan.
+
+A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots
+behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). The value at t is b(t, ..., t). Both are found by de Boor's recursion
+(Cohen, Lyche and Riesenfeld, 1980).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from brachis.kernel.library import address, load
+
+
+@dataclass(frozen=True, eq=False)
+class Spline:
+    """A spline of degree d over L + d + 1 knots, which may repeat.
+
+    Attributes
+    ----------
+    knots : (L + d + 1,) ndarray
+        Ascending; the first and the last d + 1 are equal.
+    control_points : (L, ...) ndarray
+    degree : int
+        d.
+    """
+
+    knots: np.ndarray
+    control_points: np.ndarray
+    degree: int
+
+    @classmethod
+    def through(cls, places: np.ndarray, values: np.ndarray, degree: int = 3) -> Spline:
+        """Interpolate values, (P, ...), at ascending places, (P,), P > d; d is odd.
+
+        The first and the last (d + 1) / 2 intervals are one polynomial each ("not a knot").
+
+        Raises
+        ------
+        ValueError
+            The places are too few, or do not ascend.
+        """
+        if not (len(places) > degree and (np.diff(places) > 0.0).all()):
+            raise ValueError("the places of an interpolation are few, or do not ascend")
+        beside = (degree + 1) // 2
+        inner = places[beside : len(places) - beside]
+        outer = np.ones(degree + 1)
+        knots = np.concatenate([places[0] * outer, inner, places[-1] * outer])
+        piece = _find_piece(knots, degree, places)
+        number = np.arange(len(places))[:, None]
+        column = piece[:, None] + np.arange(-degree, 1)
+        matrix = np.zeros((len(places), 2 * degree + 1))
+        matrix[number, column - number + degree] = _basis(knots, degree, places, piece)
+        points = np.array(values, dtype=float)
+        columns = points.size // len(points)
+        load().brachis_solve_band(
+            len(points), degree, columns, address(matrix), address(points)
+        )
+        return cls(knots, points, degree)
+
+    def __call__(self, x: ArrayLike, nu: int = 0) -> np.ndarray:
+        """Value, or derivative of the order `nu`, at x, of any shape; at a knot the one behind it."""
+        if nu > 0:
+            return self.derivative()(x, nu - 1)
+        x = np.asarray(x, dtype=float)
+        flat = x.ravel()
+        piece = _find_piece(self.knots, self.degree, flat)
+        points = self.control_points.reshape(len(self.control_points), -1)
+        values = blossom(self.knots, points, piece, [flat] * self.degree)
+        return values.reshape(x.shape + self.control_points.shape[1:])
+
+    def derivative(self) -> Spline:
+        """Differentiate the spline; that of steps is zero."""
+        points = self.control_points
+        if self.degree == 0:
+            return Spline(self.knots, np.zeros_like(points), 0)
+        width = self.knots[self.degree + 1 : -1] - self.knots[1 : -self.degree - 1]
+        # Where knots repeat so often that a control point matters nowhere, the width is zero.
+        share = np.divide(self.degree, width, out=np.zeros_like(width), where=width > 0)
+        slopes = np.diff(points, axis=0) * share.reshape(-1, *[1] * (points.ndim - 1))
+        return Spline(self.knots[1:-1], slopes, self.degree - 1)
+
+
+def collocation(
+    knots: np.ndarray, degree: int, places: np.ndarray, nu: int = 0
+) -> np.ndarray:
+    """Matrix, (P, L), with ``matrix @ control_points`` the spline, or a derivative, at places, (P,)."""
+    return Spline(knots, np.eye(len(knots) - degree - 1), degree)(places, nu)
+
+
+def blossom(
+    knots: np.ndarray,
+    control_points: np.ndarray,
+    piece: np.ndarray,
+    arguments: Sequence[np.ndarray],
+) -> np.ndarray:
+    """Evaluate the blossoms of a spline's pieces; see the module.
+
+    Parameters
+    ----------
+    knots : (L + d + 1,) ndarray
+    control_points : (L, c) ndarray
+    piece : (K,) int ndarray
+        Numbers of the knots at which the pieces begin.
+    arguments : sequence of d (K,) ndarray
+
+    Returns
+    -------
+    (K, c) ndarray
+    """
+    window = piece[:, None] + np.arange(-len(arguments), 1)
+    return _recur(knots, control_points[window], window, arguments)
+
+
+def _recur(
+    knots: np.ndarray,
+    points: np.ndarray,
+    window: np.ndarray,
+    arguments: Sequence[np.ndarray],
+) -> np.ndarray:
+    """Run de Boor's recursion from control points, (K, d + 1, c), with numbers (K, d + 1), to values, (K, c)."""
+    degree = len(arguments)
+    for level, argument in enumerate(arguments, 1):
+        left = knots[window[:, level:]]
+        right = knots[window[:, level:] + degree - level + 1]
+        share = ((argument[:, None] - left) / (right - left))[:, :, None]
+        points = share * points[:, 1:] + (1.0 - share) * points[:, :-1]
+    return np.asarray(points[:, 0])
+
+
+def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
+    """Find the knot at which the piece of each x, (K,), begins; beyond the ends that of the outer piece."""
+    piece = np.searchsorted(knots, x, side="right") - 1
+    return np.clip(piece, degree, len(knots) - degree - 2)
+
+
+def _basis(
+    knots: np.ndarray, degree: int, x: np.ndarray, piece: np.ndarray
+) -> np.ndarray:
+    """Values, (K, d + 1), of the basis functions that differ from zero at x, (K,)."""
+    window = piece[:, None] + np.arange(-degree, 1)
+    points = np.broadcast_to(np.eye(degree + 1), (len(x), degree + 1, degree + 1))
+    return _recur(knots, points, window, [x] * degree)

@@ -1,0 +1,72 @@
+"""Splines, against SciPy's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
+
+from brachis.kernel import Spline, collocation
+
+KNOTS = np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.5, 0.5, 0.5, 0.5, 0.9, 1.0, 1.0, 1.0, 1.0])
+"""Of a cubic spline; two phases meet at 0.5."""
+X = np.sort(np.append(np.random.default_rng(4).uniform(0.0, 1.0, 60), [0.0, 0.5, 1.0]))
+
+
+@pytest.mark.parametrize("nu", range(4))
+@pytest.mark.parametrize("shape", [(), (2,), (2, 3)])
+def test_values_and_derivatives(nu, shape):
+    points = np.random.default_rng(1).normal(size=(len(KNOTS) - 4, *shape))
+    own = Spline(KNOTS, points, 3)(X.reshape(-1, 3), nu)
+    wanted = BSpline(KNOTS, points, 3)(X.reshape(-1, 3), nu)
+    assert own.shape == wanted.shape
+    np.testing.assert_allclose(own, wanted, rtol=1e-11, atol=1e-9)
+
+
+def test_higher_derivatives_vanish():
+    points = np.random.default_rng(1).normal(size=len(KNOTS) - 4)
+    assert not Spline(KNOTS, points, 3)(X, 4).any()
+    assert Spline(KNOTS, points, 3)(0.3).shape == ()
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+@pytest.mark.parametrize("more", [1, 2, 40, 500])
+def test_interpolation(degree, more):
+    rng = np.random.default_rng(more)
+    places = np.cumsum(rng.uniform(0.01, 1.0, degree + more))
+    values = rng.normal(size=(len(places), 2, 2))
+    own = Spline.through(places, values, degree)
+    wanted = make_interp_spline(places, values, k=degree)
+    np.testing.assert_allclose(own.knots, wanted.t)
+    size = np.abs(wanted.c).max()
+    np.testing.assert_allclose(
+        own.control_points, wanted.c, rtol=1e-9, atol=1e-9 * size
+    )
+    np.testing.assert_allclose(own(places), values, rtol=1e-9, atol=1e-9 * size)
+
+
+def test_cubic_interpolation_over_uneven_places():
+    """Steps that differ by a factor of 1e6."""
+    steps = 10.0 ** np.random.default_rng(2).uniform(-6.0, 0.0, 200)
+    places = np.cumsum(steps)
+    values = np.sin(places)
+    x = np.linspace(places[0], places[-1], 300)
+    own = Spline.through(places, values)
+    wanted = CubicSpline(places, values)
+    np.testing.assert_allclose(own(x), wanted(x), atol=1e-12)
+    np.testing.assert_allclose(own(x, 1), wanted(x, 1), atol=1e-8)
+
+
+def test_collocation():
+    points = np.random.default_rng(3).normal(size=(len(KNOTS) - 4, 2))
+    for nu in range(3):
+        matrix = collocation(KNOTS, 3, X, nu)
+        np.testing.assert_allclose(matrix @ points, Spline(KNOTS, points, 3)(X, nu))
+
+
+@pytest.mark.parametrize(
+    "places", [[0.0, 1.0, 2.0], [0.0, 1.0, 1.0, 2.0], [3.0, 2.0, 1.0, 0.0], [0.0] * 5]
+)
+def test_places_that_cannot_be_interpolated(places):
+    with pytest.raises(ValueError, match="places of an interpolation"):
+        Spline.through(np.array(places), np.ones(len(places)))
