@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import sys
+
+import brachis
 from brachis.common import interrupts
 
 
 def main() -> None:
     """Run the command line."""
     interrupts.install()
+    if sys.argv[1:] == ["--version"]:  # without the import of Typer
+        sys.stdout.write(f"brachis {brachis.__version__}\n")
+        return
     from brachis.apps.cli.main import main as run
 
     run()

@@ -1,6 +1,5 @@
 """The compiled library: where it is missing or belongs to other source, the message says so and what to do."""
 
-
 import numpy as np
 import pytest
 

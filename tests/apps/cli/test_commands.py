@@ -406,6 +406,15 @@ def test_version(run):
     assert (outcome.code, outcome.out) == (0, f"brachis {__version__}\n")
 
 
+def test_version_alone_is_printed_without_typer():
+    """In a process of its own, where a message tells of every import."""
+    command = [sys.executable, "-v", "-m", "brachis", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == f"brachis {__version__}\n"
+    assert "import 'brachis'" in done.stderr
+    assert "import 'typer'" not in done.stderr
+
+
 def test_inspect(run):
     outcome = run("inspect", SCARA, "--task-space", "x,y")
     assert outcome.code == 0
