@@ -43,6 +43,7 @@ FUNCTIONS = {
     "brachis_set_turns": "i llppppppp",
     "brachis_largest_parts": "- lllpppp",
     "brachis_solve_band": "- lllpp",
+    "brachis_blossoms": "- lllpppppp",
     "brachis_formula": "- llplplplplpp",
     "brachis_side_by_side": "l ",
 }

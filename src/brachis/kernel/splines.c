@@ -1,4 +1,4 @@
-/* Linear equations of interpolating splines; see splines.py. */
+/* Interpolating splines, and their values; see splines.py. */
 
 /* Solve equations with a band matrix: row i of `matrix`, (count, 2 d + 1), holds columns i - d to i + d, and is used up.
 `values`, (count, columns), become the solution. Rows are not exchanged: a matrix of B-splines, with no negative minor, does
@@ -29,6 +29,37 @@ void brachis_solve_band(long count, long d, long columns, double *matrix, double
                 sum -= own[k - i] * values[k * columns + c];
             }
             values[i * columns + c] = sum / own[0];
+        }
+    }
+}
+
+/* Blossoms of pieces of a spline of degree d, by de Boor's recursion, (count, columns): of the pieces that begin at the knots
+with the numbers `pieces`, (count), at `arguments`, (d, count). `points`, (knots - d - 1, columns), are the control points,
+`work` has room for (d + 1, columns). */
+void brachis_blossoms(
+    long count, long d, long columns, const double *knots, const double *points, const long *pieces,
+    const double *arguments, double *work, double *found
+)
+{
+    for (long k = 0; k < count; k++) {
+        const long first = pieces[k] - d;
+        for (long i = 0; i < (d + 1) * columns; i++) {
+            work[i] = points[first * columns + i];
+        }
+        for (long level = 1; level <= d; level++) {
+            const double x = arguments[(level - 1) * count + k];
+            for (long i = 0; i <= d - level; i++) {
+                const double left = knots[first + i + level];
+                const double right = knots[first + i + d + 1];
+                const double share = (x - left) / (right - left);
+                double *own = &work[i * columns];
+                for (long c = 0; c < columns; c++) {
+                    own[c] = share * own[columns + c] + (1.0 - share) * own[c];
+                }
+            }
+        }
+        for (long c = 0; c < columns; c++) {
+            found[k * columns + c] = work[c];
         }
     }
 }

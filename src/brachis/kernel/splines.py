@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brachis.kernel.library import address, load
+from brachis.kernel.library import address, as_doubles, load
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +54,11 @@ class Spline:
         piece = _find_piece(knots, degree, places)
         number = np.arange(len(places))[:, None]
         column = piece[:, None] + np.arange(-degree, 1)
+        # Of d + 1 successive control points each has a column of its own.
+        every = np.arange(len(places)) % (degree + 1)
+        basis = cls(knots, np.eye(degree + 1)[every], degree)(places)
         matrix = np.zeros((len(places), 2 * degree + 1))
-        matrix[number, column - number + degree] = _basis(knots, degree, places, piece)
+        matrix[number, column - number + degree] = basis[number, every[column]]
         points = np.array(values, dtype=float)
         columns = points.size // len(points)
         load().brachis_solve_band(
@@ -65,7 +69,7 @@ class Spline:
     def __call__(self, x: ArrayLike, nu: int = 0) -> np.ndarray:
         """Value, or derivative of the order `nu`, at x, of any shape; at a knot the one behind it."""
         if nu > 0:
-            return self.derivative()(x, nu - 1)
+            return self.derivative(x, nu - 1)
         x = np.asarray(x, dtype=float)
         flat = x.ravel()
         piece = _find_piece(self.knots, self.degree, flat)
@@ -73,8 +77,9 @@ class Spline:
         values = blossom(self.knots, points, piece, [flat] * self.degree)
         return values.reshape(x.shape + self.control_points.shape[1:])
 
+    @cached_property
     def derivative(self) -> Spline:
-        """Differentiate the spline; that of steps is zero."""
+        """The derivative as a spline; zero of steps."""
         points = self.control_points
         if self.degree == 0:
             return Spline(self.knots, np.zeros_like(points), 0)
@@ -112,36 +117,27 @@ def blossom(
     -------
     (K, c) ndarray
     """
-    window = piece[:, None] + np.arange(-len(arguments), 1)
-    return _recur(knots, control_points[window], window, arguments)
-
-
-def _recur(
-    knots: np.ndarray,
-    points: np.ndarray,
-    window: np.ndarray,
-    arguments: Sequence[np.ndarray],
-) -> np.ndarray:
-    """Run de Boor's recursion from control points, (K, d + 1, c), with numbers (K, d + 1), to values, (K, c)."""
     degree = len(arguments)
-    for level, argument in enumerate(arguments, 1):
-        left = knots[window[:, level:]]
-        right = knots[window[:, level:] + degree - level + 1]
-        share = ((argument[:, None] - left) / (right - left))[:, :, None]
-        points = share * points[:, 1:] + (1.0 - share) * points[:, :-1]
-    return np.asarray(points[:, 0])
+    count = len(piece)
+    points = as_doubles(
+        control_points, (len(knots) - degree - 1, *control_points.shape[1:])
+    )
+    columns = points.shape[1]
+    numbers = piece.astype("l", order="C", copy=False)
+    if count and not degree <= piece.min() <= piece.max() < len(points):
+        raise ValueError(
+            f"a piece does not exist; they are {degree} to {len(points) - 1}"
+        )
+    at = as_doubles(np.array(arguments), (degree, count)) if degree else np.empty(0)
+    own_knots = as_doubles(knots, knots.shape)
+    work = np.empty((degree + 1, columns))
+    found = np.empty((count, columns))
+    given = map(address, (own_knots, points, numbers, at, work, found))
+    load().brachis_blossoms(count, degree, columns, *given)
+    return found
 
 
 def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
     """Find the knot at which the piece of each x, (K,), begins; beyond the ends that of the outer piece."""
     piece = np.searchsorted(knots, x, side="right") - 1
     return np.clip(piece, degree, len(knots) - degree - 2)
-
-
-def _basis(
-    knots: np.ndarray, degree: int, x: np.ndarray, piece: np.ndarray
-) -> np.ndarray:
-    """Values, (K, d + 1), of the basis functions that differ from zero at x, (K,)."""
-    window = piece[:, None] + np.arange(-degree, 1)
-    points = np.broadcast_to(np.eye(degree + 1), (len(x), degree + 1, degree + 1))
-    return _recur(knots, points, window, [x] * degree)

@@ -15,6 +15,7 @@ that brings its basis nearest to the one before (orthogonal Procrustes problem; 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -95,16 +96,24 @@ class ChartRows:
         )
         return tuple(int(joint) for joint in np.argmax(rows, axis=1)) if unit else ()
 
+    @cached_property
     def _spline(self) -> Spline:
         return Spline(np.asarray(self.knots), self.coefficients, DEGREE)
 
+    @cached_property
+    def _orders_at(self) -> LastCall[np.ndarray]:
+        return LastCall(self._orders)
+
+    def _orders(self, s: np.ndarray) -> np.ndarray:
+        """[C, p] and, where they are not constant, three derivatives by s, (1 or 4, K, r, n + 1)."""
+        if self.knots is None:
+            shape = (1, len(s), *self.coefficients.shape[1:])
+            return np.broadcast_to(self.coefficients, shape)
+        return np.array([self._spline(s, order) for order in range(4)])
+
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """C, (K, r, n), and p, (K, r), at path coordinates (K,)."""
-        if self.knots is None:
-            shape = (len(s), *self.coefficients.shape[1:])
-            values = np.broadcast_to(self.coefficients, shape)
-        else:
-            values = self._spline()(s)
+        values = self._orders_at(s)[0]
         return values[:, :, :-1], values[:, :, -1]
 
     def values(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -117,10 +126,9 @@ class ChartRows:
         rows, _ = self.at(s)
         if self.knots is None:
             return Conditions(rows)
-        spline = self._spline()
-        values = np.array([spline(s, nu=order) for order in (1, 2, 3)])
-        turning = values[..., :-1]
-        drift = np.einsum("okij,kj->oki", turning, q) - values[..., -1]
+        orders = self._orders_at(s)[1:]
+        turning = orders[..., :-1]
+        drift = (turning @ q[:, :, None])[..., 0] - orders[..., -1]
         return Conditions(rows, turning[:2], drift)
 
 
@@ -169,7 +177,6 @@ class ChartMap(PathMap):
         table = np.concatenate([reference, sigma, self_motion], axis=1)
         self._lines = Spline.through(s, table, 1)
         self.sample_at = LastCall(path.sample)
-        self._rows_at = LastCall(rows.at)
         self._reference_at = LastCall(self._between)
         even = np.linspace(0.0, 1.0, 33)
         augmented = self._augmented_at(even, self._between(even)[0])
@@ -209,7 +216,7 @@ class ChartMap(PathMap):
         """Joint positions, (K, n), at any times; without `near` the search begins at the reference."""
         s = y[:, 0]
         targets = (sample or self.path.sample(s)).target
-        rows, offset = self._rows_at(s)
+        rows, offset = self.rows.at(s)
         wanted = y[:, 1:] + offset
         if near is not None:
             return self._newton.solve(targets, near, rows, wanted)

@@ -213,12 +213,12 @@ class SequencePath:
         values = np.atleast_1d(np.asarray(s, dtype=float))
         which = np.searchsorted(self.breaks[1:-1], values, side="right")
         result = np.empty((order + 1, values.size, self._coordinates))
-        by_piece = np.argsort(which, kind="stable")
-        used, starts = np.unique(which[by_piece], return_index=True)
-        for i, here in zip(used, np.split(by_piece, starts[1:]), strict=True):
+        runs = np.flatnonzero(np.diff(which)) + 1
+        for begin, end in pairwise([0, *runs.tolist(), values.size]):
+            i = which[begin]
             piece = self.pieces[i]
-            sigma = piece.first + (values[here] - self.breaks[i]) * self.total
-            result[:, here] = piece.curve.derivatives(sigma, order)
+            sigma = piece.first + (values[begin:end] - self.breaks[i]) * self.total
+            result[:, begin:end] = piece.curve.derivatives(sigma, order)
         result *= self.total ** np.arange(order + 1)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T

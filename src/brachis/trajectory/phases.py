@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,9 +51,14 @@ class PhaseSpline(Summary):
 
         At knots those just after them.
         """
-        spline = Spline(self.knots, self.control_points.T, self.degree)
         t_norm = np.clip(t / self.t_end, 0.0, 1.0)
-        return tuple(spline(t_norm, nu=order) / self.t_end**order for order in range(4))
+        orders = (self._spline(t_norm, order) for order in range(4))
+        return tuple(part / self.t_end**order for order, part in enumerate(orders))
+
+    @cached_property
+    def _spline(self) -> Spline:
+        """The curves over normalised time."""
+        return Spline(self.knots, self.control_points.T, self.degree)
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""

@@ -21,6 +21,7 @@ definition of the motion, for all who evaluate it, the verification included.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,7 +49,7 @@ class Pieces:
     def __call__(self, t: ArrayLike, nu: int = 0) -> np.ndarray:
         """Values, or derivatives of the order `nu`, (..., n), at times t, (...), s; at a node those behind it."""
         if nu > 0:
-            return self.derivative()(t, nu - 1)
+            return self.derivative(t, nu - 1)
         t = np.asarray(t, dtype=float)
         flat = t.ravel()
         piece = np.searchsorted(self.x[1:-1], flat, side="right")
@@ -59,8 +60,9 @@ class Pieces:
             values = (1.0 - u) * values[:-1] + u * values[1:]
         return np.asarray(values[0]).reshape(*t.shape, -1)
 
+    @cached_property
     def derivative(self) -> Pieces:
-        """Differentiate the polynomials by time."""
+        """The derivatives of the polynomials by time."""
         degree = len(self.c) - 1
         return Pieces(
             degree * np.diff(self.c, axis=0) / np.diff(self.x)[:, None], self.x

@@ -49,7 +49,7 @@ def _path_speeds(
     """Return ds/dt, 1/s, of a phase at times since its beginning, s, at its knots, and wherever it turns."""
     knots = curves.knots * curves.t_end
     spline = Spline(knots, curves.control_points[0], curves.degree)
-    bend = spline.derivative().derivative()
+    bend = spline.derivative.derivative
     begins = np.unique(knots)
     piece, u = roots(_bernstein_coefficients(bend, begins))
     turning = begins[piece] + u * np.diff(begins)[piece]
