@@ -13,7 +13,7 @@ from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Conditions, PathMotion, find_least_singular
 from brachis.kernel.rotations import body_twists, rotation_derivatives
-from brachis.kernel.splines import Spline, blossom, collocation
+from brachis.kernel.splines import Spline, blossom, collocation, sum_basis
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
 from brachis.kernel.turns import follow_turns, pick_nearest, set_turns
 
@@ -42,5 +42,6 @@ __all__ = [
     "rotation_derivatives",
     "rotation_vectors",
     "set_turns",
+    "sum_basis",
     "tool_derivatives",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -44,11 +45,14 @@ FUNCTIONS = {
     "brachis_largest_parts": "- lllpppp",
     "brachis_solve_band": "- lllpp",
     "brachis_blossoms": "- lllpppppp",
+    "brachis_curves": "- lllllpppp",
     "brachis_formula": "- llplplplplpp",
     "brachis_side_by_side": "l ",
 }
 """What functions return and take: pointer, long, double, int, or nothing."""
 _DOUBLE = np.dtype(np.float64)
+_find_address = ctypes.addressof
+_find_buffer: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 
 
 @cache
@@ -91,7 +95,7 @@ def _open(path: Path) -> ctypes.CDLL:
 def address(values: np.ndarray) -> int:
     """Return where the numbers of a contiguous array begin."""
     try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(values))  # type: ignore[arg-type]
+        return _find_address(_find_buffer(values))
     except (TypeError, ValueError):  # read-only, or empty
         place, _ = values.__array_interface__["data"]
         return int(place)

@@ -63,3 +63,32 @@ void brachis_blossoms(
         }
     }
 }
+
+/* Values of splines and their derivatives, (orders, count, curves), by `width` basis functions of each place: `basis`, (orders,
+count, width), of the control points from the one with number `first`, (count), on. `points` are (curves, many). The sum is
+taken from the nearest point, so that derivatives vanish without rounding where points are equal. */
+void brachis_curves(
+    long orders, long count, long width, long curves, long many, const double *basis, const long *first, const double *points,
+    double *found
+)
+{
+    for (long k = 0; k < count; k++) {
+        const double *value = &basis[k * width];
+        long nearest = 0;
+        for (long w = 1; w < width; w++) {
+            nearest = value[w] > value[nearest] ? w : nearest;
+        }
+        for (long j = 0; j < curves; j++) {
+            const double *own = &points[j * many + first[k]];
+            const double beside = own[nearest];
+            for (long o = 0; o < orders; o++) {
+                const double *weight = &basis[(o * count + k) * width];
+                double sum = 0.0;
+                for (long w = 0; w < width; w++) {
+                    sum += weight[w] * (own[w] - beside);
+                }
+                found[(o * count + k) * curves + j] = o == 0 ? sum + beside : sum;
+            }
+        }
+    }
+}

@@ -141,3 +141,31 @@ def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
     """Find the knot at which the piece of each x, (K,), begins; beyond the ends that of the outer piece."""
     piece = np.searchsorted(knots, x, side="right") - 1
     return np.clip(piece, degree, len(knots) - degree - 2)
+
+
+def sum_basis(
+    basis: np.ndarray, first: np.ndarray, control_points: np.ndarray
+) -> np.ndarray:
+    """Values of splines and their derivatives, (orders, K, c), by the basis functions that matter at K places.
+
+    Parameters
+    ----------
+    basis : (orders, K, w) ndarray
+    first : (K,) int ndarray
+        Number of the control point of the first of them.
+    control_points : (c, L) ndarray
+    """
+    orders, count, width = basis.shape
+    curves, many = control_points.shape
+    if first.shape != (count,):
+        raise ValueError("a place has no first control point")
+    if count and not 0 <= first.min() <= first.max() <= many - width:
+        raise ValueError(f"a control point does not exist; there are {many}")
+    kept = (
+        as_doubles(basis, basis.shape),
+        first.astype("l", order="C", copy=False),
+        as_doubles(control_points, control_points.shape),
+        np.empty((orders, count, curves)),
+    )
+    load().brachis_curves(orders, count, width, curves, many, *map(address, kept))
+    return kept[-1]

@@ -271,6 +271,17 @@ class Description:
         return self.kind.replace("_", " ")
 
     @property
+    def is_checked_at_points(self) -> bool:
+        """Whether a violation counts at single points."""
+        return self.role is not Role.SAFEGUARD and not self.guarantee.is_mean
+
+    @property
+    def is_of_postures(self) -> bool:
+        """Whether it is one of postures alone, whatever the timing."""
+        has_posture = self.at_rest != "nothing" and self.longer_time == "neither"
+        return self.is_checked_at_points and has_posture
+
+    @property
     def centre(self) -> np.ndarray:
         """Value, (c,), that uses nothing of the limit; by default the middle between two finite bounds."""
         with np.errstate(invalid="ignore"):  # -inf + inf

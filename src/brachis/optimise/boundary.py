@@ -12,11 +12,13 @@ linear in the control points too (see `periodic`). Boundary conditions therefore
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from brachis.kernel import sum_basis
 from brachis.optimise.bspline import ORDERS, local_basis
 from brachis.path.time_law import TimeLaw
 
@@ -137,9 +139,9 @@ class BoundarySpline:
         """Greville abscissae (N + d,): the normalised times to which the control points belong."""
         return greville(self.knots, self.degree)
 
-    def given_points(self, duration: float, *, slope: bool = False) -> np.ndarray:
-        """Return the given part of the control points, (N + d,); or its slope by the duration, s."""
-        return sum_powers(self.given, duration, slope=slope)
+    def given_points(self, duration: float) -> np.ndarray:
+        """Return the given part of the control points, (N + d,)."""
+        return sum_powers(self.given, duration)
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
@@ -153,6 +155,37 @@ class BoundarySpline:
         variable = part.variable[is_alone]
         sums = np.bincount(variable, own_part[part.point[is_alone]], self.free)
         return np.asarray(sums / np.bincount(variable, minlength=self.free))
+
+
+def stack_splines(
+    splines: Sequence[BoundarySpline], slices: Sequence[slice], shape: tuple[int, int]
+) -> tuple[FreePart, np.ndarray]:
+    """Put splines over the same knots together: the control points of one follow those of the one before.
+
+    Parameters
+    ----------
+    splines : sequence of BoundarySpline
+    slices : sequence of slice
+        Where the free variables of each are among all variables.
+    shape : tuple of int
+        Number of control points of each spline, and of all variables.
+
+    Returns
+    -------
+    free_part : FreePart
+        By all variables.
+    given : (1 + k, all control points) ndarray
+        By powers of the duration.
+    """
+    count, variables = shape
+    most = max((len(spline.given) for spline in splines), default=1)
+    given = np.zeros((most, len(splines), count))
+    matrix = np.zeros((len(splines), count, variables))
+    for number, (spline, own) in enumerate(zip(splines, slices, strict=True)):
+        given[: len(spline.given), number] = spline.given
+        matrix[number, :, own] = spline.free_part.matrix()
+    free_part = FreePart.of(matrix.reshape(-1, variables))
+    return free_part, given.reshape(most, -1)
 
 
 def sum_powers(
@@ -302,13 +335,13 @@ class LocalBasis:
 
     Attributes
     ----------
-    columns : (K, d + 1) int ndarray
-        Control points that matter at each time.
+    first : (K,) int ndarray
+        Number of the first of the d + 1 control points that matter at each time.
     values : (4, K, d + 1) ndarray
         Per unit of normalised time.
     """
 
-    columns: np.ndarray
+    first: np.ndarray
     values: np.ndarray
 
     @classmethod
@@ -319,18 +352,16 @@ class LocalBasis:
         place = np.searchsorted(breaks, t_norm - 1e-13).clip(max=len(breaks) - 1)
         near = breaks[place]
         at = np.where(np.abs(near - t_norm) <= 1e-13, near, t_norm)
-        first, values = local_basis(knots, degree, at)
-        return cls(first[:, None] + np.arange(degree + 1), values)
+        return cls(*local_basis(knots, degree, at))
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Control points that matter at each time, (K, d + 1)."""
+        return self.first[:, None] + np.arange(self.values.shape[2])
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
         """Value and three derivatives (4, K, c) of c splines with control points (c, N + d)."""
-        points = control_points[:, self.columns]
-        # From the nearest point, so that derivatives where points are equal vanish, without rounding.
-        nearest = self.values[0].argmax(axis=1)[None, :, None]
-        beside = np.take_along_axis(points, nearest, axis=2)
-        found = np.einsum("okw,ckw->okc", self.values, points - beside)
-        found[0] += beside[:, :, 0].T
-        return np.asarray(found)
+        return sum_basis(self.values, self.first, control_points)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from brachis.limits import Limit, Moments
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
-from brachis.optimise.phase import Phase, is_checked_at_points, is_of_postures
+from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming, largest_acceleration
 from brachis.optimise.timed_splines import breaks_for, splines_along
 from brachis.timing import Timing
@@ -254,7 +254,7 @@ def _look_at_postures(phase: Phase, laid: Laid) -> Laid:
     beyond = [
         limit.violation(limit.values(still)).max()
         for limit in phase.limits
-        if is_of_postures(limit)
+        if limit.is_of_postures
     ]
     return replace(laid, outside=max(beyond, default=0.0))
 
@@ -272,7 +272,7 @@ def _hold_limits(
     limits = [
         limit
         for limit in phase.limits
-        if is_checked_at_points(limit) and limit.longer_time == "relieves"
+        if limit.is_checked_at_points and limit.longer_time == "relieves"
     ]
     timing = fastest
     best = Laid(_lay_splines(phase, own, timing, breaks))

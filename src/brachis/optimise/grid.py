@@ -199,7 +199,6 @@ class FreeGrid(FixedGrid):
         self._inside = (around >= 0) & (around < count)
         # Beyond the ends: an interval without length.
         self._around = np.where(self._inside, around, count)
-        self._columns = self._interval[:, None] + np.arange(degree + 1)
         self.point, _ = np.nonzero(self._inside)
         self.variable = around[self._inside]
         self._last: tuple[bytes, LocalBasis] | None = None
@@ -225,13 +224,13 @@ class FreeGrid(FixedGrid):
         key = h.tobytes()
         if self._last is None or self._last[0] != key:
             values = basis_functions(self._lengths_around(h), self._fraction)
-            self._last = (key, LocalBasis(self._columns, values))
+            self._last = (key, LocalBasis(self._interval, values))
         return self._last[1]
 
     def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
         """Differentiate splines by the 2 d - 1 lengths around each collocation point."""
         derivatives = basis_derivatives(self._lengths_around(h), self._fraction)
-        points = control_points[:, self._columns]
+        points = control_points[:, self.basis(h).columns]
         slopes = np.einsum("oikw,ckw->okic", derivatives, points)
         return np.asarray(slopes[:, self._inside])
 

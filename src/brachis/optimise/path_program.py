@@ -24,9 +24,10 @@ from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
 from brachis.kernel import find_entries
 from brachis.limits import Limit, Moments
-from brachis.optimise.bspline import basis_matrix, clamped_knots, local_basis
+from brachis.optimise.boundary import LocalBasis
+from brachis.optimise.bspline import basis_matrix, clamped_knots
 from brachis.optimise.evaluator import Evaluation, Evaluator
-from brachis.optimise.phase import Phase, is_of_postures
+from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Link, is_safeguard
 from brachis.path.time_law import TimeLaw
@@ -62,7 +63,7 @@ _STATIONS_A_PIECE = 4
 def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
     """Return the largest violation of a limit on postures along curves, (S, c)."""
     motion = _moments_along(phase, curves)
-    of_postures = [limit for limit in phase.limits if is_of_postures(limit)]
+    of_postures = [limit for limit in phase.limits if limit.is_of_postures]
     found = [limit.violation(limit.values(motion)).max() for limit in of_postures]
     return float(max(found, default=0.0))
 
@@ -140,10 +141,7 @@ class PathPhase:
         breaks = self._part(np.interp(evenly, t, curves[:, 0]))
         self.breaks = breaks
         self._knots = clamped_knots(_DEGREE, breaks)
-        first, basis = local_basis(self._knots, _DEGREE, self._part(places))
-        self._basis = basis / self._way ** np.arange(4)[:, None, None]
-        columns = first[:, None] + np.arange(_DEGREE + 1)
-        self._columns = columns
+        self._basis = self._basis_at(places)
         self._count = intervals + _DEGREE
         matrix = basis_matrix(self._knots, _DEGREE, self._part(curves[:, 0]))
         points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
@@ -160,7 +158,7 @@ class PathPhase:
         # Splines over time leave a joint path by a little.
         for values, limit in self._posture_limits():
             self._narrow(values, limit.inset / limit.violation_scale)
-        self._set_pattern(columns)
+        self._set_pattern(self._basis.columns)
         self._last: tuple[bytes, Evaluation] | None = None
 
     def _set_pattern(self, columns: np.ndarray) -> None:
@@ -226,6 +224,12 @@ class PathPhase:
         """Path coordinates as parts of the way, from 0 to 1."""
         return np.asarray(((s - self._begin) / self._way).clip(0.0, 1.0))
 
+    def _basis_at(self, s: np.ndarray) -> LocalBasis:
+        """Basis functions of the curves at path coordinates, (S,), and their derivatives by these."""
+        basis = LocalBasis.of(self._knots, _DEGREE, self._part(s))
+        orders = np.arange(len(basis.values))[:, None, None]
+        return LocalBasis(basis.first, basis.values / self._way**orders)
+
     def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """X at the stations, (P,), and control points, (r, M + 3)."""
         count = len(self._s)
@@ -235,10 +239,7 @@ class PathPhase:
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Y' and y'', (L, c), and X and u, (L, 1), at the L places where limits hold; y in front."""
         squares, points = self._split(x)
-        near = points[:, self._columns]
-        y, y_ds, y_dds = (
-            np.einsum("mk,jmk->mj", basis, near) for basis in self._basis[:3]
-        )
+        y, y_ds, y_dds, _ = self._basis.curves(points)
         number = self._number
         square = squares[number + 1, None]
         square = square + self._ahead * (squares[number, None] - square)
@@ -284,7 +285,7 @@ class PathPhase:
         for limit in self._limits:
             columns = slice(first, first + len(limit.lower))
             first = columns.stop
-            if is_of_postures(limit):
+            if limit.is_of_postures:
                 yield columns, limit
 
     def _narrow(self, columns: slice, by: np.ndarray | float) -> None:
@@ -340,7 +341,7 @@ class PathPhase:
         by_squares = np.zeros((2, 3, *y_ds.shape))
         by_squares[:, 1] = units * share * half * y_ds
         by_squares[:, 2] = units * (share * y_dds + sign * of_step)
-        value, first, second, _ = self._basis
+        value, first, second, _ = self._basis.values
         basis = np.array([value, first * rate, second * square + first * u])
         slopes = self.evaluate(x).slopes[:3]
         return find_entries(
@@ -358,10 +359,7 @@ class PathPhase:
 
     def course(self, x: np.ndarray, s: np.ndarray) -> Course:
         """Take the curves at path coordinates s, (S,)."""
-        first, basis = local_basis(self._knots, _DEGREE, self._part(s))
-        near = self._split(x)[1][:, first[:, None] + np.arange(_DEGREE + 1)]
-        basis = basis / self._way ** np.arange(4)[:, None, None]
-        y, y_ds, y_dds = (np.einsum("mk,jmk->mj", own, near) for own in basis[:3])
+        y, y_ds, y_dds, _ = self._basis_at(s).curves(self._split(x)[1])
         return Course(
             s,
             np.column_stack([s, y]),

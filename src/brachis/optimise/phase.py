@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -26,12 +27,16 @@ from brachis.optimise.boundary import (
     BoundarySpline,
     EndCondition,
     LocalBasis,
+    stack_splines,
+    sum_powers,
 )
 from brachis.optimise.bspline import ORDERS
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.grid import FixedGrid, FreeGrid
 from brachis.optimise.layout import Layout
 from brachis.optimise.motion import Motion, per_second, sample_law
+
+_is_checked = attrgetter("is_checked_at_points")
 
 
 class Phase:
@@ -113,6 +118,9 @@ class Phase:
         self.intervals = len(grid.breaks) - 1
         self.t_norm = grid.t_norm
         self.variables = len(layout.x_lower)
+        self._points = len(self.splines), self.intervals + self.degree
+        shape = self._points[1], self.variables
+        self._together = stack_splines(self.splines, layout.slices, shape)
         self.x_lower = layout.x_lower
         self.x_upper = layout.x_upper
         self.lower = layout.lower
@@ -183,7 +191,7 @@ class Phase:
         if self.joint_map.r:
             ends = self.joint_map.postures(curves[[0, -1]])
             limits = [
-                limit.keep_inside(ends) if is_of_postures(limit) else limit
+                limit.keep_inside(ends) if limit.is_of_postures else limit
                 for limit in limits
             ]
         return self.with_limits(limits)
@@ -214,9 +222,9 @@ class Phase:
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
-        parts = zip(self.splines, self.slices, strict=True)
-        points = [spline.control_points(x[part], x[0]) for spline, part in parts]
-        return np.reshape(points, (len(self.splines), self.intervals + self.degree))
+        free_part, given = self._together
+        points = free_part.control_points(x) + sum_powers(given, x[0])
+        return points.reshape(self._points)
 
     def _orders(
         self, x: np.ndarray, control_points: np.ndarray, *, is_slope: bool = False
@@ -346,7 +354,7 @@ class Phase:
         Limits that hold over the whole motion are left out. So are safeguards, which are numerical and not physical.
         Raises UnreachableError as `evaluate` does.
         """
-        return self.evaluate(x).violation(is_checked_at_points)
+        return self.evaluate(x).violation(_is_checked)
 
     def violation_at(self, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
         """As `violation`, at other normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
@@ -359,7 +367,7 @@ class Phase:
         evaluation = self.evaluator.evaluate(
             *motion.at(t_norm * motion.t_end), near=near
         )
-        return evaluation.violation(is_checked_at_points)
+        return evaluation.violation(_is_checked)
 
     def time_scaling_ratios(
         self, x: np.ndarray, *, with_means: bool = True
@@ -465,8 +473,7 @@ class Phase:
         slower = np.array(self.state(x).curves) * rates[:, None, None]
         if not self._ends_by_duration:
             return slower
-        given = [spline.given_points(x[0], slope=True) for spline in self.splines]
-        points = np.reshape(given, (len(self.splines), self.intervals + self.degree))
+        points = sum_powers(self._together[1], x[0], slope=True).reshape(self._points)
         moving = per_second(self._orders(x, points, is_slope=True), x[0])
         return np.array(moving) + slower
 
@@ -477,17 +484,6 @@ class Phase:
             own = [part.entries(basis.values) for part in self._layout.patterns]
             self._entries = (basis, np.concatenate([np.empty((ORDERS, 0)), *own], 1))
         return np.array(per_second(self._entries[1], x[0]))
-
-
-def is_checked_at_points(limit: Limit) -> bool:
-    """Tell whether a violation of the limit counts at single points."""
-    return limit.role is not Role.SAFEGUARD and not limit.guarantee.is_mean
-
-
-def is_of_postures(limit: Limit) -> bool:
-    """Tell whether the limit is one of postures alone, whatever the timing."""
-    is_held = is_checked_at_points(limit) and limit.at_rest != "nothing"
-    return is_held and limit.longer_time == "neither"
 
 
 def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:

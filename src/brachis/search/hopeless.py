@@ -24,7 +24,6 @@ import numpy as np
 from brachis.errors import Remedy
 from brachis.limits import Limit, Moments
 from brachis.optimise.candidate import InitialGuess
-from brachis.optimise.phase import is_of_postures
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Problem
 from brachis.search.failure import Failure
@@ -123,7 +122,7 @@ def explain_postures(starts: Sequence[InitialGuess]) -> Failure | None:
         q = postures_along(start, _S)
         if q is None:
             continue
-        of_postures = filter(is_of_postures, start.problem.limits)
+        of_postures = [own for own in start.problem.limits if own.is_of_postures]
         found = [explain_beyond(start.problem, limit, _S, q) for limit in of_postures]
         exceeded = [each for each in found if each is not None]
         if not exceeded:
