@@ -112,10 +112,15 @@ def sum_up(steps: npt.ArrayLike) -> Array:
     return np.append(0.0, np.cumsum(steps))
 
 
-def shares_along(points: Array, begin: Array, side: Array) -> Array:
-    """Return where points, (n, p), are nearest to the sides that begin at `begin`, as shares of these, (n,)."""
+def project_on_sides(points: Array, begin: Array, side: Array) -> tuple[Array, Array]:
+    """Return where points, (n, p), are nearest to the sides that begin at `begin`, as shares of these, (n,).
+
+    Beside it stand the distances there, (n,).
+    """
+    away = points - begin
     lengths = np.maximum(np.sum(side**2, axis=1), 1e-300)
-    return np.clip(np.sum((points - begin) * side, axis=1) / lengths, 0.0, 1.0)
+    shares = np.clip(np.sum(away * side, axis=1) / lengths, 0.0, 1.0)
+    return shares, np.linalg.norm(away - shares[:, None] * side, axis=1)
 
 
 def angles_between(one: Array, other: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
-from brachis.task.fields import LARGEST
+from brachis.task.fields import LARGEST, POSITION
 from brachis.task.point_data import FileUnits, PointFile
 from brachis.task.points.points import Array, Indices, Points, PointsAndNotes, Rows
 from brachis.task.points.units import (
@@ -174,7 +174,6 @@ def _number(cell: str) -> float:
         return math.nan
 
 
-POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _ORIENTATIONS: Final = {
     _QUATERNION: ("quaternion_wxyz",),
