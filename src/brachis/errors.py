@@ -33,7 +33,7 @@ Examples
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Self, TypedDict, Unpack
 
@@ -270,6 +270,15 @@ class UnknownNameError(InputError):
         )
 
 
+def check_names(
+    kind: str, names: Iterable[str], valid: Collection[str], where: str
+) -> None:
+    """Refuse the first of the names that does not exist; see `UnknownNameError`."""
+    for name in names:
+        if name not in valid:
+            raise UnknownNameError(kind, name, valid, where=where)
+
+
 class LimitError(InputError):
     """A limit is missing or not usable.
 
@@ -282,23 +291,13 @@ class LimitError(InputError):
     """
 
     def __init__(
-        self,
-        problem: str,
-        *,
-        joint: str,
-        key: str,
-        found: object = None,
-        allowed: object = None,
+        self, problem: str, *, joint: str, key: str, **details: Unpack[Details]
     ) -> None:
         self.joint = joint
         self.key = key
-        super().__init__(
-            problem,
-            found=found,
-            allowed=allowed,
-            where=f"joint {joint!r}",
-            hint=f"Set {key} in the task file",
-        )
+        details["where"] = f"joint {joint!r}"
+        details["hint"] = f"Set {key} in the task file"
+        super().__init__(problem, **details)
 
 
 class PathError(InputError):
@@ -406,10 +405,7 @@ class PlanningError(BrachisError):
 
 
 def nearest(
-    name: str,
-    valid: Iterable[str],
-    *,
-    is_attribute: bool = False,
+    name: str, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
     """Suggest a valid name: one for a word of other libraries, else the longest beginning of `name`, else the nearest.
 

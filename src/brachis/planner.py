@@ -67,8 +67,6 @@ _OWN_KEYWORDS = (
     "progress",
     "check_advice",
 )
-_EXACT_SHARE = 0.5
-"""Part of the time in which a motion without tolerances is looked for."""
 
 
 def plan(
@@ -164,7 +162,7 @@ def plan(
         deadline = Deadline.after(asked.search.time_limit - (loaded - began))
         try:
             remarks = of_robot(robot) + of_task(asked)
-            remarks = report_issues(remarks, strict=asked.strict, stacklevel=3)
+            remarks = report_issues(remarks, strict=asked.strict)
             _report_plan(robot, asked, report)
             problem = Problem.of(robot, asked, own_limits)
             places = of_places(
@@ -174,7 +172,7 @@ def plan(
                 problem.end,
                 asked.path_start,
             )
-            remarks += report_issues(places, strict=asked.strict, stacklevel=3)
+            remarks += report_issues(places, strict=asked.strict)
             search = _open_search(problem, families, deadline, report)
             exact = None
             if known is None and asked.tolerances != Tolerances():
@@ -194,7 +192,7 @@ def plan(
             smoothed = _find_smoother(best, problem, left, report)
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
-            remarks += report_issues(end_time, strict=asked.strict, stacklevel=3)
+            remarks += report_issues(end_time, strict=asked.strict)
             assert best.trajectory is not None
             gap = find_timing_gap(best.trajectory, problem.limits)
             is_given = asked.spline.intervals != "auto"
@@ -263,7 +261,7 @@ def _plan_exactly(
     task = problem.task.model_copy(update={"tolerances": Tolerances()})
     try:
         exact = Problem.of(robot, task, problem.user_limits)
-        soon = deadline.part(_EXACT_SHARE)
+        soon = deadline.part(0.5)  # the rest is for the search with tolerances
         search = _open_search(exact, families, soon, report)
         search.run()
     except BrachisError:  # the tolerances are needed

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from brachis.errors import NotInstalledError, UnknownNameError
+from brachis.errors import NotInstalledError, check_names
 from brachis.search.planned import PlannedMotion
 
 if TYPE_CHECKING:
@@ -81,10 +81,7 @@ class Result(PlannedMotion):
 
         if kind == CANDIDATES:
             return plots.plot_candidates(self.candidates)
-        if kind not in plots.PLOTS:
-            raise UnknownNameError(
-                "plot", kind, (*plots.PLOTS, CANDIDATES), where="kind"
-            )
+        check_names("plot", [kind], (*plots.PLOTS, CANDIDATES), "kind")
         return plots.PLOTS[kind](self.trajectory)
 
     def report(

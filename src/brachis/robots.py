@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 
 from brachis.common.files import is_file, shipped_folder
-from brachis.errors import UnknownNameError, no_attribute
+from brachis.errors import check_names, no_attribute
 from brachis.robot import Robot
 
 
@@ -35,8 +35,7 @@ def path_of(name: str) -> Path:
     UnknownNameError
         brachis has no robot of this name.
     """
-    if name not in names():
-        raise UnknownNameError("robot", name, names(), where="brachis.robots")
+    check_names("robot", [name], names(), "brachis.robots")
     return shipped_folder("robots") / name / "robot.urdf"
 
 

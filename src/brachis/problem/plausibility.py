@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 
 from brachis.errors import PathError, write_apart
 from brachis.robot import Robot, TaskMap
@@ -18,16 +19,11 @@ from brachis.robot.joints import TURN, UNITS
 from brachis.robot.plausibility import Check, Issue, find_issues, link_lengths, reach
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
-from brachis.task import Task, ToolPose
-from brachis.task.limit_kinds import FASTEST
-from brachis.task.limit_models import SpeedTable
+from brachis.task import LIMIT_KINDS, SpeedTable, Task, ToolPose
+from brachis.task.limit_kinds import FASTEST, UsualLimit
 
 if TYPE_CHECKING:
     from brachis.path import Path
-from collections.abc import Callable
-
-from brachis.task import LIMIT_KINDS
-from brachis.task.limit_kinds import UsualLimit
 
 _OR_NULL = ", or null for no limit"
 _OF_SIZE = " for an arm of this size"
@@ -141,9 +137,11 @@ def of_places(
     """
     along = path.sample(np.linspace(0.0, 1.0, 401)).target
     of_joints = isinstance(task_map, JointSpace)
-    postures = {"start.joints": start, "path": along, "end.joints": end}
-    if not of_joints:
-        del postures["path"]
+    postures = {
+        "start.joints": start,
+        "path": along if of_joints else None,
+        "end.joints": end,
+    }
     figures = [
         figure
         for key, given in postures.items()
@@ -257,7 +255,9 @@ def of_robot(robot: Robot) -> tuple[Issue, ...]:
     """Look at limits, friction, lengths, masses, payload and mounting of a robot."""
     bare = robot.with_payload(None) if robot.settings.payload else robot
     figures = (
-        *limit_figures(bare),
+        *_magnitudes(bare),
+        *_ranges(bare),
+        *_curves(bare),
         *_lengths(robot),
         *_masses(bare),
         *_payload(robot, bare),
@@ -309,7 +309,7 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Check]:
         return
     size = max(1.0, sum(link_lengths(robot)) if robot.revolute.any() else reach(robot))
     # The strongest arms carry as much as they weigh.
-    moved = sum(body.mass for body in list(bare.model.inertias)[1:])
+    moved = pin.computeTotalMass(bare.model)
     heaviest = (3.0 * moved or math.inf) / USUAL["robot.payload.mass"][1]
     inertia = payload.inertia
     moment = max(inertia.ixx, inertia.iyy, inertia.izz) if inertia else 0.0
@@ -361,17 +361,8 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
     )
 
 
-_HOLDS = 50.0
-"""Arms hold a tenth to five times their own weight at full reach."""
-
-
-def limit_figures(robot: Robot) -> Iterator[Check]:
-    """Yield all figures of the limits of a robot without payload."""
-    for look in (_magnitudes, _ranges, _curves):
-        yield from look(robot)
-
-
 def _magnitudes(robot: Robot) -> Iterator[Check]:
+    """Look at the limits around zero of a robot without payload."""
     for kind, row in LIMIT_KINDS.items():
         usual = row.usual
         if usual is None:
@@ -380,19 +371,19 @@ def _magnitudes(robot: Robot) -> Iterator[Check]:
         values = values / getattr(robot.settings.limits.scale, kind)
         if usual.overridden:
             values = values / robot.settings.speed_override
-        largest = _largest_usual(robot, usual)
         for i, (name, unit, value) in enumerate(
             zip(robot.joint_names, robot.position_units, values, strict=True)
         ):
             has_curve = usual.by_curve and robot.limits.torque_speed[i]
+            largest = _largest_usual(robot, usual, i)
             if not has_curve and not _placeholder(
-                value, usual, largest(i), _stated(robot, usual, i)
+                value, usual, largest, _stated(robot, usual, i)
             ):
                 yield Check(
                     f"robot.limits.{kind}.{name}",
                     f"the {row.name.replace('_', ' ')} limit looks like {usual.mistaken_unit[unit]}",
                     float(value),
-                    largest(i),
+                    largest,
                     row.units[unit],
                 )
 
@@ -414,23 +405,20 @@ def _stated(robot: Robot, usual: UsualLimit, joint: int) -> float | None:
     return robot.urdf_limits[joint].of_kind(kind) if kind else None
 
 
-def _largest_usual(robot: Robot, usual: UsualLimit) -> Callable[[int], float]:
-    """Return what gives the largest usual limit of a joint."""
-    mass = sum(inertia.mass for inertia in list(robot.model.inertias)[1:])
-    weight = mass * 9.81 * sum(link_lengths(robot))
-
-    def of_joint(joint: int) -> float:
-        unit = robot.position_units[joint]
-        stated = _stated(robot, usual, joint)
-        most = [usual.largest[unit]]
-        if usual.compares_weight and unit == "rad" and weight > 0.0:
-            most.append(_HOLDS * weight)
-        # URDFs state 1 for a limit that nobody knows.
-        if stated and stated != 1.0:
-            most.append(max(usual.urdf_factor * stated, usual.urdf_least))
-        return float(min(most))
-
-    return of_joint
+def _largest_usual(robot: Robot, usual: UsualLimit, joint: int) -> float:
+    """Return the largest usual limit of a joint."""
+    unit = robot.position_units[joint]
+    most = [usual.largest[unit]]
+    # What holds the arm's own weight at full reach, Nm.
+    holding = pin.computeTotalMass(robot.model) * 9.81 * sum(link_lengths(robot))
+    if usual.compares_weight and unit == "rad" and holding > 0.0:
+        # Arms hold a tenth to five times their own weight at full reach.
+        most.append(50.0 * holding)
+    stated = _stated(robot, usual, joint)
+    # URDFs state 1 for a limit that nobody knows.
+    if stated and stated != 1.0:
+        most.append(max(usual.urdf_factor * stated, usual.urdf_least))
+    return float(min(most))
 
 
 def _ranges(robot: Robot) -> Iterator[Check]:
@@ -472,9 +460,8 @@ def _curves(robot: Robot) -> Iterator[Check]:
     scale = robot.settings.limits.scale.torque
     usual_torque = LIMIT_KINDS["torque"].usual
     assert usual_torque is not None
-    torque = _largest_usual(robot, usual_torque)
     # Without load motors turn at up to twice the rated speed; rpm are 9.5 times rad/s.
-    velocity = _largest_usual(robot, UsualLimit({}, FASTEST, "velocity", 5.0, 5.0))
+    usual_speed = UsualLimit({}, FASTEST, "velocity", 5.0, 5.0)
     rows = zip(
         robot.joint_names, robot.position_units, robot.limits.torque_speed, strict=True
     )
@@ -483,15 +470,18 @@ def _curves(robot: Robot) -> Iterator[Check]:
             continue
         key = f"robot.limits.torque_speed.{name}"
         meant = {"rad": "rpm", "m": "mm per second"}[unit]
-        said = "the last speed of the curve looks like"
-        aside = "; at the joint, behind its gear"
         yield Check(
             key,
-            f"{said} {meant}",
+            f"the last speed of the curve looks like {meant}",
             curve[-1][0],
-            velocity(i),
+            _largest_usual(robot, usual_speed, i),
             UNITS["velocity"][unit],
-            aside,
+            "; at the joint, behind its gear",
         )
-        said = f"the torque of the curve looks like {usual_torque.mistaken_unit[unit]}"
-        yield Check(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])
+        yield Check(
+            key,
+            f"the torque of the curve looks like {usual_torque.mistaken_unit[unit]}",
+            curve[0][1] / scale,
+            _largest_usual(robot, usual_torque, i),
+            UNITS["torque"][unit],
+        )

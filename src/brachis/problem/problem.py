@@ -320,7 +320,6 @@ def decompositions_of(
                 ", ".join(c.redundant_joints): "; ".join(c.reasons.values())
                 for c in found
             },
-            available=[],
         )
     allowed: list[Decomposition] = []
     refusals: list[StartError | UnknownNameError] = []

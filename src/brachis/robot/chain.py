@@ -29,14 +29,11 @@ def chain_of(
     linear = columns[:3].T
     angular = columns[3:].T
     revolute = np.linalg.norm(angular, axis=1) > 0.5
-    bodies = list(model.inertias)[1:]
+    inertias = list(model.inertias)[1:]
     placements = list(data.oMi)[1:]
-    turned = [
-        placed.rotation @ body.inertia @ placed.rotation.T
-        for body, placed in zip(bodies, placements, strict=True)
-    ]
-    centers = [
-        placed.act(body.lever) for body, placed in zip(bodies, placements, strict=True)
+    bodies = [
+        placement.act(inertia)
+        for placement, inertia in zip(placements, inertias, strict=True)
     ]
     tool = pin.updateFramePlacement(model, data, tool_frame)
     return Chain(
@@ -46,8 +43,8 @@ def chain_of(
         tool_position=np.array(tool.translation),
         tool_rotation=np.array(tool.rotation),
         masses=np.array([body.mass for body in bodies]),
-        centers=np.array(centers),
-        inertias=np.array(turned)[:, *np.triu_indices(3)],
+        centers=np.array([body.lever for body in bodies]),
+        inertias=np.array([body.inertia[np.triu_indices(3)] for body in bodies]),
         gravity=np.array(model.gravity.linear),
         friction=friction,
     )

@@ -11,9 +11,9 @@ import pinocchio as pin
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
 from brachis.errors import InputError
-from brachis.robot.limits import per_joint_values
 from brachis.task import FROM_URDF, FrictionSettings
 from brachis.task.fields import LARGEST
+from brachis.task.limit_models import per_joint_values
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,23 +91,8 @@ class Friction(Summary):
                     )
         rotors = terms.pop("rotor_inertia")
         ratios = terms.pop("gear_ratio")
-        for name, rotor, ratio, armature in zip(
-            names, rotors, ratios, terms["armature"], strict=True
-        ):
-            if rotor > 0.0 and ratio == 0.0:
-                raise InputError(
-                    f"the rotor of joint {name!r} has no gear ratio",
-                    where=f"robot.friction.gear_ratio.{name}",
-                    allowed=f"turns of the rotor per turn of the joint, > 0, at most {LARGEST:g}; 1 for a direct drive",
-                )
-            if rotor > 0.0 and armature > 0.0:
-                raise InputError(
-                    f"joint {name!r} has both armature and rotor_inertia",
-                    where=f"robot.friction.rotor_inertia.{name}",
-                    found=f"armature {armature:g}, rotor inertia {rotor:g} at a gear ratio of {ratio:g}",
-                    allowed="either armature, or rotor_inertia with gear_ratio",
-                )
-        terms["armature"] = terms["armature"] + rotors * ratios**2
+        _check_rotors(names, rotors, ratios, terms["armature"])
+        terms["armature"] += rotors * ratios**2
         v_eps = terms.pop("coulomb_velocity")
         least = 1e-9  # rad/s or m/s: steeper steps have slopes that overflow in squares
         if not v_eps.min() >= least:
@@ -147,3 +132,24 @@ class Friction(Summary):
     def table(self) -> np.ndarray:
         """All terms, (n, 4), in the order of the attributes."""
         return np.column_stack([self.armature, self.viscous, self.coulomb, self.v_eps])
+
+
+def _check_rotors(
+    names: Sequence[str], rotors: np.ndarray, ratios: np.ndarray, armatures: np.ndarray
+) -> None:
+    """Refuse a rotor without a gear ratio, and one whose inertia the armature states too."""
+    rows = zip(names, rotors, ratios, armatures, strict=True)
+    for name, rotor, ratio, armature in rows:
+        if rotor > 0.0 and ratio == 0.0:
+            raise InputError(
+                f"the rotor of joint {name!r} has no gear ratio",
+                where=f"robot.friction.gear_ratio.{name}",
+                allowed=f"turns of the rotor per turn of the joint, > 0, at most {LARGEST:g}; 1 for a direct drive",
+            )
+        if rotor > 0.0 and armature > 0.0:
+            raise InputError(
+                f"joint {name!r} has both armature and rotor_inertia",
+                where=f"robot.friction.rotor_inertia.{name}",
+                found=f"armature {armature:g}, rotor inertia {rotor:g} at a gear ratio of {ratio:g}",
+                allowed="either armature, or rotor_inertia with gear_ratio",
+            )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,6 @@ from brachis.errors import InputError, TaskError
 from brachis.robot.friction import Friction
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import (
-    MAGNITUDES,
-    per_joint_values,
     resolve_limits,
     to_spec,
     without_joints,
@@ -24,13 +22,14 @@ from brachis.robot.robot import Robot
 from brachis.robot.task_map.choice import with_tool_joints
 from brachis.robot.urdf import read_chain
 from brachis.task import (
-    FROM_URDF,
+    LIMIT_KINDS,
     FrictionSettings,
     LimitSpec,
     Placement,
     RobotSettings,
     check_robot_settings,
 )
+from brachis.task.limit_models import map_by_joint, without_defaults
 
 
 def robot_from_settings(
@@ -70,9 +69,10 @@ def robot_from_settings(
 _FRAMES = ("tool_frame", "base_frame", "locked_joints")
 """Settings that decide which joints the chain has."""
 _PER_JOINT: dict[str, object] = {
-    **{f"robot.limits.{kind}": None for kind in MAGNITUDES},
     **{
-        f"robot.limits.{kind}": FROM_URDF for kind in ("torque", "velocity", "position")
+        f"robot.limits.{each.name}": each.default
+        for each in fields(LimitSpec)
+        if each.name in LIMIT_KINDS
     },
     **{
         f"robot.friction.{kind}": field.default
@@ -147,12 +147,9 @@ def _current_settings(robot: Robot) -> RobotSettings:
 
 def _to_settings(friction: Friction, n: int) -> FrictionSettings:
     """State the friction of the first n joints, joint by joint."""
-    return FrictionSettings(
-        armature=tuple(friction.armature[:n].tolist()),
-        viscous=tuple(friction.viscous[:n].tolist()),
-        coulomb=tuple(friction.coulomb[:n].tolist()),
-        coulomb_velocity=tuple(friction.v_eps[:n].tolist()),
-    )
+    keys = ("armature", "viscous", "coulomb", "coulomb_velocity")
+    columns = friction.table[:n].T.tolist()
+    return FrictionSettings.model_validate(dict(zip(keys, columns, strict=True)))
 
 
 def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotSettings:
@@ -181,11 +178,7 @@ def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotS
         locked = chain.locked
     if limits:
         moving = without_joints(asked.limits, locked)
-        written["limits"] = {
-            key: limits[key] if key == "scale" else value
-            for key, value in vars(moving).items()
-            if key == "scale" or value != getattr(LimitSpec(), key)
-        }
+        written["limits"] = without_defaults(moving) | {"scale": limits["scale"]}
     return check_robot_settings(_merge("robot", own, written, names))
 
 
@@ -202,15 +195,7 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
     sides = [given, asked]
     if key in _PER_JOINT:
         absent = _PER_JOINT[key]
-        listed = [per_joint_values(key, side, names, absent) for side in sides]
-        sides = [
-            {
-                name: value
-                for name, value in zip(names, values, strict=True)
-                if value != absent
-            }
-            for values in listed
-        ]
+        sides = [map_by_joint(key, side, names, absent) for side in sides]
     own, other = sides
     if not (isinstance(own, Mapping) and isinstance(other, Mapping)):
         raise TaskError(

@@ -11,10 +11,11 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
-from brachis.errors import InputError, LimitError, UnknownNameError
+from brachis.errors import InputError, LimitError, check_names
 from brachis.robot.tool_joints import ToolJoint
 from brachis.task import FROM_URDF, LIMIT_KINDS, LimitScale, LimitSpec
 from brachis.task.fields import LARGEST, LEAST
+from brachis.task.limit_models import per_joint_values
 
 Curve = tuple[tuple[float, float], ...]
 """Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
@@ -229,15 +230,14 @@ def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
 
 
 def _check_scale(scale: LimitScale) -> None:
-    for kind, factor in vars(scale).items():
-        if kind not in MAGNITUDES:
-            raise UnknownNameError(
-                "limit that can be scaled", kind, MAGNITUDES, where="robot.limits.scale"
-            )
+    factors = vars(scale)
+    where = "robot.limits.scale"
+    check_names("limit that can be scaled", factors, MAGNITUDES, where)
+    for kind, factor in factors.items():
         if not (_is_number(factor) and 0.0 < factor < np.inf):
             raise InputError(
                 "the factor is not valid",
-                where=f"robot.limits.scale.{kind}",
+                where=f"{where}.{kind}",
                 found=factor,
                 allowed="a finite number > 0",
             )
@@ -288,35 +288,6 @@ def _check_sizes(what: str, figures: np.ndarray, joint: str, key: str) -> None:
             )
 
 
-def per_joint_values(
-    key: str, value: object, names: Sequence[str], missing: object
-) -> list[object]:
-    """Spread a scalar, list or mapping over the joints; `missing` where a mapping leaves a joint out.
-
-    Raises
-    ------
-    InputError
-        A list has the wrong length.
-    UnknownNameError
-        A mapping names a joint that is not of the chain.
-    """
-    if isinstance(value, Mapping):
-        for name in value:
-            if name not in names:
-                raise UnknownNameError("joint", name, names, where=key)
-        return [value.get(name, missing) for name in names]
-    if isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str):
-        if len(value) != len(names):
-            raise InputError(
-                "the list has the wrong number of values",
-                where=key,
-                found=len(value),
-                allowed=f"{len(names)}, one for each of {', '.join(names)}",
-            )
-        return list(value)
-    return [value] * len(names)
-
-
 def _spread_magnitudes(
     kind: str, value: object, names: list[str], urdf: Sequence[UrdfLimit]
 ) -> np.ndarray:
@@ -326,7 +297,7 @@ def _spread_magnitudes(
     limits = np.tile([[-np.inf], [np.inf]], len(names))
     listed = per_joint_values(key, value, names, FROM_URDF)
     for i, (name, entry) in enumerate(zip(names, listed, strict=True)):
-        from_urdf = isinstance(entry, str) and entry == FROM_URDF
+        from_urdf = entry == FROM_URDF
         given = urdf[i].of_kind(kind) if from_urdf else entry
         if given is None:
             continue
@@ -405,21 +376,19 @@ def _resolve_curves(
     stated: object, names: Sequence[str], factor: float
 ) -> tuple[Curve, ...]:
     """Check the curves of a chain's joints, and multiply their torques by a factor."""
-    if stated is None:
-        return ((),) * len(names)
-    if not isinstance(stated, Mapping):
+    where = "robot.limits.torque_speed"
+    if not isinstance(stated, Mapping | None):
         raise InputError(
             "this is not a mapping of joint names",
-            where="robot.limits.torque_speed",
+            where=where,
             found=stated,
             allowed="{joint: [[speed, torque], ...]}",
         )
-    for name in stated:
-        if name not in names:
-            raise UnknownNameError(
-                "joint", name, names, where="robot.limits.torque_speed"
-            )
-    return tuple(_resolve_curve(stated.get(name), name, factor) for name in names)
+    listed = per_joint_values(where, stated, names, None)
+    return tuple(
+        _resolve_curve(points, name, factor)
+        for name, points in zip(names, listed, strict=True)
+    )
 
 
 def _resolve_curve(points: object, joint: str, factor: float) -> Curve:

@@ -74,17 +74,17 @@ def _join(stem: str, group: list[Issue]) -> Issue:
 
 
 def report_issues(
-    issues: tuple[Issue, ...], *, strict: bool | None, stacklevel: int = 2
+    issues: tuple[Issue, ...], *, strict: bool | None
 ) -> tuple[Issue, ...]:
     """Warn of issues, or refuse some or all of them; return them, one for all joints with the same message.
+
+    Warnings blame the caller of the function that calls this one.
 
     Parameters
     ----------
     issues : tuple of Issue
     strict : bool or None
         Whether they are errors; None: those of the start posture are.
-    stacklevel : int, optional
-        As of `warnings.warn`; 2 blames the caller.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def report_issues(
     if refused:
         raise PlausibilityError(refused)
     for issue in joined:
-        warnings.warn(str(issue), PlausibilityWarning, stacklevel=stacklevel)
+        warnings.warn(str(issue), PlausibilityWarning, stacklevel=3)
     return joined
 
 

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from brachis.common.arguments import check_keywords
 from brachis.common.summary import Summary
-from brachis.errors import InputError, TaskError, UnknownNameError
+from brachis.errors import InputError, TaskError, check_names
 from brachis.kernel import Chain
 from brachis.robot.chain import chain_of
 from brachis.robot.friction import Friction
@@ -23,7 +23,6 @@ from brachis.robot.limits import (
     FARTHEST,
     Limits,
     UrdfLimit,
-    per_joint_values,
     resolve_limits,
     to_spec,
     without_joints,
@@ -31,7 +30,7 @@ from brachis.robot.limits import (
 from brachis.robot.model import build_model
 from brachis.robot.tool_joints import ToolJoint
 from brachis.robot.urdf import read_chain, read_file
-from brachis.robot.urdf_bodies import UrdfDynamics
+from brachis.robot.urdf_bodies import UrdfDynamics, placement_matrix
 from brachis.robot.urdf_elements import read_tree
 from brachis.task import (
     FROM_URDF,
@@ -42,6 +41,7 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
+from brachis.task.limit_models import map_by_joint, per_joint_values
 
 
 class RobotKeywords(TypedDict, total=False):
@@ -174,12 +174,11 @@ class Robot(Summary):
         """
         given = {key: value for key, value in keywords.items() if value is not None}
         given["urdf"] = str(Path(path).absolute())
-        spec = given.get("limits")
-        if isinstance(spec, LimitSpec):  # checked below, where the joints are known
-            del given["limits"]
-        settings = check_robot_settings(given)
-        if isinstance(spec, LimitSpec):
-            settings = settings.model_copy(update={"limits": spec})
+        unchecked = {}
+        if isinstance(given.get("limits"), LimitSpec):
+            # It is checked below, where the joints are known.
+            unchecked["limits"] = given.pop("limits")
+        settings = check_robot_settings(given).model_copy(update=unchecked)
         return cls.from_settings(settings, str(path), urdf_text)
 
     @classmethod
@@ -262,9 +261,8 @@ class Robot(Summary):
         """
         names = self.urdf_joints
         changes: dict[str, Any] = vars(to_spec(self.limits, names)).copy()
+        check_names("limit", limits, changes, "with_limits")
         for kind, value in limits.items():
-            if kind not in changes:
-                raise UnknownNameError("limit", kind, changes, where="with_limits")
             stated = changes[kind]
             if isinstance(value, Mapping) and isinstance(stated, Mapping):
                 changes[kind] = {**stated, **value}
@@ -465,7 +463,7 @@ class Robot(Summary):
         """
         base = self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
         floor = self.model.frames[base].placement.translation
-        up = pin.rpy.rpyToMatrix(*np.radians(self.settings.mounting.rpy_deg))[:, 2]
+        up = placement_matrix(self.settings.mounting)[:3, 2]
         return (self.tool_placements(q)[0] - floor) @ up
 
 
@@ -477,10 +475,8 @@ def _without_defaults(
     for each in fields(limits):
         value = getattr(limits, each.name)
         if isinstance(value, tuple | dict):
-            listed = per_joint_values("limits", value, names, FROM_URDF)
-            pairs = zip(names, listed, strict=True)
-            kept = {name: entry for name, entry in pairs if entry != FROM_URDF}
-            by_name[each.name] = kept or each.default
+            stated = map_by_joint("limits", value, names, FROM_URDF)
+            by_name[each.name] = stated or each.default
     used = settings.model_copy(update={"limits": replace(limits, **by_name)})
     default = RobotSettings()
     checked = check_robot_settings(dict(used))

@@ -30,8 +30,6 @@ _DIRECTIONS = {
 }
 """Axes of the virtual joints, in the order of the chain."""
 _TURNING = ("roll", "lead", "side")
-_WIDER = 1.01
-"""Factor on ranges beside which a cone, sphere or box is the limit."""
 _Range = tuple[float, float, str]
 """Ends, rad or m, and the key of the task that sets them."""
 _FREE: _Range = (-math.inf, math.inf, "task_space")
@@ -130,6 +128,6 @@ def _lengths(given: PositionTolerance) -> dict[str, _Range]:
 
 def _within(given: _Range | None, reach: float, key: str) -> _Range:
     """Cut a range down to a little more than both sides of zero; without one, `key` is what sets it."""
-    wide = _WIDER * reach
+    wide = 1.01 * reach  # so that the cone, sphere or box itself is the limit
     low, high, own_key = given or (-wide, wide, key)
     return max(low, -wide), min(high, wide), own_key

@@ -14,7 +14,7 @@ import numpy as np
 from lxml import etree
 
 from brachis.common import files, tolerances
-from brachis.errors import UnknownNameError, UrdfError
+from brachis.errors import UrdfError, check_names
 from brachis.robot.limits import FARTHEST, UrdfLimit
 from brachis.robot.urdf_bodies import (
     Body,
@@ -177,17 +177,14 @@ def read_chain(
     """
     tree = read_tree(text, where)
     for key, frame in (("tool_frame", tool_frame), ("base_frame", base_frame)):
-        if frame is not None and frame not in tree.links:
-            raise UnknownNameError("frame", frame, tree.links, where=f"{where}: {key}")
+        if frame is not None:
+            check_names("frame", [frame], tree.links, f"{where}: {key}")
     tool = _only_leaf(tree, where) if tool_frame is None else tool_frame
     base = tree.root if base_frame is None else base_frame
     path = _joints_between(tree, base, tool, where)
     movable = _movable(tree)
+    check_names("moving joint", locked_joints, movable, f"{where}: locked_joints")
     for name, position in locked_joints.items():
-        if name not in movable:
-            raise UnknownNameError(
-                "moving joint", name, movable, where=f"{where}: locked_joints"
-            )
         if not abs(position) <= FARTHEST:
             raise UrdfError(
                 "the position of a locked joint is too large",

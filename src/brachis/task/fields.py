@@ -55,6 +55,8 @@ WRONG_FORM = "brachis_form"
 WRONG_KEYS = "brachis_keys"
 """Error type of a mapping whose keys do not select one member of a union; see `ByKey`."""
 
+POSITION: Final = ("x", "y", "z")
+"""Rows of the position of a tool."""
 LEAST = 1e-6
 """Least limit of torque, velocity, acceleration or their rates, in SI units."""
 LARGEST = 1e12

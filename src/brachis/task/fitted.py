@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from brachis.task.point_data import (
     PointFile,
 )
 from brachis.task.points.checks import refuse_repetitions
-from brachis.task.points.curves import cut_at_corners, fit_curves
+from brachis.task.points.curves import FittedCurve, cut_at_corners, fit_curves
 from brachis.task.points.gcode import SUFFIXES, read_gcode
 from brachis.task.points.points import Points, Rows, points_from
 from brachis.task.points.tables import read_points, read_table
@@ -63,44 +63,53 @@ def segments_along(
             where=f"{where}.orientation",
         )
     stops = settings.corner == "stop"
-    if settings.tolerance is None:
-        if points.speed is not None:
-            raise TaskError(
-                "feed rates need a fitted path",
-                found="feed rates",
-                allowed="feed rates together with a tolerance",
-                where=where,
-                hint="Set csv.tolerance, or remove the feed rates",
-            )
-        parts, report = cut_at_corners(points, notes, stops=stops)
-        _check_corners(report, segment, where)
-        fit = report.model_copy(update={"source": settings.file})
-        return [
-            SplineSegment(
-                **_end_of(segment, is_last=i == len(parts) - 1),
-                spline=_spline_through(part, None if i else fit, settings),
-            )
-            for i, part in enumerate(parts)
-        ]
-    curves, report = fit_curves(points, settings.tolerance, notes, stops=stops)
-    _check_corners(report, segment, where)
-    fit = report.model_copy(update={"source": settings.file})
-    return [
-        BSplineSegment(
-            **_end_of(segment, is_last=i == len(curves) - 1, blend=curve.blend),
-            bspline=BSplineCurve.model_validate(
-                {
-                    "degree": curve.spline.k,
-                    "knots": curve.spline.t.tolist(),
-                    "control_points": curve.spline.c.tolist(),
-                    "relative": settings.relative or i > 0,
-                    "speeds": curve.speeds,
-                    "fit": None if i else fit,
-                }
-            ),
+    parts: Sequence[Points | FittedCurve]
+    if settings.tolerance is not None:
+        parts, report = fit_curves(points, settings.tolerance, notes, stops=stops)
+    elif points.speed is not None:
+        raise TaskError(
+            "feed rates need a fitted path",
+            found="feed rates",
+            allowed="feed rates together with a tolerance",
+            where=where,
+            hint="Set csv.tolerance, or remove the feed rates",
         )
-        for i, curve in enumerate(curves)
+    else:
+        parts, report = cut_at_corners(points, notes, stops=stops)
+    _check_corners(report, segment, where)
+    first = report.model_copy(update={"source": settings.file})
+    last = len(parts) - 1
+    return [
+        _segment_along(parts[i], None if i else first, segment, is_last=i == last)
+        for i in range(len(parts))
     ]
+
+
+def _segment_along(
+    part: Points | FittedCurve,
+    fit: FitReport | None,
+    segment: CsvSegment,
+    *,
+    is_last: bool,
+) -> SplineSegment | BSplineSegment:
+    """Return the segment along a part of a file, of which only the first one has the report, `fit`."""
+    if isinstance(part, Points):
+        return SplineSegment(
+            **_end_of(segment, is_last=is_last),
+            spline=_spline_through(part, fit, segment.csv),
+        )
+    curve = {
+        "degree": part.spline.k,
+        "knots": part.spline.t.tolist(),
+        "control_points": part.spline.c.tolist(),
+        "relative": segment.csv.relative or fit is None,
+        "speeds": part.speeds,
+        "fit": fit,
+    }
+    return BSplineSegment(
+        **_end_of(segment, is_last=is_last, blend=part.blend),
+        bspline=BSplineCurve.model_validate(curve),
+    )
 
 
 def _end_of(
@@ -240,7 +249,7 @@ def _along_joints(
                 where=f"{where}.csv.{key}",
             )
     names = "the names of the joints"
-    table = read_table(text, str(path), names, lambda _header, _where: None)
+    table, _ = read_table(text, str(path), names, lambda _header, _where: None)
     _check_count(len(table.values), path)
     nothing = table.values[:, :0]
     refuse_repetitions(Points(table.values, nothing, None, table.lines, str(path)))

@@ -12,8 +12,7 @@ Limits on the motion of the tool.
 from __future__ import annotations
 
 import itertools
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, make_dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Unpack
 
@@ -25,7 +24,7 @@ from pydantic import (
     model_validator,
 )
 
-from brachis.errors import write_count
+from brachis.errors import InputError, check_names, write_count
 from brachis.task.fields import (
     LARGEST,
     LEAST,
@@ -167,6 +166,56 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
             object.__setattr__(self, each.name, value)
 
 
+def without_defaults(limits: LimitSpec) -> dict[str, Any]:
+    """Return what differs from the defaults."""
+    usual = vars(LimitSpec())
+    return {kind: value for kind, value in vars(limits).items() if value != usual[kind]}
+
+
+def per_joint_values(
+    key: str,
+    value: object,
+    names: Sequence[str],
+    missing: object,
+    error: type[InputError] = InputError,
+) -> list[object]:
+    """Spread a scalar, list or mapping over the joints; `missing` where a mapping leaves a joint out.
+
+    Raises
+    ------
+    InputError
+        Of the class `error`: a list has the wrong length.
+    UnknownNameError
+        A mapping names a joint that is not of the chain.
+    """
+    if isinstance(value, Mapping):
+        check_names("joint", value, names, key)
+        return [value.get(name, missing) for name in names]
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+        if len(value) != len(names):
+            raise error(
+                "the list has the wrong number of values",
+                where=key,
+                found=len(value),
+                allowed=f"{len(names)}, one for each of {', '.join(names)}",
+            )
+        return list(value)
+    return [value] * len(names)
+
+
+def map_by_joint(
+    key: str,
+    value: object,
+    names: Sequence[str],
+    missing: object,
+    error: type[InputError] = InputError,
+) -> dict[str, object]:
+    """Return the values of the joints by name, without those that are `missing`; see `per_joint_values`."""
+    values = per_joint_values(key, value, names, missing, error)
+    pairs = zip(names, values, strict=True)
+    return {name: each for name, each in pairs if each != missing}
+
+
 Speed = Annotated[Positive, Field(ge=LEAST, le=LARGEST)]
 _PathCoordinates = Annotated[
     tuple[Annotated[Number, Field(ge=0.0, le=1.0)], ...], BeforeValidator(plain)
@@ -201,8 +250,8 @@ class SpeedTable(Model):
                     found=place,
                     allowed=f">= {before:g}",
                 )
-        for place, times in Counter(self.s).items():
-            if times > 2:
+        for place, second_after in zip(self.s, self.s[2:], strict=False):
+            if place == second_after:
                 raise refuse(
                     "a path coordinate has more than two speeds",
                     key="s",

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from brachis.common.files import check_kind, locate_urdf, read_text
-from brachis.errors import TaskError, UnknownNameError
+from brachis.errors import TaskError, check_names
 from brachis.task.fields import (
     Flag,
     Model,
@@ -20,7 +20,12 @@ from brachis.task.fields import (
     Positive,
     merge,
 )
-from brachis.task.limit_models import LimitSpec
+from brachis.task.limit_models import (
+    FROM_URDF,
+    LimitSpec,
+    map_by_joint,
+    without_defaults,
+)
 from brachis.task.messages import show, validate
 from brachis.task.yaml_reader import read_yaml
 
@@ -150,7 +155,7 @@ def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
     >>> limits.velocity["panda_joint1"]
     2.175
     """
-    return LimitSpec(**_by_joint(Path(path), str(path), Path.cwd(), None))
+    return LimitSpec(**_read_file(Path(path), str(path), Path.cwd(), None))
 
 
 def with_limits_of_file(
@@ -177,10 +182,10 @@ def with_limits_of_file(
     file = Path(robot["limits_file"])
     own = robot.get("limits") or {}
     if isinstance(own, LimitSpec):
-        own = _differences(own)
+        own = without_defaults(own)
     if not isinstance(own, Mapping):
         return content
-    merged = _by_joint(
+    merged = _read_file(
         folder / file,
         f"{source}: robot.limits_file",
         folder,
@@ -191,7 +196,7 @@ def with_limits_of_file(
     return {**content, "robot": {**rest, "limits": merge(merged, own)}}
 
 
-def _by_joint(
+def _read_file(
     path: Path,
     where: str,
     folder: Path,
@@ -227,16 +232,12 @@ def _by_joint(
     return {
         kind: value
         if kind == "total_power"  # of the whole robot
-        else _spread(value, file.joints, f"{path}: limits.{kind}")
-        for kind, value in _differences(file.limits).items()
+        else map_by_joint(
+            f"{path}: limits.{kind}", value, file.joints, FROM_URDF, TaskError
+        )
+        for kind, value in without_defaults(file.limits).items()
         if kind != "scale"
     }
-
-
-def _differences(limits: LimitSpec) -> dict[str, Any]:
-    """Return what differs from the defaults."""
-    usual = vars(LimitSpec())
-    return {kind: value for kind, value in vars(limits).items() if value != usual[kind]}
 
 
 def _check_joints(
@@ -255,11 +256,8 @@ def _check_joints(
     if not words or not isinstance(locked, Mapping):
         return  # the robot's model says so
     names, moving = _joints_of(Path(locate_urdf(robot["urdf"], folder)), tool, base)
-    for name in sorted(limited if names else ()):
-        if name not in names:
-            raise UnknownNameError(
-                "URDF joint", name, names, where=f"{where}: joint_limits"
-            )
+    if names:
+        check_names("URDF joint", sorted(limited), names, f"{where}: joint_limits")
     own = [each for kind, each in robot["limits"].items() if kind != "scale"]
     if any(isinstance(each, int | float | list | tuple) for each in own):
         return  # of all joints
@@ -300,22 +298,3 @@ def _joints_of(
         if joint.get("type") != "fixed":
             moving.append(joint.get("name"))
     return [joint.get("name") for joint in joints], moving
-
-
-def _spread(value: object, joints: tuple[str, ...], where: str) -> dict[str, Any]:
-    """Give every joint of the file its limit."""
-    if isinstance(value, Mapping):
-        for name in value:
-            if name not in joints:
-                raise UnknownNameError("joint", name, joints, where=where)
-        return dict(value)
-    if isinstance(value, tuple):
-        if len(value) != len(joints):
-            raise TaskError(
-                "the list has the wrong number of values",
-                where=where,
-                found=len(value),
-                allowed=f"{len(joints)}, one for each of {', '.join(joints)}",
-            )
-        return dict(zip(joints, value, strict=True))
-    return dict.fromkeys(joints, value)

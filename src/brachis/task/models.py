@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from brachis.task.fields import (
+    POSITION,
     ByForm,
     Model,
     Name,
@@ -31,7 +32,7 @@ from brachis.task.fields import (
     refuse,
 )
 from brachis.task.limit_models import ToolLimits
-from brachis.task.orientation import ToolPose
+from brachis.task.orientation import StartPlace, ToolPose
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
 from brachis.task.scene import (
@@ -63,7 +64,6 @@ from brachis.task.tolerances import (
 )
 
 Row = Literal["x", "y", "z", "yaw"]
-POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
 
 _EACH_ONCE = must(
@@ -81,7 +81,7 @@ TaskSpace = Annotated[
     | Annotated[NonEmpty[Row], _EACH_ONCE, _YAW_LAST],
     ByForm(_SPACE_FORMS),
     # ``position`` is spelled out, so that equal task spaces compare equal.
-    AfterValidator(lambda space: POSITION_ROWS if space == "position" else space),
+    AfterValidator(lambda space: POSITION if space == "position" else space),
 ]
 
 
@@ -101,7 +101,7 @@ class Posture(Model):
 
 
 PathStart = Annotated[
-    tuple[Number, ...] | ToolPose | None,
+    StartPlace,
     ByForm(
         "a list of the rows of the task space, or of a pose a mapping {position: [x, y, z], rpy_deg: [...]}"
     ),
@@ -405,7 +405,7 @@ class Task(Model):
     @model_validator(mode="after")
     def _tolerances_fit(self) -> Self:
         asked = self.tolerances
-        of_places = self.of_poses or self.task_space == POSITION_ROWS
+        of_places = self.of_poses or self.task_space == POSITION
         return self.check(
             (
                 asked.orientation != OrientationTolerance() and not self.of_poses,
@@ -467,7 +467,7 @@ class Task(Model):
         return self.task_space in {"pose", "pose_free_roll"}
 
     @property
-    def start_place(self) -> tuple[float, ...] | ToolPose | None:
+    def start_place(self) -> StartPlace:
         """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
         place = self.path[0].start_place(of_poses=self.of_poses)
         return place if isinstance(place, ToolPose) == self.of_poses else None

@@ -146,6 +146,10 @@ class ToolPose(Attitude):
         return {"position": position, **turn}
 
 
+StartPlace = tuple[Number, ...] | ToolPose | None
+"""Where a path begins: its task coordinates, or a pose; None where that is left open."""
+
+
 def poses_of(
     transforms: Any, source: str, orientations: Any = None
 ) -> list[tuple[list[float], dict[str, Any]]]:

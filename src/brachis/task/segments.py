@@ -41,6 +41,7 @@ from brachis.task.orientation import (
     Attitude,
     Direction,
     OrientationMode,
+    StartPlace,
     ToolPose,
     Turning,
     poses_of,
@@ -348,7 +349,7 @@ class SegmentModel(Model):
         given = ", ".join(f"{name}={value!r}" for name, value in pairs)
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
-    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
+    def start_place(self, *, of_poses: bool) -> StartPlace:
         """Where the segment says that it begins, as ``path_start`` of a task; None where it leaves that open.
 
         Without relative waypoints and another word on it, that is the first waypoint.
@@ -418,7 +419,7 @@ class SplineSegment(MovingSegment):
 
     spline: SplineThrough
 
-    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
+    def start_place(self, *, of_poses: bool) -> StartPlace:
         """Return `starts_at`, or else the first waypoint; None where the waypoints are relative."""
         spline = self.spline
         if spline.relative:
@@ -455,7 +456,7 @@ class BSplineSegment(MovingSegment):
 
     bspline: BSplineCurve
 
-    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
+    def start_place(self, *, of_poses: bool) -> StartPlace:
         """Return the first control point; None where the curve is relative."""
         if self.bspline.relative:
             return None

@@ -12,6 +12,7 @@ from pydantic import (
 )
 
 from brachis.task.fields import (
+    POSITION,
     ByForm,
     Model,
     Number,
@@ -51,7 +52,6 @@ _EndsOrFree = Annotated[
 _Lean = Annotated[_Ends, _range_within(80.0)]
 _Roll = Annotated[_EndsOrFree, _range_within(180.0)]
 _Distance = Annotated[_Ends, _range_within(_FARTHEST)]
-AXES = ("x", "y", "z")
 
 
 def _check_within(given: Model, largest: str, ranges: Iterable[str]) -> None:
@@ -104,8 +104,8 @@ class PositionTolerance(Model):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        given = [axis for axis in AXES if getattr(self, axis) is not None]
-        if self.axes == "world" and len(given) < len(AXES):
+        given = [axis for axis in POSITION if getattr(self, axis) is not None]
+        if self.axes == "world" and len(given) < len(POSITION):
             raise refuse(
                 "a box along the world's axes needs all three lengths",
                 key="axes",

@@ -61,15 +61,11 @@ class JointSpace(TaskMap):
         """Return identity matrices, (K, n, n)."""
         return np.broadcast_to(np.eye(self.m), (twists.shape[1], self.m, self.m))
 
-    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """Return zeros, (K, n, n)."""
-        return np.zeros((len(qdot), self.m, self.m))
-
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
         """Return zeros, (K, n, n) each."""
-        zeros = self.velocity_slopes(twists, qdot)
+        zeros = np.zeros((len(qdot), self.m, self.m))
         return TaskDerivatives(zeros, zeros, zeros)
 
 
@@ -123,8 +119,18 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
             found=list(names),
             allowed=f"{', '.join(ROWS)}, each once",
         )
-    if YAW not in names:
-        return WorldRows(robot, names)
+    return _rows_and_yaw(robot, names) if YAW in names else WorldRows(robot, names)
+
+
+def _rows_and_yaw(robot: Robot, names: tuple[str, ...]) -> RowsAndYaw:
+    """Bind two rows of the position and yaw to a robot.
+
+    Raises
+    ------
+    InputError
+        Yaw is not beside two rows, or no axis of the tool frame lies in their plane.
+    """
+    positions = position_rows(names)
     if names[-1] != YAW or len(positions) != 2:
         raise InputError(
             "yaw needs exactly two position rows before it",
@@ -209,8 +215,8 @@ def with_tool_joints(robot: Robot, joints: Sequence[ToolJoint]) -> Robot:
     name = f"{robot.tool_frame}/{joints[-1].name}"
     model.addFrame(pin.Frame(name, last, robot.frame_id, place, pin.FrameType.OP_FRAME))
     count = len(joints)
-    friction = robot.friction
-    nothing = np.zeros(count)
+    frictionless = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+    friction = np.concatenate([robot.friction.table, frictionless])
     return replace(
         robot,
         tool_joints=tuple(joints),
@@ -219,10 +225,5 @@ def with_tool_joints(robot: Robot, joints: Sequence[ToolJoint]) -> Robot:
         tool_frame=name,
         limits=robot.limits.with_tool_joints(joints),
         urdf_limits=(*robot.urdf_limits, *(UrdfLimit(None, None, None, None),) * count),
-        friction=Friction(
-            armature=np.append(friction.armature, nothing),
-            viscous=np.append(friction.viscous, nothing),
-            coulomb=np.append(friction.coulomb, nothing),
-            v_eps=np.append(friction.v_eps, np.ones(count)),
-        ),
+        friction=Friction(*friction.T),
     )

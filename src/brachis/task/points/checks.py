@@ -17,7 +17,7 @@ from brachis.task.points.points import (
     Points,
     PointsAndNotes,
     angles_between,
-    shares_along,
+    project_on_sides,
     sum_up,
 )
 
@@ -213,11 +213,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
         return
     position = points.position
     before = position[:-2]
-    here = position[1:-1]
-    after = position[2:]
-    side = after - before
-    share = shares_along(here, before, side)
-    off = np.linalg.norm(here - before - share[:, None] * side, axis=1)
+    _, off = project_on_sides(position[1:-1], before, position[2:] - before)
     around = 4
     chords = np.pad(points.steps, around, mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(chords, 2 * around + 2)

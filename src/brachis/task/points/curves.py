@@ -102,12 +102,11 @@ def _fit_between(
         first = start.after if start else 0
         rows = range(first, end.before if end else len(points))
         given = slice(len(before), len(before) + len(rows))
-        whole = points.only([*before, *rows, *after])
-        position = whole.position.copy()
-        for at_end, row in ((start, 0), (end, -1)):
-            if at_end is not None:
-                position[row] = at_end.place
-        whole = replace(whole, position=position)
+        whole = points.only([*before, *rows, *after])  # copies
+        if start is not None:
+            whole.position[0] = start.place
+        if end is not None:
+            whole.position[-1] = end.place
         fit = _fit_one(whole, tolerance, scatter, note)
         distances, angles = _measure_deviations(whole, fit, tolerance)
         curves.append(FittedCurve(whole, given, fit, distances[given], angles[given]))

@@ -25,7 +25,7 @@ from brachis.task.points.points import (
     Array,
     Points,
     angles_between,
-    shares_along,
+    project_on_sides,
     steps_of,
     sum_up,
 )
@@ -163,11 +163,9 @@ def lengths_along(position: Array, deviation: float) -> Array:
         return sum_up(np.maximum(steps_of(position), 1e-9))
     edges = np.arange(0, count + 1, block)
     edges[-1] = count
-    moved = np.pad(position - position[0], ((1, 0), (0, 0)))
-    sums = np.cumsum(moved, axis=0)
-    sizes = np.diff(edges)[:, None]
-    means = position[0] + np.diff(sums[edges], axis=0) / sizes
-    centres = (edges[:-1] + edges[1:] - 1) / 2.0
+    firsts = edges[:-1]
+    means = np.add.reduceat(position, firsts) / np.diff(edges)[:, None]
+    centres = (firsts + edges[1:] - 1) / 2.0
     corners = np.concatenate([position[:1], means, position[-1:]])
     chords = np.maximum(steps_of(corners), 1e-9)
     index = np.concatenate([[-0.5], centres, [count - 0.5]])
@@ -201,7 +199,7 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
     """
     sigma = lengths_along(points.position, scatter.deviation)
     if len(points) <= DEGREE:
-        return _polynomial(points, sigma)
+        return _interpolate(points, sigma)
     every = -(-len(points) // 8_000)  # points that are looked at while knots are added
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
     noisy = scatter.noisy(tolerance)
@@ -324,21 +322,15 @@ def _removable(fit: Fit, tolerance: FitTolerance, needed: Array) -> Array:
     return fit.breaks[1:-1][taken[1:-1]]
 
 
-def _polynomial(points: Points, sigma: Array) -> Fit:
-    """Return the polynomial through few points, as a spline without inner knots."""
-    from scipy.interpolate import make_interp_spline
-
-    through = make_interp_spline(sigma, points.columns, k=len(points) - 1)
-    at = np.linspace(0.0, sigma[-1], DEGREE + 1)
-    spline = make_interp_spline(at, through(at), k=DEGREE)
-    return _measure(points, spline, sigma[[0, -1]], sigma)
-
-
 def _interpolate(points: Points, sigma: Array) -> Fit:
-    """Return the spline through all points."""
+    """Return the spline through all points: through few of them a polynomial, without inner knots."""
     from scipy.interpolate import make_interp_spline
 
-    spline = make_interp_spline(sigma, points.columns, k=DEGREE)
+    degree = min(len(points) - 1, DEGREE)
+    spline = make_interp_spline(sigma, points.columns, k=degree)
+    if degree < DEGREE:
+        at = np.linspace(0.0, sigma[-1], DEGREE + 1)
+        spline = make_interp_spline(at, spline(at), k=DEGREE)
     return _measure(points, spline, np.unique(spline.t), sigma)
 
 
@@ -362,10 +354,9 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     at = np.zeros(len(points))
     for offset in (-1, 0):
         first = np.clip(nearest + offset, 0, len(place) - 2)
-        side = place[first + 1] - place[first]
-        share = shares_along(points.position, place[first], side)
-        nearest_place = place[first] + share[:, None] * side
-        away = np.linalg.norm(points.position - nearest_place, axis=1)
+        begin = place[first]
+        side = place[first + 1] - begin
+        share, away = project_on_sides(points.position, begin, side)
         nearer = away < distances
         distances[nearer] = away[nearer]
         at[nearer] = (sigma[first] + share * (sigma[first + 1] - sigma[first]))[nearer]

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 
 from brachis.errors import TaskError, write_count
+from brachis.task.fields import POSITION
 from brachis.task.points.points import Array, Points, PointsAndNotes, Rows
-from brachis.task.points.tables import POSITION
 
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
@@ -57,6 +57,17 @@ class _Machine:
         """Return the error that the line is wrong."""
         where = f"{self.source}: line {self.line}"
         return TaskError(problem, found=found, allowed=allowed, where=where)
+
+    def notes(self) -> tuple[str, ...]:
+        """Say what was taken for granted, and what was skipped."""
+        notes = ["G-code"]
+        if not self.unit_stated:
+            notes.append(
+                "lengths are in millimetres, as the program has neither G20 nor G21"
+            )
+        if self.skipped:
+            notes.append(f"skipped {', '.join(sorted(self.skipped))}")
+        return tuple(notes)
 
 
 def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
@@ -113,14 +124,7 @@ def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
         np.array(machine.lines),
         source,
     )
-    notes = ["G-code"]
-    if not machine.unit_stated:
-        notes.append(
-            "lengths are in millimetres, as the program has neither G20 nor G21"
-        )
-    if machine.skipped:
-        notes.append(f"skipped {', '.join(sorted(machine.skipped))}")
-    return points, tuple(notes)
+    return points, machine.notes()
 
 
 def _obey(machine: _Machine, code: str) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from brachis.common.arrays import with_like_signs
-from brachis.errors import TaskError
+from brachis.errors import Details, TaskError
 from brachis.task.point_data import FileUnits
 from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS, quaternions_of
 
@@ -91,23 +91,11 @@ class Points:
         place = ", ".join(f"{value:.6g}" for value in self.position[i])
         return f"{self.name_row(i)}, [{place}] m"
 
-    def wrong(
-        self,
-        i: int,
-        problem: str,
-        *,
-        allowed: str,
-        found: str | None = None,
-        hint: str | None = None,
-    ) -> TaskError:
+    def wrong(self, i: int, problem: str, **details: Unpack[Details]) -> TaskError:
         """Return the error that something is wrong with a point; without `found`, with its row and position."""
-        return TaskError(
-            problem,
-            found=found or self.describe(i),
-            allowed=allowed,
-            where=f"{self.source}: {self.name_row(i)}",
-            hint=hint,
-        )
+        details.setdefault("found", self.describe(i))
+        details["where"] = f"{self.source}: {self.name_row(i)}"
+        return TaskError(problem, **details)
 
 
 PointsAndNotes = tuple[Points, tuple[str, ...]]
@@ -124,10 +112,15 @@ def sum_up(steps: npt.ArrayLike) -> Array:
     return np.append(0.0, np.cumsum(steps))
 
 
-def shares_along(points: Array, begin: Array, side: Array) -> Array:
-    """Return where points, (n, p), are nearest to the sides that begin at `begin`, as shares of these, (n,)."""
+def project_on_sides(points: Array, begin: Array, side: Array) -> tuple[Array, Array]:
+    """Return where points, (n, p), are nearest to the sides that begin at `begin`, as shares of these, (n,).
+
+    Beside it stand the distances there, (n,).
+    """
+    away = points - begin
     lengths = np.maximum(np.sum(side**2, axis=1), 1e-300)
-    return np.clip(np.sum((points - begin) * side, axis=1) / lengths, 0.0, 1.0)
+    shares = np.clip(np.sum(away * side, axis=1) / lengths, 0.0, 1.0)
+    return shares, np.linalg.norm(away - shares[:, None] * side, axis=1)
 
 
 def angles_between(one: Array, other: Array) -> Array:
@@ -186,21 +179,7 @@ def points_from(
     turning = np.empty((len(values), 0))
     if orientations is not None:
         turning = _turning(orientations, units, source)
-    speeds = None
-    if speed is not None:
-        where = f"{source}: speed"
-        speeds = _numbers(speed, where) * SPEEDS[units.speed or "m/s"]
-        if speeds.ndim != 1:
-            raise TaskError(
-                "the speeds have the wrong shape",
-                found=speeds.shape,
-                allowed="(n,)",
-                where=where,
-            )
-        problem = (
-            "a speed must be positive and finite, or NaN if no speed is prescribed"
-        )
-        _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
+    speeds = None if speed is None else _speeds(speed, units, source)
     for name, one in (("orientations", turning), ("speed", speeds)):
         if one is not None and len(one) != len(values):
             raise TaskError(
@@ -243,6 +222,22 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
         problem = "an array of quaternions does not say whether w is first or last"
     allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
     raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
+
+
+def _speeds(speed: Any, units: FileUnits, source: str) -> Array:
+    """Return speeds, (n,), m/s."""
+    where = f"{source}: speed"
+    speeds = _numbers(speed, where) * SPEEDS[units.speed or "m/s"]
+    if speeds.ndim != 1:
+        raise TaskError(
+            "the speeds have the wrong shape",
+            found=speeds.shape,
+            allowed="(n,)",
+            where=where,
+        )
+    problem = "a speed must be positive and finite, or NaN if no speed is prescribed"
+    _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
+    return speeds
 
 
 def _array(values: Any, where: str, source: str) -> Array:

@@ -11,13 +11,13 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
-from brachis.task.fields import LARGEST
+from brachis.task.fields import LARGEST, POSITION
 from brachis.task.point_data import FileUnits, PointFile
 from brachis.task.points.points import Array, Indices, Points, PointsAndNotes, Rows
 from brachis.task.points.units import (
@@ -28,6 +28,7 @@ from brachis.task.points.units import (
     rotation_by,
 )
 
+_Found = TypeVar("_Found")
 _DELIMITERS: Final = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces"}
 
 
@@ -58,8 +59,8 @@ def read_table(
     text: str,
     source: str,
     allowed: str,
-    check: Callable[[tuple[str, ...], str], object],
-) -> Table:
+    understand: Callable[[tuple[str, ...], str], _Found],
+) -> tuple[Table, _Found]:
     """Read a table whose first line names the columns; lines that are empty or begin with ``#`` are skipped.
 
     Parameters
@@ -70,8 +71,12 @@ def read_table(
         The file, for messages.
     allowed : str
         The columns that it may have, for messages.
-    check : callable
-        Refuses a header that is not understood, given its file and line.
+    understand : callable
+        Returns what a header says, or refuses it, given its file and line.
+
+    Returns
+    -------
+    Table, and what `understand` returns
 
     Raises
     ------
@@ -99,7 +104,7 @@ def read_table(
     header_line, first = head
     where = f"{source}: line {header_line}"
     header = tuple(_cells(first, delimiter, where))
-    check(header, where)
+    found = understand(header, where)
     if not body:
         raise TaskError("the file has no rows of numbers", where=source)
     values = []
@@ -107,7 +112,8 @@ def read_table(
         where = f"{source}: line {number}"
         values.append(_numbers(_cells(line, delimiter, where), header, where))
     numbers = np.array([number for number, _ in body])
-    return Table(header, header_line, np.array(values), numbers, tuple(notes))
+    table = Table(header, header_line, np.array(values), numbers, tuple(notes))
+    return table, found
 
 
 def _with_point(line: str, where: str) -> str:
@@ -168,7 +174,6 @@ def _number(cell: str) -> float:
         return math.nan
 
 
-POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _ORIENTATIONS: Final = {
     _QUATERNION: ("quaternion_wxyz",),
@@ -358,9 +363,8 @@ def read_points(
         Columns are missing or unknown, units are missing or contradict each other, a quaternion has no unit length, or
         a feed rate is not positive.
     """
-    check = partial(_read_columns, rows=rows, stated=settings.orientation)
-    table = read_table(text, source, _allowed_columns(rows), check)
-    columns = check(table.header, f"{source}: line {table.header_line}")
+    understand = partial(_read_columns, rows=rows, stated=settings.orientation)
+    table, columns = read_table(text, source, _allowed_columns(rows), understand)
     notes = [*table.notes]
     units = settings.units
 

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 if TYPE_CHECKING:
     import numpy.typing as npt
     from scipy.spatial.transform import Rotation
@@ -99,7 +97,7 @@ def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
     if convention == "quaternion_xyzw":
         return Rotation.from_quat(values)
     if convention == "quaternion_wxyz":
-        return Rotation.from_quat(np.roll(values, -1, axis=-1))
+        return Rotation.from_quat(values, scalar_first=True)
     if convention == "rotation_vector":
         return Rotation.from_rotvec(values)
     return Rotation.from_euler(CONVENTIONS[convention].euler, values)
@@ -107,4 +105,4 @@ def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
 
 def quaternions_of(rotation: Rotation) -> npt.NDArray[Any]:
     """Return the unit quaternions w, x, y, z, (..., 4), one of both, of rotations."""
-    return np.roll(rotation.as_quat(), 1, axis=-1)
+    return rotation.as_quat(scalar_first=True)
