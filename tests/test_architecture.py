@@ -280,6 +280,23 @@ def test_importing_loads_no_heavy_library():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize("example", ["scara_line", "tx90l_rail_line"])
+def test_an_ordinary_plan_loads_no_scipy(example):
+    """Its import takes longer than the plan."""
+    code = (
+        "import sys, brachis\n"
+        f"brachis.plan(brachis.examples.{example}, effort='single', intervals=8, strict=False)\n"
+        "print('scipy' in sys.modules, 'pinocchio' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["False", "True"]
+
+
 def test_public_names_exist():
     for name in brachis.__all__:
         assert getattr(brachis, name) is not None

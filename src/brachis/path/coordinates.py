@@ -27,7 +27,6 @@ from brachis.path.joins import pose_corner, row_corner
 from brachis.path.orientation import orientation_along, turn_of
 from brachis.path.pose import POSITIONS, PosePath, pose_curve, rotations
 from brachis.path.protocol import Array, Curve, MappedCurve
-from brachis.path.rotations import rotation_of
 from brachis.path.sequence import SequencePath
 from brachis.path.splines import (
     bspline_curve,
@@ -213,8 +212,9 @@ class PoseCoordinates(RowCoordinates):
                 allowed=allowed,
                 where="start",
             )
-        nearest = rotation_of(rotation).as_matrix()
-        return np.concatenate([start[:POSITIONS], nearest.ravel()])
+        # The nearest rotation: the polar decomposition without its stretch.
+        left, _, right = np.linalg.svd(rotation)
+        return np.concatenate([start[:POSITIONS], (left @ right).ravel()])
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """Return the curve of position and orientation along a segment."""

@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from brachis.common.summary import Summary
 from brachis.errors import InputError
 from brachis.robot.urdf_elements import Element, UrdfTree, end_of, number_of, numbers_of
 from brachis.task import Placement
-from brachis.task.points.units import rotation_by
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -158,7 +156,7 @@ def _read_body(
 def placement_matrix(placement: Placement) -> np.ndarray:
     """Return a placement as a (4, 4) matrix."""
     matrix = np.eye(4)
-    matrix[:3, :3] = _turn("rpy", np.radians(placement.rpy_deg))
+    matrix[:3, :3] = _turn_by_rpy(np.radians(placement.rpy_deg))
     matrix[:3, 3] = placement.xyz
     return matrix
 
@@ -210,7 +208,8 @@ def _spread(lever: np.ndarray) -> np.ndarray:
 def origin_of(owner: Element, path: str) -> np.ndarray:
     """Return the placement, (4, 4), that an origin describes: roll, pitch and yaw about fixed axes."""
     placed = np.eye(4)
-    placed[:3, :3] = _turn("rpy", numbers_of(owner, path, "rpy", "0 0 0"))
+    angles = numbers_of(owner, path, "rpy", "0 0 0")
+    placed[:3, :3] = _turn_by_rpy(angles)
     placed[:3, 3] = numbers_of(owner, path, "xyz", "0 0 0")
     return placed
 
@@ -221,10 +220,18 @@ def _displacement(joint: Element, position: float) -> np.ndarray:
     if joint.get("type") == "prismatic":
         placed[:3, 3] = position * _axis(joint)
     elif joint.get("type") in ("revolute", "continuous"):
-        placed[:3, :3] = _turn("rotation_vector", position * _axis(joint))
+        placed[:3, :3] = _turn_about(_axis(joint), position)
     return placed
 
 
-def _turn(convention: str, angles: npt.ArrayLike) -> np.ndarray:
-    """Return the rotation, (3, 3), of angles, (3,) rad, in one of the conventions of `rotation_by`."""
-    return np.asarray(rotation_by(convention, np.array(angles)).as_matrix())
+def _turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the rotation, (3, 3), about a unit axis by an angle, rad (Rodrigues' formula)."""
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+
+
+def _turn_by_rpy(angles: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the rotation, (3, 3), by roll, pitch and yaw, rad, about the fixed x, then y, then z axis."""
+    roll, pitch, yaw = map(_turn_about, np.eye(3), angles)
+    return np.asarray(yaw @ pitch @ roll)
