@@ -100,6 +100,7 @@ def test_a_program_reads_the_file_too(tmp_path):
     ("changes", "words"),
     [
         ({"brachis_limits": 2}, ["limits.yaml: brachis_limits"]),
+        ({"brachis_limits": True}, ["brachis_limits: the version", "found true"]),
         ({"source": None}, ["limits.yaml: source"]),
         (
             {"limits": {"torqe": 1}},

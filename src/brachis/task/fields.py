@@ -187,6 +187,18 @@ def _from_percent(value: object) -> object:
 
 # Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
 # are accepted as real ones.
+def _check_version(version: object) -> object:
+    # Python holds true == 1, so that a literal alone would accept `brachis: true`.
+    if type(version) is not int:
+        raise refuse(
+            "the version of the format must be a whole number",
+            found=version,
+            allowed="1",
+        )
+    return version
+
+
+Version = Annotated[Literal[1], BeforeValidator(_check_version)]
 Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]

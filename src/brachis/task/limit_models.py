@@ -157,9 +157,17 @@ class LimitSpec(_JointLimits):  # type: ignore[misc]
 
     def __post_init__(self) -> None:
         """Take arrays for plain numbers, and a mapping for the scale."""
-        if not isinstance(self.scale, LimitScale):
-            factors: Any = plain(self.scale or {})
-            scale = LimitScale().model_copy(update=factors)
+        given: Any = self.scale
+        if not isinstance(given, LimitScale):
+            given = {} if given is None else given
+            if not isinstance(given, Mapping):
+                raise InputError(
+                    "the factors on limits are not a mapping",
+                    where="robot.limits.scale",
+                    found=given,
+                    allowed="factors by kind of limit, such as {torque: 0.8}",
+                )
+            scale = LimitScale().model_copy(update=plain(given))
             object.__setattr__(self, "scale", scale)
         for each in fields(self):
             value = plain(getattr(self, each.name), tuple)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -18,6 +18,7 @@ from brachis.task.fields import (
     NonEmpty,
     Number,
     Positive,
+    Version,
     merge,
 )
 from brachis.task.limit_models import (
@@ -33,7 +34,7 @@ from brachis.task.yaml_reader import read_yaml
 class LimitsFile(Model):
     """What a limits file says."""
 
-    brachis_limits: Literal[1]
+    brachis_limits: Version
     """Version of the format."""
     source: Name
     """Origin of the figures."""

@@ -26,6 +26,7 @@ from brachis.task.fields import (
     Name,
     NonEmpty,
     Number,
+    Version,
     must,
     or_form,
     plain,
@@ -157,7 +158,7 @@ class Task(Model):
     (('x', 'y'), ('j3',))
     """
 
-    brachis: Literal[1]
+    brachis: Version
     """Version of the task format."""
     robot: RobotSettings = Field(default_factory=RobotSettings)
     """The robot."""
@@ -222,18 +223,6 @@ class Task(Model):
     strict: bool | None = None
     """true: all implausible figures are errors. false: all are warnings. null: only a start posture that looks like
     degrees is an error."""
-
-    @field_validator("brachis", mode="before")
-    @classmethod
-    def _version_is_a_number(cls, version: object) -> object:
-        # Python holds true == 1, so that the literal alone would accept `brachis: true`.
-        if type(version) is not int:
-            raise refuse(
-                "the version of the task format must be a whole number",
-                found=version,
-                allowed="1",
-            )
-        return version
 
     @model_validator(mode="before")
     @classmethod

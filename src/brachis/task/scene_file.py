@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from brachis.common.files import locate_urdf, read_text
 from brachis.errors import TaskError
-from brachis.task.fields import Model
+from brachis.task.fields import Model, Version
 from brachis.task.messages import show, validate
 from brachis.task.models import Task
 from brachis.task.scene import SceneBody
@@ -19,7 +19,7 @@ from brachis.task.yaml_reader import read_yaml
 class SceneFile(Model):
     """What a scene file says."""
 
-    brachis_scene: Literal[1]
+    brachis_scene: Version
     """Version of the format."""
     bodies: tuple[SceneBody, ...]
     """Bodies as in scene; files are relative to this file."""

@@ -131,5 +131,5 @@ class Margins(Model):
     singularity: Positive | None = None
     """Least singular value of the Jacobian of the task space's rows by the arm's own joints (m and rad, per rad and m);
     tolerances and a free roll do not count. Null: none."""
-    joint_ends: Annotated[float, Field(gt=0.0, lt=0.5)] | None = None
+    joint_ends: Annotated[Positive, Field(lt=0.5)] | None = None
     """Part of each joint's range that is kept free at both ends, such as 0.05. Null: none."""
