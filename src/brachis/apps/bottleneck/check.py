@@ -99,6 +99,7 @@ class CheckedSensitivity:
 
 
 def _deviation(predicted: float, found: float) -> float:
+    """How far a prediction is off, as a fraction of what was found; 0 if both are equal."""
     if found == predicted:
         return 0.0
     return abs(predicted - found) / abs(found) if found else np.inf
@@ -177,7 +178,7 @@ def check_sensitivities(
     """
     began = time.perf_counter()
     program = refined.program
-    base = refined.reports[-1].x
+    base = refined.report.x
     t_end = program.end_time
     checked = []
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
@@ -256,7 +257,7 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     while True:
         found = linprog(
             gradient,
-            A_ub=slopes[np.flatnonzero(kept)].toarray(),
+            A_ub=slopes[kept].toarray(),
             b_ub=room[kept],
             bounds=bounds,
         )
@@ -305,6 +306,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def _stationarity(program: Program, x: np.ndarray) -> float:
+    """Residual of the multipliers at x, (v,); infinite if a collocation point is out of the branch's reach."""
     try:
         return multipliers_of(program, x).residual
     except UnreachableError:

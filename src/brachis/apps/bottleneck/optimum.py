@@ -100,7 +100,7 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
             slower = trajectory.t_end / refined.t_end - 1.0
             if -longest <= slower <= task.search.slower + 1e-3:
                 return refined
-            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.reports[-1].solver}")
+            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.report.solver}")
     what = "a different optimum" if ends else "no optimum"
     raise PlanningError(
         f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
@@ -116,7 +116,7 @@ def _over_few_knots(
     breaks = np.linspace(0.0, 1.0, _FEW_INTERVALS + 1)
     phases = []
     parts = []
-    for (phase, _), motion in zip(program.split(x), program.motions(x), strict=True):
+    for phase, motion in zip(program.phases, program.motions(x), strict=True):
         knots = clamped_knots(phase.degree, breaks)
         few = phase.with_knots(knots, spread(breaks, points))
         t_norm = spread(breaks, _FIT)

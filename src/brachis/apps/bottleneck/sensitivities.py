@@ -27,10 +27,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.common.summary import Summary
-from brachis.limits import Bound, Label, Limit, Role
+from brachis.limits import Bound, Label, Limit
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase_timing import PhaseTiming
-from brachis.optimise.program import Program
+from brachis.optimise.program import Program, is_safeguard
 from brachis.optimise.retiming import SOLVER
 
 if TYPE_CHECKING:
@@ -234,6 +234,11 @@ _NEAR = 0.02
 """Distance from a limit, as a part of it, beyond which it costs nothing."""
 
 
+def _outwards(bound: Bound) -> float:
+    """Sign of a change of the figure that leaves more room."""
+    return -1.0 if bound.side == "lower" else 1.0
+
+
 @dataclass(frozen=True)
 class Sensitivity:
     """What one figure of a limit costs.
@@ -259,7 +264,7 @@ class Sensitivity:
     @property
     def outwards(self) -> float:
         """Sign of a change of the figure that leaves more room."""
-        return -1.0 if self.bound.side == "lower" else 1.0
+        return _outwards(self.bound)
 
     def change(self, fraction: float) -> float:
         """Predict the change of t_E, s, for a limit that leaves more room by a fraction; 0.01 is +1 %."""
@@ -368,7 +373,7 @@ def sensitivities(refined: SolvedProgram) -> Sensitivities:
     Sensitivities
         Of the answer before its end time was lengthened to meet the limits between collocation points.
     """
-    report = refined.reports[-1]
+    report = refined.report
     if report.solver == SOLVER:
         return sensitivities_of_timing(refined)
     multipliers = multipliers_of(refined.program, report.x, report.multipliers)
@@ -384,14 +389,14 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         for bound in limit.bounds:
             rates = np.zeros(len(program.lower))
             rates[rows[:, bound.column]] = bound.per_unit
-            if limit.role is Role.SAFEGUARD:
+            if is_safeguard(limit):
                 subject = limit.labels[bound.column].subject
                 cost = -multipliers.change(rates)
                 if cost > 1e-9:
                     boundaries.append(BranchBoundary(subject, bound.figure, cost))
                 continue
             side = {None: None, "lower": 1.0, "upper": -1.0}[bound.side]
-            derivative = -(side or -1.0) * multipliers.change(rates, side)
+            derivative = _outwards(bound) * multipliers.change(rates, side)
             found.append(Sensitivity(limit, bound, derivative))
     found.sort(key=lambda entry: entry.change(1.0))
     return Sensitivities(
@@ -426,7 +431,7 @@ def sensitivities_of_timing(refined: SolvedProgram) -> Sensitivities:
             continue
         evaluation = phase.evaluate(x)
         for limit, values in zip(phase.limits, evaluation.by_limit, strict=True):
-            if limit.role is Role.SAFEGUARD:
+            if is_safeguard(limit):
                 continue
             nearest = limit.violation(values).max(axis=0)
             for bound in limit.bounds:
@@ -436,8 +441,7 @@ def sensitivities_of_timing(refined: SolvedProgram) -> Sensitivities:
                 costs[limit, bound] = costs.get((limit, bound), 0.0) + cost
     found = []
     for (limit, bound), cost in costs.items():
-        outwards = -1.0 if bound.side == "lower" else 1.0
-        derivative = outwards * cost / (_RAISED * bound.full_scale)
+        derivative = _outwards(bound) * cost / (_RAISED * bound.full_scale)
         found.append(Sensitivity(limit, bound, derivative))
     found.sort(key=lambda entry: entry.change(1.0))
     return Sensitivities(tuple(found), (), TIMINGS, 0.0, unique=True)
