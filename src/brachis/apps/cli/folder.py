@@ -286,7 +286,7 @@ def finish(
         own = _name_files(names, verified=verified)
         files = {own[name]: write for name, write in results.items()}
         (data_file,) = (own[name] for name in names if name.endswith(".json"))
-        files[data_file] = lambda path: write_text(json_text(data), path)
+        files[data_file] = partial(write_text, json_text(data))
         drawings = {own[name]: partial(draw, make) for name, make in figures.items()}
         others = _name_files(names, verified=not verified)
         stale = {*own.values(), *others.values()} - {*files}

@@ -39,7 +39,6 @@ _MOST_REFUSED = 12
 _OTHER_TASKS = (
     "this family does not solve poses",
     "this family solves only poses",
-    "only for poses",
     "this family solves only the position: x, y and z",
 )
 """Reasons of families for other task spaces; shown only without other reasons."""
@@ -84,27 +83,14 @@ def inspect(
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
     from brachis.limits import describe_guarantees, joint_limits_of, limits_of
-    from brachis.problem.plausibility import of_posture, of_robot
     from brachis.robot import bind
     from brachis.robot.from_task import in_use, robot_from_settings
 
-    ik = brachis.ik
     remarks: list[str] = []
     task = None
     space: str | Sequence[str] | None = task_space_of(task_space)
     if source.suffix in TASK_SUFFIXES or kind_of(source) is Kind.TASK:
-        given = {
-            "--tool-frame": (tool_frame, "set robot.tool_frame in the task"),
-            "--base-frame": (base_frame, "set robot.base_frame in the task"),
-            "--lock": (lock, "set robot.locked_joints in the task"),
-        }
-        for option, (value, hint) in given.items():
-            if value:
-                raise InputError(
-                    "not allowed with a task file",
-                    where=option,
-                    hint=f"Omit the option and {hint}; or give the URDF in place of the task",
-                )
+        _refuse_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
         robot = robot_from_settings(task.robot)
         space = space or task.task_space
@@ -113,20 +99,12 @@ def inspect(
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
     if space is None:
-        space = ik.default_task_space(robot)
+        space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
     robot, task_map = bind(robot, space, None if task is None else task.tolerances)
-    remarks += [f"warning: {remark}" for remark in of_robot(robot)]
-    candidates = ik.find_all(robot, task_map)
-    if candidates and not any(candidate.solver for candidate in candidates):
-        remarks.append(ik.NO_CLOSED_FORM)
-    if missing := ik.missing_eaik(candidates):
-        remarks.append(missing)
-    if posture is not None:
-        q = _read_posture(robot, posture)
-        remarks += [f"warning: {each}" for each in of_posture(robot, "--posture", q)]
-        remarks.append(_tool_pose(robot, q))
+    candidates = brachis.ik.find_all(robot, task_map)
+    remarks += _remarks(robot, candidates, posture)
     limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     data = {
         "robot": str(source),
@@ -146,6 +124,43 @@ def inspect(
         print_json(data)
     else:
         _print_robot(robot, task, data, degrees=degrees)
+
+
+def _refuse_options(
+    tool_frame: str | None, base_frame: str | None, lock: list[str] | None
+) -> None:
+    """Refuse the options of a URDF that a task sets itself."""
+    given = {
+        "--tool-frame": (tool_frame, "robot.tool_frame"),
+        "--base-frame": (base_frame, "robot.base_frame"),
+        "--lock": (lock, "robot.locked_joints"),
+    }
+    for option, (value, key) in given.items():
+        if value:
+            raise InputError(
+                "not allowed with a task file",
+                where=option,
+                hint=f"Omit the option and set {key} in the task; or give the URDF in place of the task",
+            )
+
+
+def _remarks(
+    robot: Robot, candidates: list[ik.TriedDecomposition], posture: str | None
+) -> list[str]:
+    """Say what is implausible, whether closed forms are missing, and where the tool is in a posture."""
+    from brachis.problem.plausibility import of_posture, of_robot
+
+    ik = brachis.ik
+    remarks = [f"warning: {remark}" for remark in of_robot(robot)]
+    if candidates and not any(candidate.solver for candidate in candidates):
+        remarks.append(ik.NO_CLOSED_FORM)
+    if missing := ik.missing_eaik(candidates):
+        remarks.append(missing)
+    if posture is not None:
+        q = _read_posture(robot, posture)
+        remarks += [f"warning: {each}" for each in of_posture(robot, "--posture", q)]
+        remarks.append(_tool_pose(robot, q))
+    return remarks
 
 
 def _print_robot(
@@ -300,16 +315,12 @@ def _robot_of_urdf(
         locked_joints=locked,
         limits=brachis.LimitSpec(torque=None, velocity=None, acceleration=1.0),
     )
-
-    def magnitudes(values: Sequence[float | None]) -> np.ndarray:
-        return np.array([np.inf if value is None else value for value in values])
-
-    limits = robot.limits.with_magnitudes(
-        acceleration=np.full(robot.n, np.inf),
-        velocity=magnitudes([limit.velocity for limit in robot.urdf_limits]),
-        torque=magnitudes([limit.effort for limit in robot.urdf_limits]),
-    )
-    return replace(robot, limits=limits)
+    magnitudes = {}
+    for kind in ("acceleration", "velocity", "torque"):
+        stated = [limit.of_kind(kind) for limit in robot.urdf_limits]
+        sizes = [np.inf if value is None else value for value in stated]
+        magnitudes[kind] = np.array(sizes)
+    return replace(robot, limits=robot.limits.with_magnitudes(**magnitudes))
 
 
 def _frames(

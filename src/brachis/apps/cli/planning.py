@@ -104,6 +104,7 @@ def _plan_task(
     strict: bool | None,
     listener: Listener,
 ) -> brachis.Result:
+    """Load a task and plan it."""
     changed = load_changed_task(task, changes, strict=strict)
     return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
 
@@ -215,15 +216,7 @@ def bottleneck(
     result = None
     with show_progress() as listener:
         if source.suffix.lower() == ".npz":
-            given = {"--urdf": urdf, "--set": changes, "--strict": strict}
-            for option, value in given.items():
-                if value is not None:
-                    raise InputError(
-                        "this option cannot be used with a saved motion",
-                        where=option,
-                        found=value,
-                        allowed="this option with a task file",
-                    )
+            _refuse_options({"--urdf": urdf, "--set": changes, "--strict": strict})
             trajectory = brachis.Trajectory.load(source)
             data = _verify_again(trajectory)
         else:
@@ -250,6 +243,18 @@ def bottleneck(
         complaint="its bottlenecks may be wrong",
     )
     raise typer.Exit(code)
+
+
+def _refuse_options(given: dict[str, object]) -> None:
+    """Refuse options of a task where a saved motion is given."""
+    for option, value in given.items():
+        if value is not None:
+            raise InputError(
+                "this option cannot be used with a saved motion",
+                where=option,
+                found=value,
+                allowed="this option with a task file",
+            )
 
 
 def _verify_again(trajectory: brachis.Trajectory) -> dict[str, Any]:
@@ -343,6 +348,7 @@ def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
 
 
 def _write_value(value: object) -> str:
+    """Write a cell of the table: nothing for None."""
     if isinstance(value, float):
         return f"{value:.6g}"
     return "" if value is None else str(value)

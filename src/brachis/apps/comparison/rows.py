@@ -18,9 +18,6 @@ import numpy as np
 from brachis.limits import Limit, Moments, Role, limits_of
 from brachis.trajectory import Trajectory
 
-_STRIDES = (1, 2, 4)
-"""Periods that are taken as one, for limits of joints; limits of the tool may change along the path, so only one."""
-
 
 @dataclass(frozen=True, eq=False)
 class RatioBounds:
@@ -72,7 +69,8 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
     one_sided = np.where(np.isfinite(limit.upper), -np.inf, np.inf)
     harmless = np.where(np.isfinite(limit.centre), limit.centre, one_sided)
     is_mean = limit.guarantee.is_mean
-    strides = _STRIDES if limit.role is Role.ROBOT and not is_mean else (1,)
+    # Periods that are taken as one. Limits of the tool may change along the path, so only one of them.
+    strides = (1, 2, 4) if limit.role is Role.ROBOT and not is_mean else (1,)
     for stride in strides:
         first = np.arange(max(len(t) - order * stride, 0))[:, None]
         windows = first + stride * np.arange(order + 1)
