@@ -22,7 +22,7 @@ from brachis.apps.cli.app import (
     urdf_of,
 )
 from brachis.apps.cli.output import print_json, print_lines, print_table
-from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
+from brachis.common.files import is_task_file
 from brachis.errors import InputError, write_count
 
 if TYPE_CHECKING:
@@ -34,16 +34,34 @@ if TYPE_CHECKING:
 
 _NONE = "none"
 """What a table shows for a missing limit, and for a joint without friction."""
-_MOST_REFUSED = 12
-"""Choices without a closed form that are listed on the screen."""
+_LISTED = 12
+"""Choices without a closed form, and pairs that may collide, that are listed on the screen."""
 _OTHER_TASKS = (
     "this family does not solve poses",
     "this family solves only poses",
     "this family solves only the position: x, y and z",
 )
 """Reasons of families for other task spaces; shown only without other reasons."""
-_PAIRS = 12
-"""Pairs that may collide that are shown, no more."""
+
+
+PrescribedSpace = Annotated[
+    str | None,
+    Option(
+        help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
+        "Default: the task's, or all that the robot can."
+    ),
+]
+
+Posture = Annotated[
+    str | None,
+    Option(
+        help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
+    ),
+]
+
+LockedJoints = Annotated[
+    list[str] | None, Option(help="Joint held at a position: name=value, repeatable.")
+]
 
 
 def inspect(
@@ -55,25 +73,11 @@ def inspect(
             metavar="URDF|TASK",
         ),
     ],
-    task_space: Annotated[
-        str | None,
-        Option(
-            help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
-            "Default: the task's, or all that the robot can."
-        ),
-    ] = None,
+    task_space: PrescribedSpace = None,
     tool_frame: ToolFrame = None,
     base_frame: BaseFrame = None,
-    posture: Annotated[
-        str | None,
-        Option(
-            help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
-        ),
-    ] = None,
-    lock: Annotated[
-        list[str] | None,
-        Option(help="Joint held at a position: name=value, repeatable."),
-    ] = None,
+    posture: Posture = None,
+    lock: LockedJoints = None,
     degrees: Degrees = False,
     changes: Changes = None,
     json: Json = False,
@@ -89,7 +93,7 @@ def inspect(
     remarks: list[str] = []
     task = None
     space: str | Sequence[str] | None = task_space_of(task_space)
-    if source.suffix in TASK_SUFFIXES or kind_of(source) is Kind.TASK:
+    if is_task_file(source):
         _refuse_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
         robot = robot_from_settings(task.robot)
@@ -180,10 +184,10 @@ def _print_robot(
     print_lines(*(f"{name} limit: {text}" for name, text in guarantees))
     pairs = data["collisions"]["pairs"]
     if pairs:
-        more = ", ..." if len(pairs) > _PAIRS else ""
+        more = ", ..." if len(pairs) > _LISTED else ""
         print_lines(
             f"{write_count(len(pairs), 'pair')} that may collide (all: --json):",
-            f"  {'; '.join(pairs[:_PAIRS])}{more}",
+            f"  {'; '.join(pairs[:_LISTED])}{more}",
         )
     if task is not None:
         if not task.fits:
@@ -209,7 +213,7 @@ def _collisions(robot: Robot, task: Task | None) -> dict[str, list[str]]:
     if scene is None:
         return {"solids": [], "pairs": []}
     # Those with bodies of the scene first.
-    pairs = sorted(range(len(scene.pairs)), key=lambda pair: -scene.pairs[pair].max())
+    pairs = (-scene.pairs.max(axis=1)).argsort(kind="stable").tolist()
     return {
         "solids": [solid.name for solid in scene.solids],
         "pairs": [scene.names(pair) for pair in pairs],
@@ -226,27 +230,27 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
 
     geometry = brachis.ik.ChainGeometry.of(robot)
     limits = robot.limits
+    columns = {"range": "position"}
+    columns |= {kind.replace("_", " "): kind for kind in MAGNITUDES}
     rows = []
     for i, (name, unit) in enumerate(
         zip(robot.joint_names, robot.position_units, strict=True)
     ):
-        axis = [f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]]
+        axis = geometry.axes[i].round(6) + 0.0
         row = {
             "joint": name,
             "type": "revolute" if geometry.revolute[i] else "prismatic",
-            "axis at zero": " ".join(axis),
+            "axis at zero": " ".join(f"{component:.4g}" for component in axis),
         }
-        pairs = {"range": (limits.position_lower[i], limits.position_upper[i], unit)}
-        for kind in MAGNITUDES:
-            lower, upper = limits.both_ways(kind)[:, i]
-            pairs[kind.replace("_", " ")] = (lower, upper, UNITS[kind][unit])
-        for key, (lower, upper, si_unit) in pairs.items():
-            shown, factor = shown_unit(si_unit, degrees=degrees)
-            row[key] = f"{factor * lower:.4g} to {factor * upper:.4g} {shown}"
+        for key, kind in columns.items():
+            shown, factor = shown_unit(UNITS[kind][unit], degrees=degrees)
+            lower, upper = factor * limits.both_ways(kind)[:, i]
+            text = f"{lower:.4g} to {upper:.4g} {shown}"
             if lower == -upper and key != "range":
-                row[key] = f"{factor * upper:.4g} {shown}"
+                text = f"{upper:.4g} {shown}"
             if (lower, upper) == (-float("inf"), float("inf")):
-                row[key] = _NONE
+                text = _NONE
+            row[key] = text
         row["mass"] = f"{robot.model.inertias[i + 1].mass:.4g} kg"
         for key in ("viscous", "coulomb", "armature"):
             value = getattr(robot.friction, key)[i]
@@ -356,13 +360,10 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
     }
     solver = candidate.solver
     if solver is None:
-        reasons = [
-            f"{family}: {reason}"
-            for family, reason in candidate.reasons.items()
-            if reason not in _OTHER_TASKS
-            or {*candidate.reasons.values()} <= {*_OTHER_TASKS}
-        ]
-        row["why not"] = "; ".join(reasons)
+        reasons = candidate.reasons
+        own = {name: why for name, why in reasons.items() if why not in _OTHER_TASKS}
+        shown = (own or reasons).items()
+        row["why not"] = "; ".join(f"{name}: {why}" for name, why in shown)
         return row
     several = f" (up to {solver.alternatives})" if solver.alternatives > 1 else ""
     row["solver"] = candidate.family
@@ -390,10 +391,10 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
         print_lines(
             f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
         )
-    for row in refused[:_MOST_REFUSED]:
+    for row in refused[:_LISTED]:
         print_lines(f"  {row['redundant joints']}: {row['why not']}")
-    if len(refused) > _MOST_REFUSED:
-        more = len(refused) - _MOST_REFUSED
+    if len(refused) > _LISTED:
+        more = len(refused) - _LISTED
         print_lines(f"  ... and {more} more, which --json lists")
 
 

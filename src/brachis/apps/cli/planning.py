@@ -88,7 +88,8 @@ def plan(
         out=out,
         names=_PLANNED,
         verified=result.verified,
-        show=None if json else lambda: _print_plan(result, data, degrees=degrees),
+        json=json,
+        show=lambda: _print_plan(result, data, degrees=degrees),
         result=result,
     )
     if view:
@@ -169,6 +170,21 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     return ", ".join(parts)
 
 
+CheckedAgain = Annotated[
+    bool,
+    Option("--check", help="Solve again with each limit raised by 1 %, and compare."),
+]
+
+WithReference = Annotated[
+    bool,
+    Option(
+        "--reference",
+        help="Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best "
+        "known value, not a proven bound, and takes seconds.",
+    ),
+]
+
+
 def bottleneck(
     task: Annotated[
         Path,
@@ -177,20 +193,8 @@ def bottleneck(
             metavar="TASK|RESULT",
         ),
     ],
-    check: Annotated[
-        bool,
-        Option(
-            "--check", help="Solve again with each limit raised by 1 %, and compare."
-        ),
-    ] = False,
-    reference: Annotated[
-        bool,
-        Option(
-            "--reference",
-            help="Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best "
-            "known value, not a proven bound, and takes seconds.",
-        ),
-    ] = False,
+    check: CheckedAgain = False,
+    reference: WithReference = False,
     out: Annotated[
         Path | None,
         Option(
@@ -230,7 +234,6 @@ def bottleneck(
     data["bottleneck"] = report.to_dict()
     redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
     head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
-    show_report = partial(print_lines, head, report.text(degrees=degrees))
     code = finish(
         data,
         {},
@@ -238,7 +241,8 @@ def bottleneck(
         out=out,
         names=_BOTTLENECK,
         verified=data["verified"],
-        show=None if json else show_report,
+        json=json,
+        show=partial(print_lines, head, report.text(degrees=degrees)),
         result=result,
         complaint="its bottlenecks may be wrong",
     )
