@@ -34,12 +34,8 @@ from brachis.task.fields import plain
 from brachis.task.yaml_reader import read_yaml
 from brachis.timing import SlowTimingWarning
 
-_INNER = 0.15
-"""Part of a range, at each end, in which no motion begins."""
 _LENGTHS = (1.0, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01)
 """Lengths of lines, m."""
-_LEAST_DEXTERITY = 1e-3
-"""Dexterity below which no motion begins."""
 _QUICK = {
     "search.effort": "single",
     "search.time_limit": 20.0,
@@ -47,8 +43,6 @@ _QUICK = {
     "search.least_motion": False,
 }
 """Keys of the plan by which a task is tried."""
-_LONGEST = 90.0
-"""Time after which no further task space is tried, s."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +74,7 @@ def choices(task_map: TaskMap) -> Iterator[Choice]:
     for lowest in (0.1 * reach, -np.inf):
         quality = _quality(task_map, postures, reach, lowest)
         for k in np.argsort(-quality)[:4]:
-            if quality[k] > _LEAST_DEXTERITY:
+            if quality[k] > 1e-3:  # too near a singularity otherwise
                 line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
                 if line is not None:
                     yield Choice(postures[k], line)
@@ -90,7 +84,8 @@ def _draw_postures(robot: Robot) -> np.ndarray:
     """Draw 400 postures in the inner part of all ranges, within 2 rad or m of zero if possible, with two digits."""
     lower = robot.limits.position_lower
     upper = robot.limits.position_upper
-    inner = _INNER * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    # No motion begins in the outer parts of a range, 15 % at each end.
+    inner = 0.15 * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
     ends = np.array([lower + inner, upper - inner])
     near = np.clip([[-2.0], [2.0]], *ends)
     low, high = np.where(near[1] > near[0], near, ends)
@@ -289,6 +284,7 @@ def _inline(value: object) -> str:
 
 
 def _joint(robot: Robot, i: int, position: float) -> str:
+    """Write a joint's position, with its unit and range as a comment."""
     low = robot.limits.position_lower[i]
     high = robot.limits.position_upper[i]
     unit = robot.position_units[i]
@@ -379,7 +375,7 @@ def starter_task(
     robot = Robot.from_urdf(
         path, tool_frame=tool_frame, base_frame=base_frame, limits=limits
     )
-    deadline = Deadline.after(_LONGEST)
+    deadline = Deadline.after(90.0)  # s; then no further task space is tried
     changes = {**_QUICK, "robot.urdf": str(path.absolute())}
     for space in spaces(robot):
         words = space if isinstance(space, str) else ", ".join(space)

@@ -303,6 +303,12 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     return None
 
 
+def is_task_file(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file is a task, by its suffix or its beginning."""
+    suffix = Path(path).suffix.lower()
+    return suffix in TASK_SUFFIXES or kind_of(path) is Kind.TASK
+
+
 def check_kind(
     path: str | os.PathLike[str], expected: Kind | str, error: type[InputError]
 ) -> None:

@@ -14,10 +14,7 @@ from brachis.apps.bottleneck.check import (
     check_sensitivities,
 )
 from brachis.apps.bottleneck.optimum import solve_again
-from brachis.apps.bottleneck.reference import (
-    Reference,
-    find_reference,
-)
+from brachis.apps.bottleneck.reference import Reference, find_reference
 from brachis.apps.bottleneck.report import BottleneckReport, report
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,

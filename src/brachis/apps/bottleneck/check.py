@@ -38,7 +38,6 @@ from brachis.optimise.program import Program
 
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
-_OPTIONS = SolverOptions(tolerance=1e-8)
 _FEASIBLE = 1e-7
 """Largest violation of a row at an answer, dimensionless."""
 
@@ -99,6 +98,7 @@ class CheckedSensitivity:
 
 
 def _deviation(predicted: float, found: float) -> float:
+    """How far a prediction is off, as a fraction of what was found; 0 if both are equal."""
     if found == predicted:
         return 0.0
     return abs(predicted - found) / abs(found) if found else np.inf
@@ -177,7 +177,7 @@ def check_sensitivities(
     """
     began = time.perf_counter()
     program = refined.program
-    base = refined.reports[-1].x
+    base = refined.report.x
     t_end = program.end_time
     checked = []
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
@@ -255,10 +255,7 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     kept = room < 0.1  # rows farther from their bounds are left out at first
     while True:
         found = linprog(
-            gradient,
-            A_ub=slopes[np.flatnonzero(kept)].toarray(),
-            b_ub=room[kept],
-            bounds=bounds,
+            gradient, A_ub=slopes[kept].toarray(), b_ub=room[kept], bounds=bounds
         )
         if not found.success:
             return None
@@ -283,10 +280,9 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
         No backend found a feasible point, and x is not feasible either.
     """
     answers = []
-    curved = any(limit.guarantee.is_mean for limit in program.limits)
-    for solver in solvers_for("auto", curved=curved):
+    for solver in solvers_for("auto", curved=bool(program.means)):
         try:
-            report = solver.solve(program, x, _OPTIONS, None)
+            report = solver.solve(program, x, SolverOptions(tolerance=1e-8), None)
         except ImportError:
             continue
         if report.violation > _FEASIBLE:
@@ -305,6 +301,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def _stationarity(program: Program, x: np.ndarray) -> float:
+    """Residual of the multipliers at x, (v,); infinite if a collocation point is out of the branch's reach."""
     try:
         return multipliers_of(program, x).residual
     except UnreachableError:

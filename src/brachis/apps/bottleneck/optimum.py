@@ -31,12 +31,6 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.task_map import JOINTS
 from brachis.trajectory import Trajectory
 
-_FEW_INTERVALS = 16
-_FIT = 8
-"""Intervals with which a timed motion begins, and times in each at which splines follow it."""
-_TIMED_FASTER = 0.01
-"""Part of the time by which a timing may be faster than splines over few knots."""
-
 
 def solve_again(trajectory: Trajectory) -> SolvedProgram:
     """Solve the problem of a saved motion from where it ended; a timing alone stays as it is.
@@ -74,10 +68,9 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
             if not first.r:
                 return SolvedProgram(program, (keep(program, x),))
             program, x = _over_few_knots(program, x, task.spline.points_per_interval)
-            longest = _TIMED_FASTER
+            longest = 0.01  # a timing may be faster than splines over few knots
         has_law = any(phase.time_law is not None for phase in program.phases)
-        curved = any(limit.guarantee.is_mean for limit in program.limits)
-        for backend in solvers_for(task.solver.name, curved=curved):
+        for backend in solvers_for(task.solver.name, curved=bool(program.means)):
             if deadline.passed:
                 break
             solve = SolverSession.for_task(
@@ -100,7 +93,7 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
             slower = trajectory.t_end / refined.t_end - 1.0
             if -longest <= slower <= task.search.slower + 1e-3:
                 return refined
-            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.reports[-1].solver}")
+            ends.append(f"t_E = {refined.t_end:.6g} s by {refined.report.solver}")
     what = "a different optimum" if ends else "no optimum"
     raise PlanningError(
         f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
@@ -113,13 +106,13 @@ def _over_few_knots(
     program: Program, x: np.ndarray, points: int
 ) -> tuple[Program, np.ndarray]:
     """Write a motion, x, over a few even knots: a timing has too many for a solver."""
-    breaks = np.linspace(0.0, 1.0, _FEW_INTERVALS + 1)
+    breaks = np.linspace(0.0, 1.0, 17)
     phases = []
     parts = []
-    for (phase, _), motion in zip(program.split(x), program.motions(x), strict=True):
+    for phase, motion in zip(program.phases, program.motions(x), strict=True):
         knots = clamped_knots(phase.degree, breaks)
         few = phase.with_knots(knots, spread(breaks, points))
-        t_norm = spread(breaks, _FIT)
+        t_norm = spread(breaks, 8)
         curves = motion.at(t_norm * motion.t_end)[0]
         phases.append(few)
         parts.append(fit_curves(few, motion.t_end, t_norm, curves))

@@ -185,6 +185,7 @@ def _plan_on_mesh(
         return None
 
     def solve_with(backend: Solver, program: Program, x: np.ndarray) -> SolverReport:
+        """Solve for a short time."""
         seconds = float(np.clip(deadline.left, 0.1, 2.5))
         options = SolverOptions(max_iterations=200, time_limit=seconds)
         return backend.solve(program, x, options, None)

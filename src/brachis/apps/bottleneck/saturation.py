@@ -11,8 +11,8 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import freeze, spread
 from brachis.common.summary import Summary
-from brachis.limits import Label, Limit, Moments, Role, limits_of
-from brachis.optimise.program import Program
+from brachis.limits import Label, Limit, Moments, limits_of
+from brachis.optimise.program import Program, is_safeguard
 from brachis.trajectory import MotionPhase, Samples, Trajectory
 
 
@@ -51,13 +51,14 @@ def dense_samples(trajectory: Trajectory) -> Samples:
 
 
 def _dense_times(trajectory: Trajectory, per_interval: int) -> np.ndarray:
+    """Return the times of knots and nodes, and `per_interval` times in every knot interval, s."""
     grid = spread(knot_times(trajectory), per_interval)
     return np.union1d(grid, trajectory.times)
 
 
 def limits_in(program: Program) -> list[Limit]:
     """List the limits of a program but its safeguards."""
-    return [limit for limit in program.limits if limit.role is not Role.SAFEGUARD]
+    return [limit for limit in program.limits if not is_safeguard(limit)]
 
 
 def limit_ratios(
@@ -83,19 +84,18 @@ def limit_ratios(
         gaps = np.abs(nodes[:-1, None] - knot_times(trajectory)).min(axis=1)
         jumps[:-1] |= gaps <= tolerances.TIME * trajectory.t_end
     t = np.concatenate([nodes[jumps], _dense_times(trajectory, 40)])
-    before = slice(0, np.count_nonzero(jumps))
-    qddot = trajectory.acceleration(t)
-    qddot[before] = trajectory.qddot_before[1:][jumps]
-    jerk = trajectory.jerk(t)
-    jerk[before] = trajectory.jerk_pieces.c[-1][jumps]
     order = np.argsort(t, kind="stable")
+    is_before_jump = order < np.count_nonzero(jumps)
+    t = t[order]
+    qddot = trajectory.acceleration(t)
+    qddot[is_before_jump] = trajectory.qddot_before[1:][jumps]
+    jerk = trajectory.jerk(t)
+    jerk[is_before_jump] = trajectory.jerk_pieces.c[-1][jumps]
     s = trajectory.path_coordinate(t)
-    motion = (trajectory.position(t), trajectory.velocity(t), qddot, jerk, s)
-    moments = Moments(*(part[order] for part in motion))
-    values = [np.empty((len(order), 0))]
-    values += [limit.ratios(moments, t[order]) for limit in limits]
+    moments = Moments(trajectory.position(t), trajectory.velocity(t), qddot, jerk, s)
+    values = [limit.ratios(moments, t) for limit in limits]
     labels = tuple(label for limit in limits for label in limit.labels)
-    return LimitRatios(t[order], labels, np.hstack(values))
+    return LimitRatios(t, labels, np.hstack([np.empty((len(t), 0)), *values]))
 
 
 THRESHOLD = 0.99

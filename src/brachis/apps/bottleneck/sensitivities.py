@@ -21,16 +21,17 @@ A motion that the phase plane timed has no multipliers: its joint path is timed 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from brachis.common.summary import Summary
-from brachis.limits import Bound, Label, Limit, Role
+from brachis.limits import Bound, Label, Limit
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.phase_timing import PhaseTiming
-from brachis.optimise.program import Program
+from brachis.optimise.program import Program, is_safeguard
 from brachis.optimise.retiming import SOLVER
 
 if TYPE_CHECKING:
@@ -222,16 +223,15 @@ def multipliers_of(
     return min(tried, key=lambda multipliers: multipliers.residual)
 
 
-STATIONARY = 1e-3
-"""Largest residual of an optimum, relative to the gradient; beyond it the multipliers are rough."""
-
-
 TIMINGS = "timings"
 """Source of sensitivities that come from timings, without multipliers."""
 _RAISED = 1e-3
 """Part by which limits are raised."""
-_NEAR = 0.02
-"""Distance from a limit, as a part of it, beyond which it costs nothing."""
+
+
+def _outwards(bound: Bound) -> float:
+    """Sign of a change of the figure that leaves more room."""
+    return -1.0 if bound.side == "lower" else 1.0
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ class Sensitivity:
     @property
     def outwards(self) -> float:
         """Sign of a change of the figure that leaves more room."""
-        return -1.0 if self.bound.side == "lower" else 1.0
+        return _outwards(self.bound)
 
     def change(self, fraction: float) -> float:
         """Predict the change of t_E, s, for a limit that leaves more room by a fraction; 0.01 is +1 %."""
@@ -332,8 +332,8 @@ class Sensitivities(Summary):
 
     @property
     def reliable(self) -> bool:
-        """Whether the answer is an optimum, judged by the multipliers."""
-        return self.residual <= STATIONARY
+        """Whether the answer is an optimum, judged by the multipliers; otherwise they are rough."""
+        return self.residual <= 1e-3  # relative to the gradient
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
         """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError if it does not exist."""
@@ -368,7 +368,7 @@ def sensitivities(refined: SolvedProgram) -> Sensitivities:
     Sensitivities
         Of the answer before its end time was lengthened to meet the limits between collocation points.
     """
-    report = refined.reports[-1]
+    report = refined.report
     if report.solver == SOLVER:
         return sensitivities_of_timing(refined)
     multipliers = multipliers_of(refined.program, report.x, report.multipliers)
@@ -384,14 +384,15 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         for bound in limit.bounds:
             rates = np.zeros(len(program.lower))
             rates[rows[:, bound.column]] = bound.per_unit
-            if limit.role is Role.SAFEGUARD:
+            if is_safeguard(limit):
                 subject = limit.labels[bound.column].subject
                 cost = -multipliers.change(rates)
                 if cost > 1e-9:
                     boundaries.append(BranchBoundary(subject, bound.figure, cost))
                 continue
-            side = {None: None, "lower": 1.0, "upper": -1.0}[bound.side]
-            derivative = -(side or -1.0) * multipliers.change(rates, side)
+            outwards = _outwards(bound)
+            side = -outwards if bound.side else None
+            derivative = outwards * multipliers.change(rates, side)
             found.append(Sensitivity(limit, bound, derivative))
     found.sort(key=lambda entry: entry.change(1.0))
     return Sensitivities(
@@ -419,35 +420,35 @@ def sensitivities_of_timing(refined: SolvedProgram) -> Sensitivities:
     Sensitivities
         Those of limits that a slower motion does not relieve are zero.
     """
-    costs: dict[tuple[Limit, Bound], float] = {}
+    costs: defaultdict[tuple[Limit, Bound], float] = defaultdict(float)
     for phase, x in refined.program.split(refined.x):
         own = PhaseTiming.of(phase, x)
         if own is None or own.timing is None:
             continue
         evaluation = phase.evaluate(x)
         for limit, values in zip(phase.limits, evaluation.by_limit, strict=True):
-            if limit.role is Role.SAFEGUARD:
+            if is_safeguard(limit):
                 continue
             nearest = limit.violation(values).max(axis=0)
             for bound in limit.bounds:
-                cost = 0.0
-                if nearest[bound.column] > -_NEAR and limit.longer_time == "relieves":
-                    cost = _raise(own, limit, bound) - own.timing.t_end
-                costs[limit, bound] = costs.get((limit, bound), 0.0) + cost
+                is_near = nearest[bound.column] > -0.02  # as a part of the limit
+                is_relieved = is_near and limit.longer_time == "relieves"
+                cost = _cost(own, limit, bound) if is_relieved else 0.0
+                costs[limit, bound] += cost
     found = []
     for (limit, bound), cost in costs.items():
-        outwards = -1.0 if bound.side == "lower" else 1.0
-        derivative = outwards * cost / (_RAISED * bound.full_scale)
+        derivative = _outwards(bound) * cost / (_RAISED * bound.full_scale)
         found.append(Sensitivity(limit, bound, derivative))
     found.sort(key=lambda entry: entry.change(1.0))
     return Sensitivities(tuple(found), (), TIMINGS, 0.0, unique=True)
 
 
-def _raise(own: PhaseTiming, limit: Limit, bound: Bound) -> float:
-    """Least time of a joint path, s, with a bound moved outwards."""
-    assert own.timing is not None
+def _cost(own: PhaseTiming, limit: Limit, bound: Bound) -> float:
+    """Change of the least time of a joint path, s, if a bound is moved outwards."""
+    timing = own.timing
+    assert timing is not None
     sides = {None: [0, 1], "lower": [0], "upper": [1]}[bound.side]
-    nearer = np.zeros((2, len(own.timing.acceleration), len(limit.labels)))
+    nearer = np.zeros((2, len(timing.acceleration), len(limit.labels)))
     nearer[sides, :, bound.column] = -_RAISED * bound.full_scale * bound.per_unit
     raised = own.course.solve(own.rates, {limit: nearer})
-    return own.timing.t_end if raised is None else raised.t_end
+    return 0.0 if raised is None else raised.t_end - timing.t_end

@@ -108,7 +108,7 @@ class _Commands(TyperGroup):
         """Find a command; add its examples, and the options that all commands have."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and command.epilog is None:
-            command.epilog = _paragraphs("Examples", EXAMPLES.get(cmd_name, ()))
+            command.epilog = _paragraphs("Examples", EXAMPLES[cmd_name])
             command.params += [
                 each for each in self.params if each.name in {"quiet", "verbose"}
             ]
@@ -193,8 +193,7 @@ Json = Annotated[
     bool, Option("--json", help="Print one JSON object on standard output.")
 ]
 Degrees = Annotated[
-    bool,
-    Option("--degrees", help="Show angles in degrees; files and JSON keep rad."),
+    bool, Option("--degrees", help="Show angles in degrees; files and JSON keep rad.")
 ]
 Strict = Annotated[
     bool | None,

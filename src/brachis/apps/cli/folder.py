@@ -9,7 +9,6 @@ import shutil
 import signal
 import stat
 import sys
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -198,9 +197,6 @@ def write_text(text: str, path: Path) -> None:
 @contextmanager
 def end_cleanly() -> Iterator[None]:
     """Let SIGTERM leave the block as an exception does, so that temporary files are removed."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         yield
@@ -217,11 +213,9 @@ _UNVERIFIED = {
 """Names of files of a motion that is not verified; all others get the prefix ``unverified_``."""
 
 
-def _name_files(names: Iterable[str], *, verified: bool) -> dict[str, str]:
-    """Return the names of a motion's files, by those of one that is verified."""
-    if verified:
-        return {name: name for name in names}
-    return {name: _UNVERIFIED.get(name, f"unverified_{name}") for name in names}
+def _unverified(name: str) -> str:
+    """Return the name of a file of a motion that is not verified, by that of one that is."""
+    return _UNVERIFIED.get(name, f"unverified_{name}")
 
 
 def make_folder(
@@ -243,7 +237,7 @@ def make_folder(
         raise InputError(
             "the folder cannot be made", where=str(out), found=found
         ) from error
-    for name in (*names, *_name_files(names, verified=False).values()):
+    for name in (*names, *map(_unverified, names)):
         check_output(out / name, (Path(name).suffix,), inputs)
 
 
@@ -255,7 +249,8 @@ def finish(
     out: Path | None,
     names: Sequence[str],
     verified: bool,
-    show: Callable[[], None] | None,
+    json: bool,
+    show: Callable[[], None],
     result: brachis.Result | None,
     complaint: str = "it is marked unverified",
 ) -> int:
@@ -274,8 +269,10 @@ def finish(
     names : sequence of str
         Files that the command may write; older ones are removed.
     verified : bool
-    show : callable or None
-        Prints the answer for a person; None: it is printed as JSON.
+    json : bool
+        Whether the answer is printed as JSON.
+    show : callable
+        Prints the answer for a person.
     result : Result or None
         Result of a search.
     complaint : str, optional
@@ -283,15 +280,14 @@ def finish(
     """
     failures: list[InputError] = []
     if out is not None:
-        own = _name_files(names, verified=verified)
+        own = {name: name if verified else _unverified(name) for name in names}
         files = {own[name]: write for name, write in results.items()}
         (data_file,) = (own[name] for name in names if name.endswith(".json"))
-        files[data_file] = lambda path: write_text(json_text(data), path)
+        files[data_file] = partial(write_text, json_text(data))
         drawings = {own[name]: partial(draw, make) for name, make in figures.items()}
-        others = _name_files(names, verified=not verified)
-        stale = {*own.values(), *others.values()} - {*files}
+        stale = {*names, *map(_unverified, names)} - {*files}
         data["files"], failures = write_files(out, files, drawings, stale=stale)
-    if show is None:
+    if json:
         print_json(data)
     else:
         show()

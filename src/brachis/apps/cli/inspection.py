@@ -22,7 +22,7 @@ from brachis.apps.cli.app import (
     urdf_of,
 )
 from brachis.apps.cli.output import print_json, print_lines, print_table
-from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
+from brachis.common.files import is_task_file
 from brachis.errors import InputError, write_count
 
 if TYPE_CHECKING:
@@ -34,17 +34,34 @@ if TYPE_CHECKING:
 
 _NONE = "none"
 """What a table shows for a missing limit, and for a joint without friction."""
-_MOST_REFUSED = 12
-"""Choices without a closed form that are listed on the screen."""
+_LISTED = 12
+"""Choices without a closed form, and pairs that may collide, that are listed on the screen."""
 _OTHER_TASKS = (
     "this family does not solve poses",
     "this family solves only poses",
-    "only for poses",
     "this family solves only the position: x, y and z",
 )
 """Reasons of families for other task spaces; shown only without other reasons."""
-_PAIRS = 12
-"""Pairs that may collide that are shown, no more."""
+
+
+PrescribedSpace = Annotated[
+    str | None,
+    Option(
+        help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
+        "Default: the task's, or all that the robot can."
+    ),
+]
+
+Posture = Annotated[
+    str | None,
+    Option(
+        help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
+    ),
+]
+
+LockedJoints = Annotated[
+    list[str] | None, Option(help="Joint held at a position: name=value, repeatable.")
+]
 
 
 def inspect(
@@ -56,25 +73,11 @@ def inspect(
             metavar="URDF|TASK",
         ),
     ],
-    task_space: Annotated[
-        str | None,
-        Option(
-            help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
-            "Default: the task's, or all that the robot can."
-        ),
-    ] = None,
+    task_space: PrescribedSpace = None,
     tool_frame: ToolFrame = None,
     base_frame: BaseFrame = None,
-    posture: Annotated[
-        str | None,
-        Option(
-            help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
-        ),
-    ] = None,
-    lock: Annotated[
-        list[str] | None,
-        Option(help="Joint held at a position: name=value, repeatable."),
-    ] = None,
+    posture: Posture = None,
+    lock: LockedJoints = None,
     degrees: Degrees = False,
     changes: Changes = None,
     json: Json = False,
@@ -84,27 +87,14 @@ def inspect(
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
     from brachis.limits import describe_guarantees, joint_limits_of, limits_of
-    from brachis.problem.plausibility import of_posture, of_robot
     from brachis.robot import bind
     from brachis.robot.from_task import in_use, robot_from_settings
 
-    ik = brachis.ik
     remarks: list[str] = []
     task = None
     space: str | Sequence[str] | None = task_space_of(task_space)
-    if source.suffix in TASK_SUFFIXES or kind_of(source) is Kind.TASK:
-        given = {
-            "--tool-frame": (tool_frame, "set robot.tool_frame in the task"),
-            "--base-frame": (base_frame, "set robot.base_frame in the task"),
-            "--lock": (lock, "set robot.locked_joints in the task"),
-        }
-        for option, (value, hint) in given.items():
-            if value:
-                raise InputError(
-                    "not allowed with a task file",
-                    where=option,
-                    hint=f"Omit the option and {hint}; or give the URDF in place of the task",
-                )
+    if is_task_file(source):
+        _refuse_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
         robot = robot_from_settings(task.robot)
         space = space or task.task_space
@@ -113,20 +103,12 @@ def inspect(
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
     if space is None:
-        space = ik.default_task_space(robot)
+        space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
     robot, task_map = bind(robot, space, None if task is None else task.tolerances)
-    remarks += [f"warning: {remark}" for remark in of_robot(robot)]
-    candidates = ik.find_all(robot, task_map)
-    if candidates and not any(candidate.solver for candidate in candidates):
-        remarks.append(ik.NO_CLOSED_FORM)
-    if missing := ik.missing_eaik(candidates):
-        remarks.append(missing)
-    if posture is not None:
-        q = _read_posture(robot, posture)
-        remarks += [f"warning: {each}" for each in of_posture(robot, "--posture", q)]
-        remarks.append(_tool_pose(robot, q))
+    candidates = brachis.ik.find_all(robot, task_map)
+    remarks += _remarks(robot, candidates, posture)
     limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     data = {
         "robot": str(source),
@@ -148,6 +130,43 @@ def inspect(
         _print_robot(robot, task, data, degrees=degrees)
 
 
+def _refuse_options(
+    tool_frame: str | None, base_frame: str | None, lock: list[str] | None
+) -> None:
+    """Refuse the options of a URDF that a task sets itself."""
+    given = {
+        "--tool-frame": (tool_frame, "robot.tool_frame"),
+        "--base-frame": (base_frame, "robot.base_frame"),
+        "--lock": (lock, "robot.locked_joints"),
+    }
+    for option, (value, key) in given.items():
+        if value:
+            raise InputError(
+                "not allowed with a task file",
+                where=option,
+                hint=f"Omit the option and set {key} in the task; or give the URDF in place of the task",
+            )
+
+
+def _remarks(
+    robot: Robot, candidates: list[ik.TriedDecomposition], posture: str | None
+) -> list[str]:
+    """Say what is implausible, whether closed forms are missing, and where the tool is in a posture."""
+    from brachis.problem.plausibility import of_posture, of_robot
+
+    ik = brachis.ik
+    remarks = [f"warning: {remark}" for remark in of_robot(robot)]
+    if candidates and not any(candidate.solver for candidate in candidates):
+        remarks.append(ik.NO_CLOSED_FORM)
+    if missing := ik.missing_eaik(candidates):
+        remarks.append(missing)
+    if posture is not None:
+        q = _read_posture(robot, posture)
+        remarks += [f"warning: {each}" for each in of_posture(robot, "--posture", q)]
+        remarks.append(_tool_pose(robot, q))
+    return remarks
+
+
 def _print_robot(
     robot: Robot, task: Task | None, data: dict[str, Any], *, degrees: bool
 ) -> None:
@@ -165,10 +184,10 @@ def _print_robot(
     print_lines(*(f"{name} limit: {text}" for name, text in guarantees))
     pairs = data["collisions"]["pairs"]
     if pairs:
-        more = ", ..." if len(pairs) > _PAIRS else ""
+        more = ", ..." if len(pairs) > _LISTED else ""
         print_lines(
             f"{write_count(len(pairs), 'pair')} that may collide (all: --json):",
-            f"  {'; '.join(pairs[:_PAIRS])}{more}",
+            f"  {'; '.join(pairs[:_LISTED])}{more}",
         )
     if task is not None:
         if not task.fits:
@@ -194,7 +213,7 @@ def _collisions(robot: Robot, task: Task | None) -> dict[str, list[str]]:
     if scene is None:
         return {"solids": [], "pairs": []}
     # Those with bodies of the scene first.
-    pairs = sorted(range(len(scene.pairs)), key=lambda pair: -scene.pairs[pair].max())
+    pairs = (-scene.pairs.max(axis=1)).argsort(kind="stable").tolist()
     return {
         "solids": [solid.name for solid in scene.solids],
         "pairs": [scene.names(pair) for pair in pairs],
@@ -211,27 +230,27 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
 
     geometry = brachis.ik.ChainGeometry.of(robot)
     limits = robot.limits
+    columns = {"range": "position"}
+    columns |= {kind.replace("_", " "): kind for kind in MAGNITUDES}
     rows = []
     for i, (name, unit) in enumerate(
         zip(robot.joint_names, robot.position_units, strict=True)
     ):
-        axis = [f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]]
+        axis = geometry.axes[i].round(6) + 0.0
         row = {
             "joint": name,
             "type": "revolute" if geometry.revolute[i] else "prismatic",
-            "axis at zero": " ".join(axis),
+            "axis at zero": " ".join(f"{component:.4g}" for component in axis),
         }
-        pairs = {"range": (limits.position_lower[i], limits.position_upper[i], unit)}
-        for kind in MAGNITUDES:
-            lower, upper = limits.both_ways(kind)[:, i]
-            pairs[kind.replace("_", " ")] = (lower, upper, UNITS[kind][unit])
-        for key, (lower, upper, si_unit) in pairs.items():
-            shown, factor = shown_unit(si_unit, degrees=degrees)
-            row[key] = f"{factor * lower:.4g} to {factor * upper:.4g} {shown}"
+        for key, kind in columns.items():
+            shown, factor = shown_unit(UNITS[kind][unit], degrees=degrees)
+            lower, upper = factor * limits.both_ways(kind)[:, i]
+            text = f"{lower:.4g} to {upper:.4g} {shown}"
             if lower == -upper and key != "range":
-                row[key] = f"{factor * upper:.4g} {shown}"
+                text = f"{upper:.4g} {shown}"
             if (lower, upper) == (-float("inf"), float("inf")):
-                row[key] = _NONE
+                text = _NONE
+            row[key] = text
         row["mass"] = f"{robot.model.inertias[i + 1].mass:.4g} kg"
         for key in ("viscous", "coulomb", "armature"):
             value = getattr(robot.friction, key)[i]
@@ -300,16 +319,12 @@ def _robot_of_urdf(
         locked_joints=locked,
         limits=brachis.LimitSpec(torque=None, velocity=None, acceleration=1.0),
     )
-
-    def magnitudes(values: Sequence[float | None]) -> np.ndarray:
-        return np.array([np.inf if value is None else value for value in values])
-
-    limits = robot.limits.with_magnitudes(
-        acceleration=np.full(robot.n, np.inf),
-        velocity=magnitudes([limit.velocity for limit in robot.urdf_limits]),
-        torque=magnitudes([limit.effort for limit in robot.urdf_limits]),
-    )
-    return replace(robot, limits=limits)
+    magnitudes = {}
+    for kind in ("acceleration", "velocity", "torque"):
+        stated = [limit.of_kind(kind) for limit in robot.urdf_limits]
+        sizes = [np.inf if value is None else value for value in stated]
+        magnitudes[kind] = np.array(sizes)
+    return replace(robot, limits=robot.limits.with_magnitudes(**magnitudes))
 
 
 def _frames(
@@ -345,13 +360,10 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
     }
     solver = candidate.solver
     if solver is None:
-        reasons = [
-            f"{family}: {reason}"
-            for family, reason in candidate.reasons.items()
-            if reason not in _OTHER_TASKS
-            or {*candidate.reasons.values()} <= {*_OTHER_TASKS}
-        ]
-        row["why not"] = "; ".join(reasons)
+        reasons = candidate.reasons
+        own = {name: why for name, why in reasons.items() if why not in _OTHER_TASKS}
+        shown = (own or reasons).items()
+        row["why not"] = "; ".join(f"{name}: {why}" for name, why in shown)
         return row
     several = f" (up to {solver.alternatives})" if solver.alternatives > 1 else ""
     row["solver"] = candidate.family
@@ -379,10 +391,10 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
         print_lines(
             f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
         )
-    for row in refused[:_MOST_REFUSED]:
+    for row in refused[:_LISTED]:
         print_lines(f"  {row['redundant joints']}: {row['why not']}")
-    if len(refused) > _MOST_REFUSED:
-        more = len(refused) - _MOST_REFUSED
+    if len(refused) > _LISTED:
+        more = len(refused) - _LISTED
         print_lines(f"  ... and {more} more, which --json lists")
 
 

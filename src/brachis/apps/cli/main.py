@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from contextvars import copy_context
-from functools import partial, wraps
+from functools import wraps
 from importlib import import_module
 from typing import TextIO, cast
 
@@ -60,6 +60,7 @@ def _prepare(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def run(**options: object) -> None:
+        """Import the planner, and run the command."""
         with interrupts.defer():
             import_module("brachis.planner")
         with show_warnings():
@@ -77,16 +78,14 @@ def main() -> None:
     open_streams()
     output = StandardOutput(sys.stdout)
     with redirect_stdout(cast(TextIO, output)):
-        code = copy_context().run(
-            partial(_run, output, as_json="--json" in sys.argv[1:])
-        )
+        code = copy_context().run(_run, output, as_json="--json" in sys.argv[1:])
     sys.exit(code if output.finish() else 1)
 
 
 def _run(output: StandardOutput, *, as_json: bool) -> int | str | None:
     """Run a command and return its exit code."""
     try:
-        return cast("int | None", app(prog_name="brachis", standalone_mode=False)) or 0
+        return app(prog_name="brachis", standalone_mode=False) or 0
     except SystemExit as stop:
         return stop.code
     except BrachisError as error:

@@ -238,7 +238,7 @@ def show(viewer: Viewer, *, browser: bool = True) -> None:
     with viewer, interrupts.end_on_interrupt():
         if get_verbosity() is not Verbosity.QUIET:
             print_error("Ctrl-C stops the viewer")
-        print(f"look at {viewer.url}", flush=True)  # noqa: T201  (what the command is for, however quiet)
+        typer.echo(f"look at {viewer.url}")  # what the command is for, however quiet
         has_screen = (
             sys.platform == "darwin"
             or os.environ.get("DISPLAY")
@@ -279,9 +279,9 @@ def schema(
     schemas = {"task": json_schema, "trajectory": samples_schema}
     if of not in schemas:
         raise UnknownNameError("schema", of, schemas, where="--of")
-    text = json_text(schemas[of]())
+    data = schemas[of]()
     if out is None:
-        sys.stdout.write(text)
-        return
-    write_one(out, lambda path: write_text(text, path), (".json",))
-    print_lines(f"wrote {out}")
+        print_json(data)
+    else:
+        write_one(out, partial(write_text, json_text(data)), (".json",))
+        print_lines(f"wrote {out}")

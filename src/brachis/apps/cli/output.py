@@ -22,13 +22,10 @@ from rich.text import Text
 
 from brachis.apps.cli.app import Verbosity, get_verbosity
 from brachis.common import interrupts
-from brachis.errors import BrachisWarning
+from brachis.errors import BrachisWarning, InputError
 
 if TYPE_CHECKING:
     from brachis.verify import Verification
-
-WRONG_INPUT = 2
-"""Exit code of a command that refuses its input."""
 
 
 def print_table(
@@ -156,6 +153,7 @@ def json_text(data: Mapping[str, object]) -> str:
 
 
 def _finite(value: object) -> object:
+    """Return plain data with None for every number that JSON does not know."""
     if isinstance(value, Mapping):
         return {str(key): _finite(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
@@ -191,12 +189,12 @@ def print_usage_error(error: Any, *, as_json: bool) -> int:
     if type(error).__name__ == "NoArgsIsHelpError":
         with suppress(OSError):
             sys.stderr.write(f"{error.ctx.get_help()}\n")
-        return WRONG_INPUT
+        return InputError.exit_code
     message = str(error.format_message()).rstrip(".")
     message = message[:1].lower() + message[1:]
     if error.ctx is not None:
         message += f"; see {error.ctx.command_path} --help"
-    return print_failure(message, WRONG_INPUT, as_json=as_json)
+    return print_failure(message, InputError.exit_code, as_json=as_json)
 
 
 class StandardOutput:
@@ -227,6 +225,7 @@ class StandardOutput:
 
     @contextmanager
     def _remember_failure(self) -> Iterator[None]:
+        """Keep the error that ends the block."""
         try:
             yield
         except OSError as error:
@@ -292,6 +291,7 @@ def show_warnings() -> Iterator[None]:
         usual = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            """Print a warning of brachis as a message, and any other one as usual."""
             if not issubclass(category, BrachisWarning):
                 usual(message, category, *where)
             elif get_verbosity() is not Verbosity.QUIET:
@@ -318,6 +318,7 @@ def show_progress(*, in_logs: bool = False) -> Iterator[Callable[[str], None]]:
             status = stack.enter_context(console.status("reading the task"))
 
         def show(text: str) -> None:
+            """Show what is done, as the verbosity asks for."""
             nonlocal last_step
             interrupts.check()
             if status is not None:

@@ -88,7 +88,8 @@ def plan(
         out=out,
         names=_PLANNED,
         verified=result.verified,
-        show=None if json else lambda: _print_plan(result, data, degrees=degrees),
+        json=json,
+        show=lambda: _print_plan(result, data, degrees=degrees),
         result=result,
     )
     if view:
@@ -104,6 +105,7 @@ def _plan_task(
     strict: bool | None,
     listener: Listener,
 ) -> brachis.Result:
+    """Load a task and plan it."""
     changed = load_changed_task(task, changes, strict=strict)
     return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
 
@@ -168,6 +170,21 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     return ", ".join(parts)
 
 
+CheckedAgain = Annotated[
+    bool,
+    Option("--check", help="Solve again with each limit raised by 1 %, and compare."),
+]
+
+WithReference = Annotated[
+    bool,
+    Option(
+        "--reference",
+        help="Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best "
+        "known value, not a proven bound, and takes seconds.",
+    ),
+]
+
+
 def bottleneck(
     task: Annotated[
         Path,
@@ -176,20 +193,8 @@ def bottleneck(
             metavar="TASK|RESULT",
         ),
     ],
-    check: Annotated[
-        bool,
-        Option(
-            "--check", help="Solve again with each limit raised by 1 %, and compare."
-        ),
-    ] = False,
-    reference: Annotated[
-        bool,
-        Option(
-            "--reference",
-            help="Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best "
-            "known value, not a proven bound, and takes seconds.",
-        ),
-    ] = False,
+    check: CheckedAgain = False,
+    reference: WithReference = False,
     out: Annotated[
         Path | None,
         Option(
@@ -215,15 +220,7 @@ def bottleneck(
     result = None
     with show_progress() as listener:
         if source.suffix.lower() == ".npz":
-            given = {"--urdf": urdf, "--set": changes, "--strict": strict}
-            for option, value in given.items():
-                if value is not None:
-                    raise InputError(
-                        "this option cannot be used with a saved motion",
-                        where=option,
-                        found=value,
-                        allowed="this option with a task file",
-                    )
+            _refuse_options({"--urdf": urdf, "--set": changes, "--strict": strict})
             trajectory = brachis.Trajectory.load(source)
             data = _verify_again(trajectory)
         else:
@@ -237,7 +234,6 @@ def bottleneck(
     data["bottleneck"] = report.to_dict()
     redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
     head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
-    show_report = partial(print_lines, head, report.text(degrees=degrees))
     code = finish(
         data,
         {},
@@ -245,11 +241,24 @@ def bottleneck(
         out=out,
         names=_BOTTLENECK,
         verified=data["verified"],
-        show=None if json else show_report,
+        json=json,
+        show=partial(print_lines, head, report.text(degrees=degrees)),
         result=result,
         complaint="its bottlenecks may be wrong",
     )
     raise typer.Exit(code)
+
+
+def _refuse_options(given: dict[str, object]) -> None:
+    """Refuse options of a task where a saved motion is given."""
+    for option, value in given.items():
+        if value is not None:
+            raise InputError(
+                "this option cannot be used with a saved motion",
+                where=option,
+                found=value,
+                allowed="this option with a task file",
+            )
 
 
 def _verify_again(trajectory: brachis.Trajectory) -> dict[str, Any]:
@@ -343,6 +352,7 @@ def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
 
 
 def _write_value(value: object) -> str:
+    """Write a cell of the table: nothing for None."""
     if isinstance(value, float):
         return f"{value:.6g}"
     return "" if value is None else str(value)

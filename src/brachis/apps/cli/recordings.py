@@ -34,7 +34,7 @@ RecordedFile = Annotated[
 RobotFile = Annotated[
     Path,
     Option(
-        help="URDF file; or a task file (.yaml), whose robot, limits and settings are used.",
+        help="URDF file; or a task file (.yaml), whose robot, limits and settings are used."
     ),
 ]
 
@@ -47,18 +47,15 @@ RecordedSpace = Annotated[
 ]
 
 AngleUnit = Annotated[
-    str | None,
-    Option(help="Unit of angles in columns without a unit: rad, deg."),
+    str | None, Option(help="Unit of angles in columns without a unit: rad, deg.")
 ]
 
 LengthUnit = Annotated[
-    str | None,
-    Option(help="Unit of lengths in columns without a unit: m, mm."),
+    str | None, Option(help="Unit of lengths in columns without a unit: m, mm.")
 ]
 
 TimeUnit = Annotated[
-    str | None,
-    Option(help="Unit of times in a column without a unit: s, ms."),
+    str | None, Option(help="Unit of times in a column without a unit: s, ms.")
 ]
 
 PathTolerance = Annotated[
@@ -174,7 +171,8 @@ def compare(
         out=out,
         names=_FILES,
         verified=found.result.verified,
-        show=None if json else lambda: _print_comparison(found),
+        json=json,
+        show=lambda: _print_comparison(found),
         result=found.result,
     )
     raise typer.Exit(code)
@@ -209,5 +207,4 @@ def _print_comparison(found: brachis.Comparison) -> None:
     last = ("limits", kept, "", verified)
     columns = ("", "recorded", "between its rows up to", "planned")
     print_table("", columns, [first, *uses, last], numbers=columns[1:])
-    assert found.recorded.recovered is not None
-    print_lines(*found.remarks, *found.recorded.recovered.told)
+    print_lines(*found.remarks, *found.recovered.told)

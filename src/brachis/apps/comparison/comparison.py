@@ -21,7 +21,7 @@ from brachis.planner import Given, plan
 from brachis.result import Result
 from brachis.robot.task_map import JOINTS
 from brachis.task import Source, Task
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Recovered, Trajectory
 from brachis.verify import Verification, verify_trajectory
 
 if TYPE_CHECKING:
@@ -101,6 +101,12 @@ class Comparison(Summary):
     result: Result
 
     @property
+    def recovered(self) -> Recovered:
+        """How the path was found, and what is known of the recorded motion."""
+        assert self.recorded.recovered is not None
+        return self.recorded.recovered
+
+    @property
     def saved(self) -> float:
         """Part of the recorded time that the plan saves; negative if the plan takes longer."""
         return 1.0 - self.result.t_end / self.recorded.t_end
@@ -163,18 +169,15 @@ class Comparison(Summary):
 
     def __str__(self) -> str:
         """Return all in plain words."""
-        assert self.recorded.recovered is not None
         uses = [
             f"{use.limit}: {use.recorded_text} used by the recorded motion ({use.recorded_at}), "
             f"{100.0 * use.planned:.1f} % in the plan ({use.planned_at})"
             for use in self.uses
         ]
-        notes = self.recorded.recovered.told
-        return "\n".join([self.verdict, *self.remarks, *uses, *notes])
+        return "\n".join([self.verdict, *self.remarks, *uses, *self.recovered.told])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON, in which the recorded motion is called ``today``."""
-        assert self.recorded.recovered is not None
         uses = [
             {
                 key.replace("recorded", "today"): value
@@ -191,7 +194,7 @@ class Comparison(Summary):
             "today_within_limits": not self.exceeded,
             "remarks": list(self.remarks),
             "limits": uses,
-            "recovered": self.recorded.recovered.to_dict(),
+            "recovered": self.recovered.to_dict(),
             "verification_today": self.verification.to_dict(),
             "plan": self.result.to_dict(),
         }
@@ -349,7 +352,7 @@ def plot_both_motions(comparison: Comparison) -> Figure:
     style.dress(ratio, r"$t$ (s)", "largest ratio to a limit")
     for ax in (progress, speed, ratio):
         ax.set_ylim(bottom=0.0)
-    progress.set_xlim(0.0, max(motion.t_end for _, motion, _, _ in motions))
+    progress.set_xlim(0.0, max(comparison.recorded.t_end, comparison.result.t_end))
     style.legend_above(ratio, style.COLUMN_WIDTH - 15.0)
     style.legend_above(progress, style.COLUMN_WIDTH - 15.0)
     progress.set_title(comparison.verdict, fontsize=style.LABEL_SIZE, pad=16.0)

@@ -18,9 +18,6 @@ import numpy as np
 from brachis.limits import Limit, Moments, Role, limits_of
 from brachis.trajectory import Trajectory
 
-_STRIDES = (1, 2, 4)
-"""Periods that are taken as one, for limits of joints; limits of the tool may change along the path, so only one."""
-
 
 @dataclass(frozen=True, eq=False)
 class RatioBounds:
@@ -67,12 +64,13 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
     """Return the sizes of the ratios to one limit that the rows at times t prove, (K, c)."""
     ratios = np.zeros((len(t), len(limit.labels)))
     first_row, _ = _differentiate(trajectory, np.zeros((1, 1), dtype=int))
-    slopes = _slopes(limit, first_row)
+    slopes = limit.partials(first_row).by_joints
     order = max(power for power, slope in enumerate(slopes) if slope is not None)
     one_sided = np.where(np.isfinite(limit.upper), -np.inf, np.inf)
     harmless = np.where(np.isfinite(limit.centre), limit.centre, one_sided)
     is_mean = limit.guarantee.is_mean
-    strides = _STRIDES if limit.role is Role.ROBOT and not is_mean else (1,)
+    # Periods that are taken as one. Limits of the tool may change along the path, so only one of them.
+    strides = (1, 2, 4) if limit.role is Role.ROBOT and not is_mean else (1,)
     for stride in strides:
         first = np.arange(max(len(t) - order * stride, 0))[:, None]
         windows = first + stride * np.arange(order + 1)
@@ -83,7 +81,7 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
             continue
         means, errors = _differentiate(trajectory, windows)
         off = np.zeros((len(windows), len(limit.labels)))
-        for slope, error in zip(_slopes(limit, means), errors, strict=True):
+        for slope, error in zip(limit.partials(means).by_joints, errors, strict=True):
             if slope is not None:
                 off += (np.abs(slope) @ error[:, :, None])[:, :, 0]
         values = limit.values(means)
@@ -94,12 +92,6 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
             return np.abs(limit.ratio(mean)) + ratios
         np.maximum.at(ratios, middle, np.abs(limit.ratio(values)))
     return ratios
-
-
-def _slopes(limit: Limit, moments: Moments) -> tuple[np.ndarray | None, ...]:
-    """Return the derivatives of a limit's values by q, qdot, qddot and qdddot."""
-    partials = limit.partials(moments)
-    return partials.q, partials.qdot, partials.qddot, partials.qdddot
 
 
 def _differentiate(

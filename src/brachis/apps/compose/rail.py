@@ -26,6 +26,7 @@ _NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
 
 
 def _is_positive(value: np.ndarray) -> np.ndarray:
+    """Tell which values are positive."""
     return value > 0.0
 
 

@@ -22,11 +22,7 @@ from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.export.rows import require_library
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import draw_holding, lines_of
-from brachis.apps.plots.postures import (
-    draw_postures,
-    plane_of,
-    skeleton,
-)
+from brachis.apps.plots.postures import draw_postures, plane_of, skeleton
 from brachis.errors import InputError
 from brachis.trajectory import Trajectory
 

@@ -93,11 +93,7 @@ class _JointTrajectory(BaseModel, extra="forbid", title="A joint trajectory"):
 def samples_schema() -> dict[str, Any]:
     """Return the JSON schema of exported trajectories, draft 2020-12; also ``brachis schema --of trajectory``."""
     draft = "https://json-schema.org/draft/2020-12/schema"
-    return {
-        "$schema": draft,
-        "$id": SCHEMA_ID,
-        **_JointTrajectory.model_json_schema(),
-    }
+    return {"$schema": draft, "$id": SCHEMA_ID, **_JointTrajectory.model_json_schema()}
 
 
 def write_json(rows: JointRows, stream: BinaryIO) -> None:

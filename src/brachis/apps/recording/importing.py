@@ -7,7 +7,6 @@ path coordinate over time is a B-spline that does not decrease. Where the motion
 from __future__ import annotations
 
 import os
-import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, pairwise
@@ -26,7 +25,7 @@ from brachis.apps.recording.nodes import (
 from brachis.apps.recording.recording import Recording, check_units, read_recording
 from brachis.common.arguments import check_keywords, file_name, numbers
 from brachis.common.arrays import spread, with_like_signs
-from brachis.common.files import TASK_SUFFIXES, Kind, kind_of
+from brachis.common.files import is_task_file
 from brachis.errors import InputError, PathError, TaskError
 from brachis.path import Path, build_path
 from brachis.planner import Given
@@ -118,32 +117,18 @@ def import_motion(
     path = file_name(path, "path")
     if tolerance is not None:
         tolerance = check_tolerance(tolerance)
-    if task is None and _is_task(robot):
-        task = robot  # type: ignore[assignment]
-        robot = None
-    settings = None if task is None else load_task(task)
-    robot_settings = settings.robot if settings else RobotSettings()
-    if robot is None and robot_settings.urdf is None:
-        raise InputError(
-            "the robot is missing",
-            where="robot",
-            allowed="a URDF file, the name of a robot (brachis.robots), a Robot, or a task file",
-        )
-    given_robot = robot_for(locate(robot), robot_settings)  # type: ignore[arg-type]
-    space = task_space
-    if not space:
-        space = settings.task_space if settings else ik.default_task_space(given_robot)
+    given_robot, settings = _read_robot(robot, task)
+    default = settings.task_space if settings else ik.default_task_space(given_robot)
+    space = task_space or default
     recording = read_recording(path, given_robot, check_units(units or {}))
     tolerances = settings.tolerances if settings else None
     bound, task_map = bind(given_robot, space, tolerances)
     deviation = _deviations(recording, noise)
     nodes = nodes_of(recording, deviation)
     error = recording.rounding if noise is None else _SURE * deviation
-    rolling = ((0, 0), (0, bound.n - given_robot.n))  # virtual joints stand still
-    q, qdot, qddot = (np.pad(x, rolling) for x in (nodes.q, nodes.qdot, nodes.qddot))
-    nodes = Nodes(nodes.t, q, qdot, qddot, nodes.notes)
-    rests = find_rests(nodes)
-    nodes = with_rests(nodes, rests)
+    virtual = (0, bound.n - given_robot.n)  # virtual joints stand still
+    states = np.pad(nodes.states, ((0, 0), (0, 0), virtual))
+    nodes = with_rests(Nodes(nodes.t, states, nodes.notes))
     if tolerance is None:
         slopes = np.abs(task_map.jacobian(task_map.twists(nodes.q)))
         moved = slopes[:, :, : len(deviation)] @ deviation
@@ -157,30 +142,19 @@ def import_motion(
             where="path",
             hint="Raise the tolerance",
         )
-    period = 1e3 * float(np.median(np.diff(recording.t)))
+    t = recording.t
+    period = 1e3 * float(np.median(np.diff(t)))
     notes = (
-        f"{len(recording.t)} rows over {recording.t[-1]:.6g} s, one every {period:.4g} ms",
+        f"{len(t)} rows over {t[-1]:.6g} s, one every {period:.4g} ms",
         *recording.notes,
         *nodes.notes,
         "unknown: the motion between the rows, and the measured torques",
         f"the tool's path comes from forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
         f"its tolerance is {tolerance:.1e} m and rad",
     )
-    recovered = Recovered(
-        recording.source,
-        tolerance,
-        notes,
-        np.column_stack([recording.t, np.pad(recording.q, rolling)]),
-        np.pad(error, rolling[1]),
-    )
-    at_rest, _ = nodes.at_rest
-    splines = [fit_coordinate(t, s, at_rest=at_rest) for t, s in followed.parts]
-    for number, (first, end) in enumerate(rests):
-        knots = np.repeat([0.0, 1.0], DEGREE + 1)
-        points = np.full((1, DEGREE + 1), splines[2 * number].control_points[0, -1])
-        wait = PhaseSpline(nodes.t[end] - nodes.t[first], knots, DEGREE, points)
-        splines.insert(2 * number + 1, wait)
-    knots, control_points = join_splines(splines)
+    rows = np.pad(np.column_stack([t, recording.q]), ((0, 0), virtual))
+    error = np.pad(error, virtual)
+    knots, control_points = _join_coordinate(nodes, followed)
     return Trajectory(
         task=_task_of(settings, bound, task_map, nodes, followed.segments, space),
         urdf=bound.urdf,
@@ -195,11 +169,48 @@ def import_motion(
         knots=knots,
         degree=DEGREE,
         control_points=control_points,
-        phase_ends=nodes.t[[*chain(*rests), -1]],
+        phase_ends=nodes.t[[*chain(*followed.rests), -1]],
         chart_rows=np.empty((0, 0, 0)),
         chart_knots=np.empty(0),
-        recovered=recovered,
+        recovered=Recovered(recording.source, tolerance, notes, rows, error),
     )
+
+
+def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
+    """Return the robot with the settings of the task, and the task, which may stand in the robot's place.
+
+    Raises
+    ------
+    InputError
+        There is no robot.
+    """
+    if task is None and _is_task(robot):
+        task = robot  # type: ignore[assignment]
+        robot = None
+    settings = None if task is None else load_task(task)
+    robot_settings = settings.robot if settings else RobotSettings()
+    if robot is None and robot_settings.urdf is None:
+        raise InputError(
+            "the robot is missing",
+            where="robot",
+            allowed="a URDF file, the name of a robot (brachis.robots), a Robot, or a task file",
+        )
+    return robot_for(locate(robot), robot_settings), settings  # type: ignore[arg-type]
+
+
+def _join_coordinate(
+    nodes: Nodes, followed: RecoveredPath
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return knots and control points of s over time, which stays where it is during the waits; see `join_splines`."""
+    at_rest, _ = nodes.at_rest
+    splines = [fit_coordinate(*followed.parts[0], at_rest=at_rest)]
+    clamped = np.repeat([0.0, 1.0], DEGREE + 1)
+    for (first, end), (t, s) in zip(followed.rests, followed.parts[1:], strict=True):
+        duration = nodes.t[end] - nodes.t[first]
+        waiting = np.full((1, DEGREE + 1), s[0])
+        splines.append(PhaseSpline(duration, clamped, DEGREE, waiting))
+        splines.append(fit_coordinate(t, s, at_rest=at_rest))
+    return join_splines(splines)
 
 
 def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
@@ -212,7 +223,8 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
     """
     assert trajectory.recovered is not None
     _, task_map = bind(trajectory.robot, JOINTS)
-    nodes = Nodes(trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot)
+    states = np.stack([trajectory.q, trajectory.qdot, trajectory.qddot])
+    nodes = Nodes(trajectory.times, states)
     return recover_path(task_map, nodes, trajectory.recovered.tolerance).segments
 
 
@@ -224,6 +236,8 @@ class RecoveredPath:
     ----------
     segments : tuple of Segment
         For a task.
+    rests : list of (int, int)
+        The waits: their first and last nodes.
     parts : tuple of ((K,) ndarray, (K,) ndarray)
         Dense times, s, and path coordinates between the waits.
     miss : float
@@ -231,6 +245,7 @@ class RecoveredPath:
     """
 
     segments: tuple[Segment, ...]
+    rests: list[tuple[int, int]]
     parts: tuple[tuple[np.ndarray, np.ndarray], ...]
     miss: float
 
@@ -262,7 +277,7 @@ def recover_path(task_map: TaskMap, nodes: Nodes, tolerance: float) -> Recovered
         miss = task_map.difference(values, own.sample(s).target)
         worst = max(worst, float(np.max(task_map.norms(miss))))
         found.append((t, s))
-    return RecoveredPath(tuple(segments), tuple(found), worst)
+    return RecoveredPath(tuple(segments), rests, tuple(found), worst)
 
 
 def _follow(
@@ -284,8 +299,7 @@ def _follow(
     from scipy.interpolate import BPoly
 
     t = spread(nodes.t, 4)
-    states = np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1)
-    pieces = BPoly.from_derivatives(nodes.t, states)
+    pieces = BPoly.from_derivatives(nodes.t, np.swapaxes(nodes.states, 0, 1))
     q = pieces(t)
     qdot = pieces(t, nu=1)
     speed = _tool_speed(task_map, q, qdot)
@@ -403,10 +417,9 @@ def fit_coordinate(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> PhaseSplin
 
 def _is_task(given: object) -> bool:
     """Tell a task, or its file, from a robot."""
-    if not isinstance(given, str | os.PathLike):
-        return isinstance(given, Task | Mapping)
-    suffix = pathlib.Path(given).suffix.lower()
-    return suffix in TASK_SUFFIXES or kind_of(given) is Kind.TASK
+    if isinstance(given, str | os.PathLike):
+        return is_task_file(given)
+    return isinstance(given, Task | Mapping)
 
 
 def _deviations(
@@ -453,8 +466,15 @@ def _task_of(
     }
     if settings is not None:
         given = settings.to_dict()
-        kept = ("tool_limits", "custom_limits", "search", "solver", "refinement")
-        content |= {key: given[key] for key in (*kept, "spline") if key in given}
+        kept = (
+            "tool_limits",
+            "custom_limits",
+            "search",
+            "solver",
+            "refinement",
+            "spline",
+        )
+        content |= {key: given[key] for key in kept if key in given}
     content["spline"]["rest"] = "full" if is_calm else "velocity"
     if not is_resting:
         first, last = _tool_speed(task_map, nodes.q[[0, -1]], nodes.qdot[[0, -1]])

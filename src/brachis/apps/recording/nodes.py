@@ -37,8 +37,6 @@ _AT_REST = {1: 1e-3, 2: 1e-2}
 """Velocity and acceleration at an end, as parts of the largest ones, below which they are zero."""
 _NARROWEST = 0.02
 """Half of the shortest part of a period in which the acceleration changes at a jump."""
-_SLOW = 1e-3
-"""Part of the largest velocity up to which a velocity at rest is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +47,35 @@ class Nodes:
     ----------
     t : (L,) ndarray
         s.
-    q, qdot, qddot : (L, n) ndarray
+    states : (3, L, n) ndarray
+        q, qdot and qddot.
     notes : tuple of str
         How velocities and accelerations were found.
     """
 
     t: np.ndarray
-    q: np.ndarray
-    qdot: np.ndarray
-    qddot: np.ndarray
+    states: np.ndarray
     notes: tuple[str, ...] = ()
+
+    @property
+    def q(self) -> np.ndarray:
+        """Positions, (L, n)."""
+        return self.states[0]
+
+    @property
+    def qdot(self) -> np.ndarray:
+        """Velocities, (L, n)."""
+        return self.states[1]
+
+    @property
+    def qddot(self) -> np.ndarray:
+        """Accelerations, (L, n)."""
+        return self.states[2]
 
     def part(self, first: int, last: int) -> Nodes:
         """Return the motion from one node to another."""
         kept = slice(first, last + 1)
-        return Nodes(self.t[kept], self.q[kept], self.qdot[kept], self.qddot[kept])
+        return Nodes(self.t[kept], self.states[:, kept])
 
     @property
     def at_rest(self) -> tuple[bool, bool]:
@@ -105,8 +117,7 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
         for end in (0, -1):
             if np.all(np.abs(states[order, end]) <= small):
                 states[order, end] = 0.0
-    q, qdot, qddot = states[:3]
-    return Nodes(t, q, qdot, qddot, tuple(notes))
+    return Nodes(t, states[:3], tuple(notes))
 
 
 def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
@@ -375,26 +386,24 @@ def find_rests(nodes: Nodes) -> list[tuple[int, int]]:
     """
     speed = np.abs(nodes.qdot).max(axis=1)
     same = np.all(np.abs(np.diff(nodes.q, axis=0)) <= tolerances.ROUNDING, axis=1)
-    slow = speed <= _SLOW * speed.max()
+    slow = speed <= 1e-3 * speed.max()  # up to there it is rounding
     still = np.concatenate([[False], same & slow[1:] & slow[:-1], [False]])
     edges = np.flatnonzero(np.diff(still))
-    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     last = len(nodes.t) - 1
     return [
         (first, end)
-        for first, end in runs
+        for first, end in edges.reshape(-1, 2).tolist()
         if first > 0 and end < last and end - first + 1 >= FEWEST_ROWS
     ]
 
 
-def with_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> Nodes:
+def with_rests(nodes: Nodes) -> Nodes:
     """Return the motion without the rounding of its positions, velocities and accelerations at rest."""
-    states = np.stack([nodes.q, nodes.qdot, nodes.qddot])
-    for first, end in rests:
+    states = nodes.states.copy()
+    for first, end in find_rests(nodes):
         states[0, first : end + 1] = nodes.q[first]
         states[1:, first : end + 1] = 0.0
-    q, qdot, qddot = states
-    return Nodes(nodes.t, q, qdot, qddot, nodes.notes)
+    return Nodes(nodes.t, states, nodes.notes)
 
 
 def split_at_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> list[Nodes]:

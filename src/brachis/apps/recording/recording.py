@@ -46,12 +46,6 @@ FEWEST_ROWS = 5
 """Rows of the shortest motion: a polynomial through five rows gives the derivatives."""
 _STILL = 1e-12
 """A joint that moves less between rows with all digits stands still, rad or m."""
-_CHANGED_DIGITS = 2.2
-"""Change of a position, in roundings, from which on the joint moves; a last digit that flickers changes by 2."""
-_CLEAR_DIGITS = 24.0
-"""Change of a position, in roundings, after a dozen changes of the last digit."""
-_MOST_TURNS = 6.0 * np.pi
-"""Largest plausible angle of a joint without a range, rad."""
 
 
 def check_units(units: object) -> dict[str, str]:
@@ -110,7 +104,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
     columns: Columns = {}
     problem = None
     for i, text in enumerate(header):
-        name = text.strip().lower()
+        name = text.lower()
         unit = None
         if name not in meanings and (match := _NAME_AND_UNIT.match(name)):
             name = match[1]
@@ -138,6 +132,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
 
 
 def _describe(kind: str, joint: str) -> str:
+    """Name a column, for messages."""
     return f"the {_QUANTITIES[kind][0]} of {joint!r}" if joint else "the time"
 
 
@@ -174,8 +169,10 @@ def _read_column(
     asked = units.get(name)
     per = _QUANTITIES[key[0]][1]
     values = table.values[:, i]
-    unit = (asked or base) if stated is None else stated.removesuffix(per)
-    if unit not in factors or (stated is not None and not stated.endswith(per)):
+    if stated is None:
+        stated = f"{asked or base}{per}"
+    unit = stated.removesuffix(per)
+    if unit not in factors or not stated.endswith(per):
         raise TaskError(
             f"unknown unit of column {table.header[i]}",
             found=stated,
@@ -194,7 +191,7 @@ def _read_column(
         if np.ptp(values) and np.array_equal(np.round(values, decimals), values):
             rounding = 0.5 * 10.0**-decimals * factors[unit]
             break
-    return values * factors[unit], f"{unit}{per}", rounding
+    return values * factors[unit], stated, rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,48 +265,62 @@ def read_recording(
                 _read_column(table, columns, (kind, joint), base, units, where)
                 for joint, base in zip(joints, robot.position_units, strict=True)
             ]
-            parts[kind] = np.column_stack([values for values, _, _ in read])
+            values, found, digits = zip(*read, strict=True)
+            parts[kind] = np.column_stack(values)
             if kind == "q":
-                position_units = [unit for _, unit, _ in read]
-                rounding = np.array([digit for _, _, digit in read])
+                position_units = found
+                rounding = np.array(digits)
     q = parts["q"]
     _check_times(t, table, source)
     if "angle" not in units:
         _check_angles(q, robot, source)
-    notes = [
-        *table.notes,
-        f"units: {', '.join(dict.fromkeys((time_unit, *position_units)))}",
-    ]
+    stated = ", ".join(dict.fromkeys((time_unit, *position_units)))
+    notes = [*table.notes, f"units: {stated}"]
     known = {i for i, _ in columns.values()}
     ignored = [name for i, name in enumerate(table.header) if i not in known]
     if ignored:
         notes.append(f"left out the columns {', '.join(ignored)}")
-    first = _first_row(t, q, rounding, source)
-    last = len(t) - 1 - _first_row(-t[::-1], q[::-1], rounding, source)
-    if last - first + 1 < FEWEST_ROWS:
-        raise _no_motion(f"the robot moves in fewer than {FEWEST_ROWS} rows", t, source)
-    for rows, time, when in (
-        (first, t[first] - t[0], "before"),
-        (len(t) - 1 - last, t[-1] - t[last], "after"),
-    ):
-        if rows:
-            notes.append(
-                f"left out {time:.6g} s {when} the motion, in which the robot stands still ({write_count(rows, 'row')})"
-            )
-    kept = {kind: part[first : last + 1] for kind, part in parts.items()}
+    moving, left_out = _moving_rows(t, q, rounding, source)
+    kept = {kind: part[moving] for kind, part in parts.items()}
     return Recording(
-        t[first : last + 1] - t[first],
+        t[moving] - t[moving.start],
         kept["q"],
         kept.get("qdot"),
         kept.get("qddot"),
         rounding,
         robot.position_units,
         str(source),
-        tuple(notes),
+        (*notes, *left_out),
     )
 
 
+def _moving_rows(
+    t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path
+) -> tuple[slice, list[str]]:
+    """Return the rows of the motion, and what is left out before and after it, in words.
+
+    Raises
+    ------
+    TaskError
+        The motion has too few rows.
+    """
+    first = _first_row(t, q, rounding, source)
+    end = len(t) - _first_row(-t[::-1], q[::-1], rounding, source)
+    if end - first < FEWEST_ROWS:
+        raise _no_motion(f"the robot moves in fewer than {FEWEST_ROWS} rows", t, source)
+    notes = []
+    for when, still in (("before", t[: first + 1]), ("after", t[end - 1 :])):
+        if len(still) > 1:
+            rows = write_count(len(still) - 1, "row")
+            time = f"{still[-1] - still[0]:.6g} s"
+            notes.append(
+                f"left out {time} {when} the motion, in which the robot stands still ({rows})"
+            )
+    return slice(first, end), notes
+
+
 def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
+    """Refuse too few times, and those that do not ascend."""
     if len(t) < FEWEST_ROWS:
         raise TaskError(
             "too few rows for a motion",
@@ -327,12 +338,12 @@ def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
 
 def _check_angles(q: np.ndarray, robot: Robot, source: Path) -> None:
     """Refuse degrees that were taken for radians: no joint turns so far."""
-    ends = np.abs([robot.limits.position_lower, robot.limits.position_upper]).max(
-        axis=0
-    )
-    reach = 1.5 * np.where(np.isfinite(ends), ends, 0.0)
+    ends = [robot.limits.position_lower, robot.limits.position_upper]
+    farthest = np.abs(ends).max(axis=0)
+    reach = 1.5 * np.where(np.isfinite(farthest), farthest, 0.0)
     largest = np.abs(q).max(axis=0)
-    is_far = robot.revolute & (largest > np.maximum(_MOST_TURNS, reach))
+    # Without a range, three turns are plausible.
+    is_far = robot.revolute & (largest > np.maximum(6.0 * np.pi, reach))
     if is_far.any():
         joint = int(np.argmax(is_far))
         raise TaskError(
@@ -350,8 +361,9 @@ def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path)
     the cube of time, so that it is eight times as large after twice the time.
     """
     away = np.abs(q - q[0])
-    changed = away > np.maximum(_STILL, _CHANGED_DIGITS * rounding)
-    clear = away > np.maximum(_STILL, _CLEAR_DIGITS * rounding)
+    # A last digit that flickers changes by 2 roundings; 24 are a dozen changes of it.
+    changed = away > np.maximum(_STILL, 2.2 * rounding)
+    clear = away > np.maximum(_STILL, 24.0 * rounding)
     if not changed.any():
         raise _no_motion("the robot does not move", t, source)
     row = int(np.argmax(changed.any(axis=1)))
@@ -361,6 +373,7 @@ def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray, source: Path)
 
 
 def _no_motion(problem: str, t: np.ndarray, source: Path) -> TaskError:
+    """Make the error for a file without a motion."""
     return TaskError(
         problem,
         found=write_count(len(t), "row"),
