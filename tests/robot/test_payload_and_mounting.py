@@ -350,6 +350,19 @@ def test_what_cannot_be_is_refused(options, words):
         of(IIWA, **options)
 
 
+def test_joints_without_a_limit_on_their_acceleration_are_named():
+    free = of(DAMPED, tool_frame="tool")
+    key = "acceleration limits"
+    assert in_use(free)[key] == "none (robot.limits.acceleration)"
+    qddot = np.array([[1.0, -5.0], [-3.0, 2.0]])
+    assert in_use(free, qddot)[key].endswith("; the largest is 5 m/s^2, of j2")
+    some = of(DAMPED, tool_frame="tool", limits={"acceleration": {"j2": 9.0}})
+    said = in_use(some, qddot)[key]
+    assert said.startswith("none for j1 (robot.limits.acceleration); the largest is 3 ")
+    both = of(DAMPED, tool_frame="tool", limits={"acceleration": 9.0})
+    assert key not in in_use(both, qddot)
+
+
 def test_slower_limits_are_said_to_be_in_use():
     slower = brachis.LimitSpec(scale={"velocity": 0.1})
     assert (

@@ -379,7 +379,7 @@ def lay_splines(
     x = np.concatenate([own.x for own in found])
     violation = max(own.laid.violation for own in found)
     seconds = time.perf_counter() - began
-    return finer, _report(finer, x, SolveStatus.ACCEPTABLE, violation, seconds)
+    return finer, _report(finer, x, SolveStatus.FOLLOWED, violation, seconds)
 
 
 def _follow_again(

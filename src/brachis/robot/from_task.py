@@ -214,10 +214,11 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
     return given if merged == own else merged
 
 
-def in_use(robot: Robot) -> dict[str, str]:
+def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
     """Describe what is in use in words, with units: payload, placements, slower limits, armature, friction.
 
-    Friction is always described, with where it comes from: the URDF, unless the task says otherwise.
+    Friction is always described, with where it comes from: the URDF, unless the task says otherwise. So are joints
+    without a limit on their acceleration, with the largest one among the accelerations of a motion, (K, n), if given.
     """
     settings = robot.settings
     payload = settings.payload
@@ -248,6 +249,9 @@ def in_use(robot: Robot) -> dict[str, str]:
         used["limits"] = f"{factors} of what is stated (limits.scale)"
     if robot.friction.armature.any():
         used["armature"] = _by_joint(robot, "armature")
+    unlimited = _without_acceleration_limit(robot, qddot)
+    if unlimited:
+        used["acceleration limits"] = unlimited
     titles = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
     for kind, stated in robot.urdf_dynamics.friction.items():
         figures = getattr(robot.friction, kind)[: len(stated)]
@@ -256,6 +260,24 @@ def in_use(robot: Robot) -> dict[str, str]:
         origin = "as the URDF states it" if same else "other than the URDF's"
         used[titles[kind]] = f"{shown} ({origin})"
     return used
+
+
+def _without_acceleration_limit(robot: Robot, qddot: np.ndarray | None) -> str:
+    """Name the joints whose acceleration has no limit, and the largest acceleration among them."""
+    names = robot.urdf_joints
+    ends = robot.limits.both_ways("acceleration")[:, : len(names)]
+    is_free = ~np.isfinite(ends).all(axis=0)
+    if not is_free.any():
+        return ""
+    free = [name for name, own in zip(names, is_free, strict=True) if own]
+    of_some = "" if is_free.all() else f" for {', '.join(free)}"
+    text = f"none{of_some} (robot.limits.acceleration)"
+    if qddot is None:
+        return text
+    largest = np.where(is_free, np.abs(qddot[:, : len(names)]).max(axis=0), 0.0)
+    joint = int(np.argmax(largest))
+    unit = UNITS["acceleration"][robot.position_units[joint]]
+    return f"{text}; the largest is {largest[joint]:.4g} {unit}, of {names[joint]}"
 
 
 def _by_joint(robot: Robot, kind: str) -> str:
