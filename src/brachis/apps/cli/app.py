@@ -195,6 +195,13 @@ Json = Annotated[
 Degrees = Annotated[
     bool, Option("--degrees", help="Show angles in degrees; files and JSON keep rad.")
 ]
+Figures = Annotated[
+    bool,
+    Option(
+        "--figures/--no-figures",
+        help="Draw the figures too: that takes some seconds, and needs Matplotlib.",
+    ),
+]
 Strict = Annotated[
     bool | None,
     Option(

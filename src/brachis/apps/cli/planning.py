@@ -14,6 +14,7 @@ import brachis
 from brachis.apps.cli.app import (
     Changes,
     Degrees,
+    Figures,
     Json,
     Strict,
     Urdf,
@@ -61,6 +62,7 @@ def plan(
         bool, Option("--view", help="Show the motion in the browser, until Ctrl-C.")
     ] = False,
     strict: Strict = None,
+    figures: Figures = True,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
@@ -75,16 +77,16 @@ def plan(
     plots = brachis.plots
     trajectory = result.trajectory
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
-    figures: dict[str, Drawing] = {
+    drawings: dict[str, Drawing] = {
         "overview.png": lambda: plots.plot_overview(trajectory),
         "candidates.png": lambda: plots.plot_candidates(result.candidates),
     }
     if any(report.profile for report in result.fits):
-        figures["fit.png"] = lambda: plots.plot_fit(trajectory)
+        drawings["fit.png"] = lambda: plots.plot_fit(trajectory)
     code = finish(
         data,
         {"result.npz": trajectory.save},
-        figures,
+        drawings if figures else {},
         out=out,
         names=_PLANNED,
         verified=result.verified,
@@ -205,6 +207,7 @@ def bottleneck(
     urdf: Urdf = None,
     changes: Changes = None,
     strict: Strict = None,
+    figures: Figures = True,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
@@ -234,10 +237,13 @@ def bottleneck(
     data["bottleneck"] = report.to_dict()
     redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
     head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
+    drawings: dict[str, Drawing] = {
+        "timeline.png": lambda: brachis.plots.plot_timeline(trajectory)
+    }
     code = finish(
         data,
         {},
-        {"timeline.png": lambda: brachis.plots.plot_timeline(trajectory)},
+        drawings if figures else {},
         out=out,
         names=_BOTTLENECK,
         verified=data["verified"],

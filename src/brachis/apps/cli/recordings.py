@@ -9,8 +9,8 @@ import typer
 from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Json, task_space_of
-from brachis.apps.cli.folder import finish, make_folder, write_one
+from brachis.apps.cli.app import Degrees, Figures, Json, task_space_of
+from brachis.apps.cli.folder import Drawing, finish, make_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
     print_lines,
@@ -147,6 +147,7 @@ def compare(
     time: TimeUnit = None,
     tolerance: PathTolerance = None,
     noise: Noise = None,
+    figures: Figures = True,
     json: Json = False,
 ) -> None:
     """Compare a recorded motion with a plan along its path."""
@@ -164,10 +165,11 @@ def compare(
             keep_end=keep_end,
             listener=listener,
         )
+    drawings: dict[str, Drawing] = {"comparison.png": lambda: plot_both_motions(found)}
     code = finish(
         found.to_dict(),
         {"today.npz": found.recorded.save, "result.npz": found.result.trajectory.save},
-        {"comparison.png": lambda: plot_both_motions(found)},
+        drawings if figures else {},
         out=out,
         names=_FILES,
         verified=found.result.verified,
