@@ -13,7 +13,6 @@ import numpy as np
 from brachis.apps.bottleneck.saturation import LimitRatios
 from brachis.limits.tool import build_tool_speed
 from brachis.robot.joints import UNITS, shown_unit
-from brachis.robot.limits import Limits
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
 from brachis.trajectory import Samples, Trajectory
@@ -58,7 +57,7 @@ class Curve:
         """Values over the limits of their directions, both from the centre, (K,); of a curve that has both."""
         away = self.values - self.centre
         above = self.upper - self.centre
-        return np.asarray(away / np.where(away > 0.0, above, self.centre - self.lower))
+        return away / np.where(away > 0.0, above, self.centre - self.lower)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +116,7 @@ class Panel:
         list of ((K,) ndarray, list of Curve)
             The limit over time, NaN where it is far away, and the curves that share it.
         """
-        reach = 0.3 * max(float(np.ptp(self.values)), 1e-9)
+        reach = 0.3 * max(np.ptp(self.values), 1e-9)
         found: dict[bytes, tuple[np.ndarray, list[Curve]]] = {}
         for curve in self.curves:
             lowest = curve.values.min() - reach
@@ -158,8 +157,8 @@ class Row:
         Title and symbol for prismatic joints if they differ.
     ratio_title : str
         Title of the values over their limits if it is not ``... / limit``.
-    ranges : callable or None
-        Of the robot's limits: lower and upper ends of ranges, (2, n), whose middle uses nothing of them.
+    is_range : bool
+        Whether the limits are the ends of ranges, whose middle uses nothing of them.
     only_if_limited : bool
         Whether the row is of interest only if the robot limits it.
     unit : str or None
@@ -178,7 +177,7 @@ class Row:
     symbol: str
     prismatic: tuple[str, str] | None = None
     ratio_title: str = ""
-    ranges: Callable[[Limits], np.ndarray] | None = None
+    is_range: bool = False
     only_if_limited: bool = False
     unit: str | None = None
     largest: Callable[[Trajectory, Samples], np.ndarray | float] | None = None
@@ -206,7 +205,7 @@ PANELS = {
         lambda _, samples: samples.q,
         "$q$",
         ratio_title="position in its range",
-        ranges=lambda limits: np.array([limits.position_lower, limits.position_upper]),
+        is_range=True,
     ),
     "velocity": Row(lambda _, samples: samples.qdot, r"$\dot{q}$"),
     "acceleration": Row(lambda _, samples: samples.qddot, r"$\ddot{q}$"),
@@ -247,7 +246,7 @@ def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
         if row.unit is None
         and (
             not row.only_if_limited
-            or np.isfinite(_limits_of(trajectory.robot.limits, name)).any()
+            or np.isfinite(trajectory.robot.limits.both_ways(name)).any()
         )
     )
 
@@ -301,9 +300,9 @@ def _joint_panels(
     """Make the panels of a row of joints, one for each unit."""
     row = PANELS[name]
     robot = trajectory.robot
-    lower, upper = _limits_of(robot.limits, name)
+    lower, upper = robot.limits.both_ways(name)
     middle = np.zeros(robot.n)
-    if row.ranges:
+    if row.is_range:
         is_range = np.isfinite(lower) & np.isfinite(upper)
         middle[is_range] = 0.5 * lower[is_range] + 0.5 * upper[is_range]
     columns = row.values(trajectory, samples).T
@@ -323,12 +322,6 @@ def _joint_panels(
         ratio = row.ratio_title or f"{title} / limit"
         found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
     return found
-
-
-def _limits_of(limits: Limits, name: str) -> np.ndarray:
-    """Lower and upper limits of a row of joints, (2, n)."""
-    ranges = PANELS[name].ranges
-    return ranges(limits) if ranges else limits.both_ways(name)
 
 
 def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, Curve]]:
@@ -361,17 +354,12 @@ def ratio_panel(
         nearest = np.abs(ratios.values[:, shown]).max(axis=0)
         shown = np.array(shown)[np.argsort(-nearest)[:MOST_CURVES]].tolist()
     values = ratios.values[:, shown]
-    is_signed = bool(values.min() < 0.0)
-    curves = [
-        Curve(
-            subjects[k],
-            order.index(subjects[k]),
-            ratios.values[:, k],
-            -1.0 if is_signed else -np.inf,
-            1.0,
-        )
-        for k in shown
-    ]
+    is_signed = values.min() < 0.0
+    lower = -1.0 if is_signed else -np.inf
+    curves = []
+    for k, column in zip(shown, values.T, strict=True):
+        number = order.index(subjects[k])
+        curves.append(Curve(subjects[k], number, column, lower, 1.0))
     curves.sort(key=lambda curve: curve.style)
     title = ", ".join(titles)
     top = 1.15 * max(1.0, float(np.abs(values).max()))

@@ -26,7 +26,7 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     They go through the base, every joint before and after its motion (one point if it is revolute) and the tool.
     """
     model = robot.model
-    base = int(model.getFrameId(robot.base_frame))
+    base = model.getFrameId(robot.base_frame)
     bones = np.empty((len(q), 2 * robot.n + 2, 3))
     for points, data in zip(bones, robot.place_joints(q), strict=True):
         points[0] = model.frames[base].placement.translation
@@ -181,7 +181,7 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     """
     from matplotlib.ticker import MaxNLocator
 
-    floor = min(0.0, float(points[:, 2].min()))
+    floor = min(0.0, points[:, 2].min())
     shadow = {"color": "#C8C8C8", "zorder": 1.0, "gid": "shadow"}
     ax.plot(*tool[:, :2].T, np.full(len(tool), floor), linewidth=1.4, **shadow)
     ax.set_zlabel("$z$ (m)", fontsize=style.LABEL_SIZE, labelpad=-4.0)
@@ -196,8 +196,8 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     def look_from(elevation: float, azimuth: float) -> tuple[float, float]:
         """Turn the axes; return how much of the frame points take if the box fits into it, and what the box takes."""
         ax.view_init(elevation, azimuth)
-        extent = float(_spans(ax, corners).max())
-        return float(np.prod(_spans(ax, points))) / extent**2, extent
+        extent = _spans(ax, corners).max()
+        return np.prod(_spans(ax, points)) / extent**2, extent
 
     best = max(_VIEWS, key=lambda view: look_from(*view)[0])
     _, extent = look_from(*best)
