@@ -106,7 +106,7 @@ class Scene:
         """Place the centres of the balls around the solids, (K, S, 3), m."""
         rotations, origins = placed
         turned = np.einsum("ksij,sj->ksi", rotations[:, self.joints], self.balls[0])
-        return np.asarray(turned + origins[:, self.joints])
+        return turned + origins[:, self.joints]
 
     def bounds(self, placed: Placed) -> np.ndarray:
         """Return least distances that the pairs can have, (K, P), by the balls around them, m."""
@@ -123,7 +123,7 @@ class Scene:
                 own = np.flatnonzero(mine == number)
                 height = centres[:, other[own]] @ plane.n - plane.d
                 bounds[:, own] = height - radii[other[own]]
-        return np.asarray(bounds)
+        return bounds
 
     @cached_property
     def _boxes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -181,7 +181,7 @@ class Scene:
                 - np.nan_to_num(side, nan=np.inf)
                 for own, side in zip(axes, sides, strict=True)
             ]
-        return np.asarray(np.maximum(*gaps).max(axis=1))
+        return np.maximum(*gaps).max(axis=1)
 
     def measure(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
