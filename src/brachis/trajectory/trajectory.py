@@ -261,19 +261,19 @@ class Trajectory(Summary):
         """
         times = self._check_times(t)
         node = np.searchsorted(self.times[1:-1], times, side="right")
-        return self.q[node] + np.asarray(self.pieces(times))
+        return self.q[node] + self.pieces(times)
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
         """Joint velocities, as `position`; rad/s or m/s."""
-        return np.asarray(self.pieces(self._check_times(t), nu=1))
+        return self.pieces(self._check_times(t), nu=1)
 
     def acceleration(self, t: ArrayLike) -> np.ndarray:
         """Joint accelerations, as `position`; rad/s^2 or m/s^2."""
-        return np.asarray(self.pieces(self._check_times(t), nu=2))
+        return self.pieces(self._check_times(t), nu=2)
 
     def jerk(self, t: ArrayLike) -> np.ndarray:
         """Joint jerks, as `position`; rad/s^3 or m/s^3. At a node the value behind it."""
-        return np.asarray(self.jerk_pieces(self._check_times(t)))
+        return self.jerk_pieces(self._check_times(t))
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""

@@ -262,7 +262,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         links.setdefault(joint, []).extend(coloured)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     positions, quaternions = placements(robot, q)
-    size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
+    size = np.ptp(positions.reshape(-1, 3), axis=0).max()
     skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
     fixed = [positions[:, 1:].reshape(-1, 3)]
     moving = fixed.copy()
@@ -302,7 +302,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
     for joint in range(robot.n):
         placement = model.jointPlacements[joint + 1]
-        subspace = np.asarray(model.joints[joint + 1].createData().S).reshape(6, -1)
+        subspace = model.joints[joint + 1].createData().S.reshape(6, -1)
         axis = subspace[:3, 0] + subspace[3:, 0]  # one of them is zero
         draw_rod(joint, begin, placement.translation, 1.0, "bone")
         if robot.revolute[joint]:

@@ -77,7 +77,7 @@ class Chart:
     """
 
     def __init__(self, gui: viser.GuiApi, panel: Panel) -> None:
-        self._t_end = float(panel.t[-1])
+        self._t_end = panel.t[-1]
         data = [panel.t]
         series: list[uplot.Series] = [{"label": "time (s)"}]
         for limit, _ in panel.near_limits():
@@ -276,7 +276,7 @@ class Controls:
         self._add_controls()
         colours = speed_colours(np.linspace(0.0, 1.0, 9)).tolist()
         stops = [f"rgb{tuple(colour)}" for colour in colours]
-        fastest = float(scene.samples.tool_speed.max())
+        fastest = scene.samples.tool_speed.max()
         self._gui.add_html(tables.speed_legend(stops, fastest))
         self._state = self._gui.add_html("")
         self._gui.add_html(tables.phases_table(trajectory))

@@ -38,7 +38,7 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     ]
     phases = trajectory.phases
     if len(phases) > 1:
-        number = int(np.searchsorted(trajectory.phase_ends[:-1], now.t[0], "right"))
+        number = np.searchsorted(trajectory.phase_ends[:-1], now.t[0], "right")
         lines.append(f"phase {number + 1} of {len(phases)}: {phases[number].kind}")
     head = _paragraph(*lines)
     panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
