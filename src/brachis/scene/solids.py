@@ -104,12 +104,11 @@ def build_solids(body: SceneBody) -> Iterator[Solid]:
 def _build_solid(body: SceneBody) -> Solid:
     shape = getattr(body, body.shape)
     if body.half_space is not None:
-        normal = np.array(body.half_space.normal)
-        unit = normal / np.linalg.norm(normal)
-        geometry = coal.Halfspace(unit, body.half_space.offset)
+        normal = np.array(shape.normal)
+        geometry = coal.Halfspace(normal / np.linalg.norm(normal), shape.offset)
     elif body.mesh is not None:
         try:
-            geometry = _hull(Path(body.mesh), np.full(3, body.scale))
+            geometry = _hull(Path(shape), np.full(3, body.scale))
         except InputError as error:
             raise TaskError(str(error), where=f"scene: {body.name}") from error
     elif body.sphere is not None:
