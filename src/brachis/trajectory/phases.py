@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -162,13 +163,13 @@ def split_splines(
     begins = np.append(0.0, phase_ends[:-1])
     numbers = find_phase_knots(knots, degree)
     splines = []
-    for number, (begin, end) in enumerate(zip(begins, phase_ends, strict=True)):
-        first = numbers[number]
-        last = numbers[number + 1] + outer
-        own = (knots[first:last] * phase_ends[-1] - begin) / (end - begin)
+    for begin, end, (first, last) in zip(
+        begins, phase_ends, pairwise(numbers), strict=True
+    ):
+        own = (knots[first : last + outer] * phase_ends[-1] - begin) / (end - begin)
         own[:outer] = 0.0
         own[-outer:] = 1.0
-        points = control_points[:, first : last - outer]
+        points = control_points[:, first:last]
         splines.append(PhaseSpline(end - begin, own, degree, points))
     return tuple(splines)
 

@@ -339,8 +339,9 @@ class Trajectory(Summary):
         if last == "exact":
             t[-1] = self.t_end
             return self.at(t)
-        qdot = self.velocity(np.minimum(t, self.t_end))
-        qddot = self.acceleration(np.minimum(t, self.t_end))
+        within = np.minimum(t, self.t_end)
+        qdot = self.velocity(within)
+        qddot = self.acceleration(within)
         qdot[-1] = 0.0
         qddot[-1] = 0.0
         return self._samples(t, qdot, qddot)
