@@ -6,7 +6,7 @@ A new panel is one row of `PANELS`, and a function if its values are not among t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -373,6 +373,12 @@ def ratio_panel(
         is_ratio=True,
         ends=(-top if is_signed else -0.05 * top, top),
     )
+
+
+def at_distinct_times(ratios: LimitRatios) -> LimitRatios:
+    """Leave out the values before jumps, whose times occur twice."""
+    is_last = np.append(np.diff(ratios.t) > 0.0, True)
+    return replace(ratios, t=ratios.t[is_last], values=ratios.values[is_last])
 
 
 def torque_panels(

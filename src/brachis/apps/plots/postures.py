@@ -95,21 +95,19 @@ def plot_postures(trajectory: Trajectory) -> Figure:
         Later postures are darker. Squares are prismatic joints, filled markers redundant ones.
     """
     figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
-    ax = draw_postures(figure, trajectory, dense_samples(trajectory))
+    place = figure.add_gridspec()[0]
+    ax = draw_postures(figure, trajectory, dense_samples(trajectory), place)
     legend_postures(ax, trajectory, style.COLUMN_WIDTH - 5.0)
     return figure
 
 
 def draw_postures(
-    figure: Figure,
-    trajectory: Trajectory,
-    samples: Samples,
-    place: SubplotSpec | None = None,
+    figure: Figure, trajectory: Trajectory, samples: Samples, place: SubplotSpec
 ) -> Axes:
     """Draw tool path and postures into new axes that suit the robot: in its plane, or in space."""
     plane = plane_of(trajectory)
     in_space = {} if plane else {"projection": "3d", "computed_zorder": False}
-    ax: Any = figure.add_subplot(*([place] if place else []), **in_space)
+    ax: Any = figure.add_subplot(place, **in_space)
     view = list(plane or (0, 1, 2))
     tool = samples.tool_position[:, view]
     times = np.linspace(0.0, trajectory.t_end, len(_SHADES))

@@ -234,9 +234,16 @@ def legend_above(
         What the legend shows; by default the labelled artists of the axes.
     """
     lines = lines_by_label([ax]) if lines is None else lines
-    look = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     if lines:
-        _add_legend(ax, width, lines, borderaxespad=0.2, borderpad=0.2, **look)
+        _add_legend(
+            ax,
+            width,
+            lines,
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            borderaxespad=0.2,
+            borderpad=0.2,
+        )
 
 
 def legend_below(figure: Figure, lines: Mapping[str, Artist]) -> None:

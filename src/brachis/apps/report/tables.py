@@ -147,7 +147,7 @@ def _entry(key: str, value: object) -> str:
     nested = (list, tuple, dict)
     if isinstance(value, float):
         shown = f"{value:.4g}"
-    elif not isinstance(value, list | tuple | dict):
+    elif not isinstance(value, nested):
         shown = _file_name(str(value))
     elif len(value) > _LISTED or any(isinstance(each, nested) for each in value):
         shown = f"{len(value)} entries"
