@@ -21,8 +21,6 @@ from brachis.task import Task
 
 _POSTURES = 100
 """Random postures in which links that always touch are found."""
-_FARTHEST = 1.0
-"""Farthest from zero that sliding joints without an end are drawn, m."""
 
 
 def scene_of(robot: Robot, task: Task) -> Scene | None:
@@ -114,7 +112,7 @@ def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.
     ]
     are_joined = np.array([pair in joined for pair in links], dtype=bool)
     ends = robot.limits.both_ways("position")
-    half = np.where(robot.revolute, np.pi, _FARTHEST)
+    half = np.where(robot.revolute, np.pi, 1.0)  # rad or m, for joints without an end
     low, high = np.where(np.isfinite(ends), ends, [-half, half])
     q = np.random.default_rng(0).uniform(low, high, (_POSTURES, robot.n))
     close = scene.with_pairs(own).find_close(Chain.of(robot.model).place(q), 0.0)

@@ -18,11 +18,6 @@ from brachis.scene.solids import Solid
 
 UNIT = 0.1
 """Scale of the values of limits and of ratios: 1 means so many m."""
-_EXACT = 1e-10
-"""Tolerance of Coal's distances of solids that are apart, m."""
-_ITERATIONS = 500
-_DEEPEST = 1.0
-"""Deepest overlap that counts, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,9 +190,9 @@ class Scene:
         first = coal.Transform3s()
         second = coal.Transform3s()
         request = coal.DistanceRequest()
-        # That of solids that overlap is less exact: Coal gives up there where it is asked for more.
-        request.gjk_tolerance = _EXACT
-        request.gjk_max_iterations = _ITERATIONS
+        # Of solids that are apart, m. The depth of overlaps is less exact: Coal gives up where it is asked for more.
+        request.gjk_tolerance = 1e-10
+        request.gjk_max_iterations = 500
         result = coal.DistanceResult()
         chosen = self.pairs[pair]
         for m in range(count):
@@ -210,6 +205,6 @@ class Scene:
             points[m, 0] = result.getNearestPoint1()
             points[m, 1] = result.getNearestPoint2()
             normal[m] = result.normal
-        # Where Coal gives up, the solids overlap deeply.
-        distance = np.maximum(np.nan_to_num(distance, nan=-np.inf), -_DEEPEST)
+        # Where Coal gives up, the solids overlap deeply; more than 1 m does not count.
+        distance = np.maximum(np.nan_to_num(distance, nan=-np.inf), -1.0)
         return ClosePairs(posture, pair, distance, points, normal)
