@@ -311,8 +311,7 @@ def _joint_panels(
         unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
         curves = []
         for joint in np.flatnonzero(is_shown).tolist():
-            values = (columns[joint], lower[joint], upper[joint], middle[joint])
-            scaled = (factor * each for each in values)
+            scaled = (factor * each[joint] for each in (columns, lower, upper, middle))
             curves.append(Curve(trajectory.joint_names[joint], joint, *scaled))
         if not curves:
             continue

@@ -111,10 +111,10 @@ def draw_postures(
     view = list(plane or (0, 1, 2))
     tool = samples.tool_position[:, view]
     times = np.linspace(0.0, trajectory.t_end, len(_SHADES))
-    postures = skeleton(trajectory.robot, trajectory.position(times))
+    postures = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
     for k, (bones, shade) in enumerate(zip(postures, _SHADES, strict=True)):
         ax.plot(
-            *bones[:, view].T,
+            *bones.T,
             color=shade,
             linewidth=2.2 if k in {0, len(_SHADES) - 1} else 1.0,
             solid_capstyle="round",
@@ -125,7 +125,7 @@ def draw_postures(
         for joint, name in enumerate(trajectory.joint_names):
             is_redundant = name in trajectory.redundant_joints
             ax.plot(
-                *bones[2 * joint + 2, view][:, None],
+                *bones[2 * joint + 2, :, None],
                 marker="o" if trajectory.robot.revolute[joint] else "s",
                 markeredgecolor=shade,
                 markerfacecolor=_REDUNDANT if is_redundant else "white",
@@ -135,7 +135,7 @@ def draw_postures(
     ax.plot(*tool.T, zorder=20.0, gid="tool path", **_PATH)
     ax.plot(*tool[-1:].T, "o", color=_PATH["color"], markersize=3.0, zorder=21.0)
     ground = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
-    base = postures[0, :1, view]
+    base = postures[0, :1].T
     ax.plot(*base, marker=ground, color=style.GREY, markersize=12.0, zorder=0.5)
     style.dress(ax, *(f"${'xyz'[axis]}$ (m)" for axis in view[:2]))
     if plane is None:

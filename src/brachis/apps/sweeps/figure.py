@@ -83,8 +83,12 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
         style.dress(ax, _title(keys[0]), _END_TIME)
     else:
         y = places[1]
-        draw = _draw_heat_map if is_heat_map else _draw_points
-        image = draw(ax, x, y, times)
+        if is_heat_map:
+            image = _draw_heat_map(ax, x, y, times)
+        else:
+            image = ax.scatter(
+                x, y, c=times, cmap=_COLOURS, s=14.0, plotnonfinite=False
+            )
         style.dress(figure.colorbar(image, ax=ax).ax, "", _END_TIME)
         style.dress(ax, _title(keys[0]), _title(keys[1]))
     if is_missing.any():
@@ -148,11 +152,6 @@ def _draw_line(ax: Axes, x: np.ndarray, times: np.ndarray, *, is_joined: bool) -
     if not is_joined:
         look["linestyle"] = "none"
     ax.plot(x[order], times[order], marker="o", markersize=3.0, **look)
-
-
-def _draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
-    """Draw points at x and y in the colours of their times."""
-    return ax.scatter(x, y, c=times, cmap=_COLOURS, s=14.0, plotnonfinite=False)
 
 
 def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:

@@ -66,7 +66,7 @@ def link_shapes(
     unread = []
     absent = []
     room = _LARGEST
-    materials = [each for each in tree.robot if each.tag == "material"]
+    materials = tree.robot.findall("material")
     visuals = [
         (name, visual)
         for name, link in tree.links.items()

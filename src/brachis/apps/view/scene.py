@@ -138,7 +138,7 @@ class Scene:
         layers = {"robot": self.bodies.links, "skeleton": self.bodies.skeleton}
         for layer, bodies in layers.items():
             for joint, meshes in bodies.items():
-                asset = trimesh.Scene(list(meshes)).export(file_type="glb")
+                asset = trimesh.Scene(meshes).export(file_type="glb")
                 handle = self._api.add_glb(f"/joint {joint}/{layer}", asset)
                 self.layers[layer].append(handle)
 
