@@ -390,10 +390,10 @@ class Trajectory(Summary):
         meta = {
             "task": self.task.to_dict(),
             "urdf": self.urdf,
-            "redundant_joints": list(self.redundant_joints),
+            "redundant_joints": self.redundant_joints,
             "branch": self.branch,
             "degree": self.degree,
-            "joint_names": list(self.joint_names),
+            "joint_names": self.joint_names,
             "recovered": None if self.recovered is None else self.recovered.to_file(),
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
