@@ -159,12 +159,12 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
     with np.load(stream, allow_pickle=False) as archive:
         meta = json.loads(str(archive["meta"]))
         if not isinstance(meta, dict):
-            raise ValueError("the metadata are not a mapping")  # noqa: TRY004  (a wrong file, not a wrong call)
+            raise TypeError("the metadata are not a mapping")
         ours = meta.get("schema") == SCHEMA
         arrays = {name: archive[name] for name in ARRAYS if ours}
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):  # of a member without the suffix .npy
-            raise ValueError(f"{name} is not an array")  # noqa: TRY004
+            raise TypeError(f"{name} is not an array")
     return meta, arrays
 
 

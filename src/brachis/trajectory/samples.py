@@ -77,7 +77,7 @@ class Samples(Summary):
             pandas is not installed.
         """
         try:
-            import pandas  # noqa: ICN001  (an extra)
+            import pandas as pd
         except ImportError:
             raise NotInstalledError("a table", "pandas", "pandas") from None
         columns = {"t": self.t, "s": self.s}
@@ -87,7 +87,7 @@ class Samples(Summary):
         names = [f"tool_{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
         pose = np.hstack([self.tool_position, self.tool_quaternion])
         columns |= zip(names, pose.T, strict=True)
-        return pandas.DataFrame({**columns, "tool_speed": self.tool_speed})
+        return pd.DataFrame({**columns, "tool_speed": self.tool_speed})
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown: the shapes."""

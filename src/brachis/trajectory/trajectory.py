@@ -471,6 +471,7 @@ def of_motion(
 
     @wraps(function)
     def taking(trajectory: Motion, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        """Call the function with the trajectory of what is given."""
         return function(motion_of(trajectory), *args, **kwargs)
 
     return taking  # type: ignore[return-value]  # mypy fears a second `trajectory` among the keywords

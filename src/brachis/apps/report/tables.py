@@ -78,8 +78,8 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     samples = motion.samples
     verification = motion.verification
     boundary = trajectory.task.boundary
-    joints = coordinates(trajectory.redundant_joints, trajectory.branch)
     branch = trajectory.branch
+    joints = coordinates(trajectory.redundant_joints, branch)
     named = {} if branch in {"", joints} else {"branch": branch}
     fastest = np.argmax(samples.tool_speed)
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"

@@ -289,6 +289,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
     drawn: Meshes = {}
 
     def draw(joint: int, mesh: trimesh.Trimesh, kind: str) -> None:
+        """Add a mesh in the colour of its kind to what a joint moves."""
         drawn.setdefault(joint, []).append(with_colour(mesh, _COLOURS[kind]))
 
     def draw_rod(
