@@ -320,7 +320,7 @@ class Trajectory(Summary):
         if last not in ("exact", "hold"):
             raise UnknownNameError("ending", last, ("exact", "hold"), where="last")
         dt = number(dt, "dt", "s")
-        if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):
+        if not (0.0 < dt < np.inf and self.t_end / dt < 1e7):
             raise InputError(
                 "the period is out of range",
                 where="dt",

@@ -160,8 +160,10 @@ def draw_holding(
     grid = place.subgridspec(len(shown), 1)
     axes = draw_panels(figure, grid, trajectory, shown)
     style.mark_end(axes[0], trajectory.t_end)
-    for ax in axes if len(axes) > 2 else ():
-        ax.set_ylabel(ax.get_ylabel().replace(" / ", " /\n"), fontsize=style.LABEL_SIZE)
+    if len(axes) > 2:
+        for ax in axes:
+            label = ax.get_ylabel().replace(" / ", " /\n")
+            ax.set_ylabel(label, fontsize=style.LABEL_SIZE)
     figure.align_ylabels(axes)
     return axes
 

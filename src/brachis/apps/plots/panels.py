@@ -22,6 +22,9 @@ MOST_CURVES = 10
 BLACK = 48
 """Style of curves of the whole arm: a number that gives a solid black line in all figures."""
 
+Bound = np.ndarray | float
+"""A limit over time, (K,), or at all times."""
+
 
 @dataclass(frozen=True, eq=False)
 class Curve:
@@ -43,8 +46,8 @@ class Curve:
     name: str
     style: int
     values: np.ndarray
-    lower: np.ndarray | float = -np.inf
-    upper: np.ndarray | float = np.inf
+    lower: Bound = -np.inf
+    upper: Bound = np.inf
     centre: float = 0.0
 
     @property
@@ -163,10 +166,8 @@ class Row:
         Whether the row is of interest only if the robot limits it.
     unit : str or None
         Unit of the values; None for joints, which have their own.
-    largest : callable or None
-        Of trajectory and samples: the largest values that the task allows, (K,).
-    smallest : callable or None
-        Takes the trajectory: the smallest value that the task allows.
+    bounds : callable or None
+        Of trajectory and samples: the smallest and the largest values that the task allows, each a number or (K,).
     name : str
         Name of the curve, where there is one.
     ends : (float or None, float or None)
@@ -180,16 +181,16 @@ class Row:
     is_range: bool = False
     only_if_limited: bool = False
     unit: str | None = None
-    largest: Callable[[Trajectory, Samples], np.ndarray | float] | None = None
-    smallest: Callable[[Trajectory], float] | None = None
+    bounds: Callable[[Trajectory, Samples], tuple[Bound, Bound]] | None = None
     name: str = "tool"
     ends: tuple[float | None, float | None] = (None, None)
 
 
-def _allowed_tool_speed(trajectory: Trajectory, samples: Samples) -> np.ndarray | float:
-    """Return the largest speed of the tool that the task allows, (K,), m/s; infinite without a limit."""
+def _bound_tool_speed(trajectory: Trajectory, samples: Samples) -> tuple[Bound, Bound]:
+    """Return no lower bound, and the largest speed of the tool that the task allows, (K,), m/s."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
-    return np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
+    largest = np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
+    return -np.inf, largest
 
 
 def _smallest_distances(trajectory: Trajectory, samples: Samples) -> np.ndarray:
@@ -224,14 +225,14 @@ PANELS = {
         lambda _, samples: samples.tool_speed,
         "tool speed",
         unit="m/s",
-        largest=_allowed_tool_speed,
+        bounds=_bound_tool_speed,
         ends=(0.0, None),
     ),
     "clearance": Row(
         _smallest_distances,
         "clearance",
         unit="m",
-        smallest=lambda trajectory: trajectory.task.collisions.clearance,
+        bounds=lambda trajectory, _: (trajectory.task.collisions.clearance, np.inf),
         name="closest pair",
     ),
 }
@@ -285,9 +286,8 @@ def panels_of(
             found += _joint_panels(trajectory, samples, name, degrees=degrees)
             continue
         values = row.values(trajectory, samples)
-        largest = row.largest(trajectory, samples) if row.largest else np.inf
-        smallest = row.smallest(trajectory) if row.smallest else -np.inf
-        curve = Curve(row.name, BLACK, values, smallest, largest)
+        bounds = row.bounds(trajectory, samples) if row.bounds else ()
+        curve = Curve(row.name, BLACK, values, *bounds)
         found.append(
             Panel(name, row.symbol, row.unit, samples.t, (curve,), ends=row.ends)
         )
