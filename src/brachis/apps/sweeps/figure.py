@@ -92,17 +92,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
         style.dress(figure.colorbar(image, ax=ax).ax, "", _END_TIME)
         style.dress(ax, _title(keys[0]), _title(keys[1]))
     if is_missing.any():
-        ax.scatter(
-            x[is_missing],
-            y[is_missing],
-            marker="x",
-            color=style.COLOURS[1],
-            s=18.0,
-            linewidths=0.8,
-            label="no verified plan",
-            zorder=3.0,
-        )
-        style.legend_above(ax, style.COLUMN_WIDTH)
+        _draw_crosses(ax, x[is_missing], y[is_missing])
     for axis, distinct in zip((ax.xaxis, ax.yaxis), values, strict=False):
         if is_heat_map or not _are_numbers(distinct):
             ticks = range(0, len(distinct), math.ceil(len(distinct) / _MOST_TICKS))
@@ -179,6 +169,21 @@ def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) ->
                 fontsize=style.TICK_SIZE,
             )
     return image
+
+
+def _draw_crosses(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
+    """Mark where no plan is verified."""
+    ax.scatter(
+        x,
+        y,
+        marker="x",
+        color=style.COLOURS[1],
+        s=18.0,
+        linewidths=0.8,
+        label="no verified plan",
+        zorder=3.0,
+    )
+    style.legend_above(ax, style.COLUMN_WIDTH)
 
 
 def _title(key: str) -> str:
