@@ -40,6 +40,7 @@ def check_keywords(
 
     @wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        """Check the arguments, then call the function."""
         for keyword in kwargs:
             if keyword not in parameters:
                 raise UnknownNameError("keyword", keyword, parameters, where=name)

@@ -93,7 +93,7 @@ def bisect(
         before = is_before(middle)
         low = np.where(before, middle, low)
         high = np.where(before, high, middle)
-    return np.asarray(0.5 * (low + high))
+    return 0.5 * (low + high)
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ import stat
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import BinaryIO
 
@@ -250,6 +250,7 @@ def ros_files(within: str) -> list[Path]:
     """Name the places where ROS may have a file of a package, ``<package>/<file>``."""
 
     def places(variable: str) -> list[Path]:
+        """List the folders that an environment variable names."""
         listed = os.environ.get(variable, "").split(os.pathsep)
         return [Path(place) for place in listed if place]
 
@@ -264,7 +265,7 @@ TASK_SUFFIXES = (".yaml", ".yml")
 """Suffixes of task files."""
 
 
-class Kind(Enum):
+class Kind(StrEnum):
     """A kind of file, in words."""
 
     TASK = "a task file"
@@ -310,15 +311,15 @@ def is_task_file(path: str | os.PathLike[str]) -> bool:
 
 
 def check_kind(
-    path: str | os.PathLike[str], expected: Kind | str, error: type[InputError]
+    path: str | os.PathLike[str], expected: str, error: type[InputError]
 ) -> None:
     """Refuse a file that is of another kind than is expected; unknown kinds are for the reader to refuse.
 
     Parameters
     ----------
     path : path
-    expected : Kind or str
-        In words for a kind that cannot be recognised.
+    expected : str
+        A `Kind`, or any words for a kind that cannot be recognised.
     error : type
         What is raised.
 
@@ -332,8 +333,8 @@ def check_kind(
         raise error(
             "the file is of another kind",
             where=os.fspath(path),
-            found=found.value,
-            allowed=expected.value if isinstance(expected, Kind) else expected,
+            found=found,
+            allowed=expected,
             hint=_ADVICE[found].format(path=os.fspath(path)),
         )
 

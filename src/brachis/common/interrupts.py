@@ -115,6 +115,7 @@ def defer() -> Iterator[None]:
     pressed = False
 
     def keep(_number: int, _frame: FrameType | None) -> None:
+        """Note a press for later."""
         nonlocal pressed
         pressed = True
         if isinstance(before, SigintHandler):
@@ -147,6 +148,7 @@ def _quiet(
     """Return a hook that ignores a KeyboardInterrupt in a finaliser: the press is remembered."""
 
     def quiet(unraisable: UnraisableHookArgs) -> None:
+        """Hand on all but a KeyboardInterrupt."""
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
             hook(unraisable)
 

@@ -38,6 +38,7 @@ def report_progress(
     log = logging.getLogger("brachis")
 
     def report(text: str) -> None:
+        """Log a step, hand it on and show it."""
         level = logging.DEBUG if isinstance(text, Iteration) else logging.INFO
         log.log(level, "%s", text)
         if listener is not None:

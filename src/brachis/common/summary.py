@@ -60,8 +60,10 @@ class Summary:
         return entries
 
 
-def show_value(value: Any, room: int = 104, items: int = 8) -> str:
-    """Show a value in at most `room` characters and `items`: arrays by their shape, long sequences by their length."""
+def show_value(value: Any) -> str:
+    """Show a value in 104 characters and 8 items or fewer: arrays by their shape, long sequences by their length."""
+    room = 104
+    items = 8
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple) and shape:
         if len(shape) > 1 or shape[0] > items:
@@ -76,12 +78,12 @@ def show_value(value: Any, room: int = 104, items: int = 8) -> str:
         instead = text.partition("\n")[0][: room - len(ending)] + ending
     elif type(value) in {list, tuple}:  # not those with names
         count = len(value)
-        text = f"[{', '.join(show_value(each, room) for each in value[:items])}]"
+        text = f"[{', '.join(show_value(each) for each in value[:items])}]"
         instead = f"{count} items"
     elif isinstance(value, Mapping):
         count = len(value)
         pairs = list(value.items())[:items]
-        text = ", ".join(f"{key}: {show_value(each, room)}" for key, each in pairs)
+        text = ", ".join(f"{key}: {show_value(each)}" for key, each in pairs)
         instead = f"{count} entries"
     else:
         text = repr(value)

@@ -21,8 +21,6 @@ from brachis.task import Task
 
 _POSTURES = 100
 """Random postures in which links that always touch are found."""
-_FARTHEST = 1.0
-"""Farthest from zero that sliding joints without an end are drawn, m."""
 
 
 def scene_of(robot: Robot, task: Task) -> Scene | None:
@@ -40,7 +38,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         return None
     folder = Path(robot.source).absolute().parent
     tree = read_tree(robot.urdf, robot.source)
-    _check_names("padding", settings.padding, tree.links)
+    _check_names("collisions.padding", settings.padding, tree.links)
     own = list(read_solids(tree, folder, settings.padding))
     if not own and settings.capsules == "auto":
         own = list(build_capsules(tree, settings.padding))
@@ -62,9 +60,8 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         joints[number], placed = find_carrier(robot, solid.link)
         placements[number] = placed @ solid.placement
     names = {*tree.links, *(solid.name for solid in solids)}
-    _check_names(
-        "disable", itertools.chain(*settings.disable), sorted(names), "link or body"
-    )
+    listed = itertools.chain(*settings.disable)
+    _check_names("collisions.disable", listed, sorted(names), "link or body")
     disabled = [*settings.disable, *_read_srdf(settings.srdf)]
     links = {solid.name: solid.link for solid in own}
     pairs = [
@@ -73,10 +70,9 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         if joints[first] != joints[second]
         and not _may_touch(solids[first], solids[second], links, disabled)
     ]
-    within = [second < len(own) for _, second in pairs]
     numbers = np.reshape(pairs, (-1, 2)).astype(int)
     scene = Scene(solids, joints, placements, numbers, len(own))
-    return scene.with_pairs(_find_hazards(scene, np.array(within), robot, tree, task))
+    return scene.with_pairs(_find_hazards(scene, robot, tree, task))
 
 
 def find_carrier(robot: Robot, link: str) -> tuple[int, np.ndarray]:
@@ -94,17 +90,15 @@ def _check_names(
     known = tuple(known)
     for name in names:
         if name not in known:
-            place = where if where.startswith("scene") else f"collisions.{where}"
-            raise UnknownNameError(kind, name, known, where=place)
+            raise UnknownNameError(kind, name, known, where=where)
 
 
-def _find_hazards(
-    scene: Scene, within: np.ndarray, robot: Robot, tree: UrdfTree, task: Task
-) -> np.ndarray:
-    """Choose the pairs to look at: of the robot's own ones, where `within`, those that do not belong together.
+def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.ndarray:
+    """Choose the pairs to look at: of those within the robot the ones that do not belong together.
 
     Links that a joint joins may touch, and so may those that overlap in every one of many random postures.
     """
+    within = scene.pairs[:, 1] < scene.own  # the robot's solids come first
     own = np.flatnonzero(within)
     others = np.flatnonzero(~within)
     if not task.collisions.self_collision:
@@ -117,10 +111,9 @@ def _find_hazards(
         frozenset(scene.solids[i].link or "" for i in pair) for pair in scene.pairs[own]
     ]
     are_joined = np.array([pair in joined for pair in links], dtype=bool)
-    limits = robot.limits
-    half = np.where(robot.revolute, np.pi, _FARTHEST)
-    low = np.where(np.isfinite(limits.position_lower), limits.position_lower, -half)
-    high = np.where(np.isfinite(limits.position_upper), limits.position_upper, half)
+    ends = robot.limits.both_ways("position")
+    half = np.where(robot.revolute, np.pi, 1.0)  # rad or m, for joints without an end
+    low, high = np.where(np.isfinite(ends), ends, [-half, half])
     q = np.random.default_rng(0).uniform(low, high, (_POSTURES, robot.n))
     close = scene.with_pairs(own).find_close(Chain.of(robot.model).place(q), 0.0)
     counts = np.bincount(close.pair, minlength=len(own))

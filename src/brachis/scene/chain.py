@@ -87,4 +87,4 @@ class Chain:
         moved = np.where(self.revolute[:, None], turning, axes)
         along = np.einsum("mja,ma->mj", moved, directions)
         carries = np.arange(len(self.axes)) < joint[:, None]
-        return np.asarray(np.where(carries, along, 0.0))
+        return np.where(carries, along, 0.0)

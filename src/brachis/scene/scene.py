@@ -18,11 +18,6 @@ from brachis.scene.solids import Solid
 
 UNIT = 0.1
 """Scale of the values of limits and of ratios: 1 means so many m."""
-_EXACT = 1e-10
-"""Tolerance of Coal's distances of solids that are apart, m."""
-_ITERATIONS = 500
-_DEEPEST = 1.0
-"""Deepest overlap that counts, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +101,7 @@ class Scene:
         """Place the centres of the balls around the solids, (K, S, 3), m."""
         rotations, origins = placed
         turned = np.einsum("ksij,sj->ksi", rotations[:, self.joints], self.balls[0])
-        return np.asarray(turned + origins[:, self.joints])
+        return turned + origins[:, self.joints]
 
     def bounds(self, placed: Placed) -> np.ndarray:
         """Return least distances that the pairs can have, (K, P), by the balls around them, m."""
@@ -123,7 +118,7 @@ class Scene:
                 own = np.flatnonzero(mine == number)
                 height = centres[:, other[own]] @ plane.n - plane.d
                 bounds[:, own] = height - radii[other[own]]
-        return np.asarray(bounds)
+        return bounds
 
     @cached_property
     def _boxes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -181,7 +176,7 @@ class Scene:
                 - np.nan_to_num(side, nan=np.inf)
                 for own, side in zip(axes, sides, strict=True)
             ]
-        return np.asarray(np.maximum(*gaps).max(axis=1))
+        return np.maximum(*gaps).max(axis=1)
 
     def measure(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
@@ -195,9 +190,9 @@ class Scene:
         first = coal.Transform3s()
         second = coal.Transform3s()
         request = coal.DistanceRequest()
-        # That of solids that overlap is less exact: Coal gives up there where it is asked for more.
-        request.gjk_tolerance = _EXACT
-        request.gjk_max_iterations = _ITERATIONS
+        # Of solids that are apart, m. The depth of overlaps is less exact: Coal gives up where it is asked for more.
+        request.gjk_tolerance = 1e-10
+        request.gjk_max_iterations = 500
         result = coal.DistanceResult()
         chosen = self.pairs[pair]
         for m in range(count):
@@ -210,6 +205,6 @@ class Scene:
             points[m, 0] = result.getNearestPoint1()
             points[m, 1] = result.getNearestPoint2()
             normal[m] = result.normal
-        # Where Coal gives up, the solids overlap deeply.
-        distance = np.maximum(np.nan_to_num(distance, nan=-np.inf), -_DEEPEST)
+        # Where Coal gives up, the solids overlap deeply; more than 1 m does not count.
+        distance = np.maximum(np.nan_to_num(distance, nan=-np.inf), -1.0)
         return ClosePairs(posture, pair, distance, points, normal)

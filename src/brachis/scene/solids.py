@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import coal
 import numpy as np
@@ -29,7 +29,7 @@ _HULL = (True, "Qt")
 """Keep the triangles; options of Qhull."""
 _THICKNESS = 0.02
 """Radius of capsules along links, as a part of the lengths of all links together."""
-Geometry: TypeAlias = Any  # coal comes without types
+Geometry = Any  # coal comes without types
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Solid:
         """Radius of a ball around it, m; infinite of a half-space."""
         # Coal leaves the padding out of the ball around a sphere.
         shape = self.geometry
-        return float(shape.aabb_radius + shape.getSweptSphereRadius())
+        return shape.aabb_radius + shape.getSweptSphereRadius()
 
 
 def build_solids(body: SceneBody) -> Iterator[Solid]:
@@ -104,12 +104,11 @@ def build_solids(body: SceneBody) -> Iterator[Solid]:
 def _build_solid(body: SceneBody) -> Solid:
     shape = getattr(body, body.shape)
     if body.half_space is not None:
-        normal = np.array(body.half_space.normal)
-        unit = normal / np.linalg.norm(normal)
-        geometry = coal.Halfspace(unit, body.half_space.offset)
+        normal = np.array(shape.normal)
+        geometry = coal.Halfspace(normal / np.linalg.norm(normal), shape.offset)
     elif body.mesh is not None:
         try:
-            geometry = _hull(Path(body.mesh), np.full(3, body.scale))
+            geometry = _hull(Path(shape), np.full(3, body.scale))
         except InputError as error:
             raise TaskError(str(error), where=f"scene: {body.name}") from error
     elif body.sphere is not None:
@@ -152,9 +151,9 @@ def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Sol
         (end_of(joint, "parent"), origin_of(joint, "origin")[:3, 3])
         for joint in tree.joints.values()
     ]
-    thick = _THICKNESS * sum(float(np.linalg.norm(end)) for _, end in ends)
+    thick = _THICKNESS * sum(np.linalg.norm(end) for _, end in ends)
     for number, (link, end) in enumerate(ends):
-        length = float(np.linalg.norm(end))
+        length = np.linalg.norm(end)
         if length <= thick:
             continue
         geometry = coal.Capsule(thick, length)
@@ -171,7 +170,7 @@ def _turn_to(direction: np.ndarray) -> np.ndarray:
     from scipy.spatial.transform import Rotation
 
     turn, _ = Rotation.align_vectors(direction, [0.0, 0.0, 1.0])
-    return np.asarray(turn.as_matrix())
+    return turn.as_matrix()
 
 
 def _solid(
@@ -188,32 +187,28 @@ def _solid(
 
 def _geometry(collision: Element, folder: Path) -> Geometry:
     """Read a ``<collision>``."""
-    found = collision.find("geometry")
-    shapes = [] if found is None else [each for each in found if each.tag in _READERS]
+    known = (*_SHAPES, "mesh")
+    shapes = [each for each in collision.iterfind("geometry[1]/*") if each.tag in known]
     if len(shapes) != 1:
         raise InputError(
             "<geometry> must contain exactly one known shape",
             found=f"{len(shapes)} of them",
-            allowed=", ".join(_READERS),
+            allowed=", ".join(known),
         )
     (shape,) = shapes
-    return _READERS[shape.tag](shape, folder)
+    if shape.tag == "mesh":
+        return _read_mesh(shape, folder)
+    kind, attributes, count = _SHAPES[shape.tag]
+    return kind(*_lengths(shape, attributes, count))
 
 
-def _read_box(shape: Element, _folder: Path) -> Geometry:
-    return coal.Box(*_lengths(shape, ("size",), 3))
-
-
-def _read_sphere(shape: Element, _folder: Path) -> Geometry:
-    return coal.Sphere(*_lengths(shape, ("radius",), 1))
-
-
-def _read_cylinder(shape: Element, _folder: Path) -> Geometry:
-    return coal.Cylinder(*_lengths(shape, ("radius", "length"), 2))
-
-
-def _read_capsule(shape: Element, _folder: Path) -> Geometry:
-    return coal.Capsule(*_lengths(shape, ("radius", "length"), 2))
+_SHAPES: dict[str, tuple[Any, tuple[str, ...], int]] = {
+    "box": (coal.Box, ("size",), 3),
+    "sphere": (coal.Sphere, ("radius",), 1),
+    "cylinder": (coal.Cylinder, ("radius", "length"), 2),
+    "capsule": (coal.Capsule, ("radius", "length"), 2),
+}
+"""Shapes but meshes: what they become, the attributes with their lengths, and how many these are together."""
 
 
 def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[float]:
@@ -238,15 +233,6 @@ def _read_mesh(shape: Element, folder: Path) -> Geometry:
     if path is None:
         raise InputError("the mesh file is missing", where=name)
     return _hull(path, np.array(numbers_of(shape, ".", "scale", "1 1 1")))
-
-
-_READERS = {
-    "box": _read_box,
-    "sphere": _read_sphere,
-    "cylinder": _read_cylinder,
-    "capsule": _read_capsule,
-    "mesh": _read_mesh,
-}
 
 
 def _hull(path: Path, scale: np.ndarray) -> Geometry:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -167,13 +168,13 @@ def split_splines(
     begins = np.append(0.0, phase_ends[:-1])
     numbers = find_phase_knots(knots, degree)
     splines = []
-    for number, (begin, end) in enumerate(zip(begins, phase_ends, strict=True)):
-        first = numbers[number]
-        last = numbers[number + 1] + outer
-        own = (knots[first:last] * phase_ends[-1] - begin) / (end - begin)
+    for begin, end, (first, last) in zip(
+        begins, phase_ends, pairwise(numbers), strict=True
+    ):
+        own = (knots[first : last + outer] * phase_ends[-1] - begin) / (end - begin)
         own[:outer] = 0.0
         own[-outer:] = 1.0
-        points = control_points[:, first : last - outer]
+        points = control_points[:, first:last]
         splines.append(PhaseSpline(end - begin, own, degree, points))
     return tuple(splines)
 
@@ -186,15 +187,15 @@ def list_phases(
     """Say what each phase is, by its curves, its end (s), and the given speeds of the task."""
     begins = np.append(0.0, phase_ends[:-1])
     phases = []
-    for spline, begin, end in zip(splines, begins, phase_ends, strict=True):
-        s = spline.control_points[0]
-        is_dwell = bool(s[0] == s[-1])
+    times = zip(begins.tolist(), phase_ends.tolist(), strict=True)
+    for spline, (begin, end) in zip(splines, times, strict=True):
+        s_begin, s_end = spline.control_points[0, [0, -1]].tolist()
+        is_dwell = s_begin == s_end
         # The phases of a recorded motion are between its stops, and longer than the parts.
-        ends = s[[0, -1]]
+        ends = (s_begin, s_end)
         given = [part.speed for part in speeds if np.allclose(ends, part.s, 0.0, 1e-9)]
         speed = None if is_dwell or not given else given[0]
-        times = (float(begin), float(end))
-        phases.append(MotionPhase(*times, float(s[0]), float(s[-1]), speed, is_dwell))
+        phases.append(MotionPhase(begin, end, s_begin, s_end, speed, is_dwell))
     return tuple(phases)
 
 

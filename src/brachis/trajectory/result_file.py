@@ -159,12 +159,12 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
     with np.load(stream, allow_pickle=False) as archive:
         meta = json.loads(str(archive["meta"]))
         if not isinstance(meta, dict):
-            raise ValueError("the metadata are not a mapping")  # noqa: TRY004  (a wrong file, not a wrong call)
+            raise TypeError("the metadata are not a mapping")
         ours = meta.get("schema") == SCHEMA
         arrays = {name: archive[name] for name in ARRAYS if ours}
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):  # of a member without the suffix .npy
-            raise ValueError(f"{name} is not an array")  # noqa: TRY004
+            raise TypeError(f"{name} is not an array")
     return meta, arrays
 
 
@@ -194,7 +194,7 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     for name, array in arrays.items():
         usable = array.dtype.kind in "fiu" and (np.abs(array) <= LARGEST).all()
         _refuse_unless(
-            bool(usable),
+            usable,
             "some numbers are not finite or are too large",
             where=name,
             allowed=f"numbers between -{LARGEST:g} and {LARGEST:g}",
@@ -217,7 +217,7 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     }
 
 
-def _refuse_unless(fits: bool, problem: str, **details: Any) -> None:
+def _refuse_unless(fits: bool | np.bool_, problem: str, **details: Any) -> None:
     if not fits:
         raise InputError(problem, **details)
 
@@ -266,7 +266,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     _check_nodes(times)
     begins = times.ndim == 1 and len(times) > 1 and times[0] == 0.0
     _refuse_unless(
-        begins and bool((np.diff(times) >= shortest).all()),
+        begins and (np.diff(times) >= shortest).all(),
         "not times",
         where="times",
         found=_describe(times),
@@ -283,7 +283,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     ends = knots[find_phase_knots(knots, degree)]
     gaps = np.diff(inner)
     _refuse_unless(
-        bool(((gaps >= shortest) | np.isin(inner[1:], ends) & (gaps == 0.0)).all()),
+        ((gaps >= shortest) | np.isin(inner[1:], ends) & (gaps == 0.0)).all(),
         "internal knots are repeated",
         where="knots",
         allowed=f"every internal knot once, at least {shortest:g} apart, or degree + 1 times where phases meet",
@@ -292,8 +292,8 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     fits = phase_ends.shape == (len(ends) - 1,) and phase_ends[-1] == times[-1]
     _refuse_unless(
         fits
-        and bool(np.isin(phase_ends, times).all())
-        and bool((np.abs(phase_ends / times[-1] - ends[1:]) <= shortest).all()),
+        and np.isin(phase_ends, times).all()
+        and (np.abs(phase_ends / times[-1] - ends[1:]) <= shortest).all(),
         "not the ends of the phases",
         where="phase_ends",
         found=_describe(phase_ends),

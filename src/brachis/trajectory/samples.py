@@ -77,22 +77,17 @@ class Samples(Summary):
             pandas is not installed.
         """
         try:
-            import pandas  # noqa: ICN001  (an extra)
+            import pandas as pd
         except ImportError:
             raise NotInstalledError("a table", "pandas", "pandas") from None
         columns = {"t": self.t, "s": self.s}
         for prefix, name in COLUMNS.items():
-            columns |= {
-                f"{prefix}_{joint}": getattr(self, name)[:, i]
-                for i, joint in enumerate(joint_names)
-            }
-        columns |= {
-            f"tool_{row}": self.tool_position[:, i] for i, row in enumerate("xyz")
-        }
-        columns |= {
-            f"tool_q{row}": self.tool_quaternion[:, i] for i, row in enumerate("wxyz")
-        }
-        return pandas.DataFrame({**columns, "tool_speed": self.tool_speed})
+            names = [f"{prefix}_{joint}" for joint in joint_names]
+            columns |= zip(names, getattr(self, name).T, strict=True)
+        names = [f"tool_{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
+        pose = np.hstack([self.tool_position, self.tool_quaternion])
+        columns |= zip(names, pose.T, strict=True)
+        return pd.DataFrame({**columns, "tool_speed": self.tool_speed})
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown: the shapes."""

@@ -238,7 +238,7 @@ class Trajectory(Summary):
         if last not in ("exact", "hold"):
             raise UnknownNameError("ending", last, ("exact", "hold"), where="last")
         dt = number(dt, "dt", "s")
-        if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):
+        if not (0.0 < dt < np.inf and self.t_end / dt < 1e7):
             raise InputError(
                 "the period is out of range",
                 where="dt",
@@ -257,8 +257,9 @@ class Trajectory(Summary):
         if last == "exact":
             t[-1] = self.t_end
             return self.at(t)
-        qdot = self.velocity(np.minimum(t, self.t_end))
-        qddot = self.acceleration(np.minimum(t, self.t_end))
+        within = np.minimum(t, self.t_end)
+        qdot = self.velocity(within)
+        qddot = self.acceleration(within)
         qdot[-1] = 0.0
         qddot[-1] = 0.0
         return self._samples(t, qdot, qddot)
@@ -307,10 +308,10 @@ class Trajectory(Summary):
         meta = {
             "task": self.task.to_dict(),
             "urdf": self.urdf,
-            "redundant_joints": list(self.redundant_joints),
+            "redundant_joints": self.redundant_joints,
             "branch": self.branch,
             "degree": self.degree,
-            "joint_names": list(self.joint_names),
+            "joint_names": self.joint_names,
             "recovered": None if self.recovered is None else self.recovered.to_file(),
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
@@ -388,6 +389,7 @@ def of_motion(
 
     @wraps(function)
     def taking(trajectory: Motion, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        """Call the function with the trajectory of what is given."""
         return function(motion_of(trajectory), *args, **kwargs)
 
     return taking  # type: ignore[return-value]  # mypy fears a second `trajectory` among the keywords

@@ -300,7 +300,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
         if fit.orientation_error > 0.0:
             beside = ax.twinx()
             style.dress(beside, "", "angle (deg)")
-            tolerance = float(np.rad2deg(fit.orientation_tolerance))
+            tolerance = math.degrees(fit.orientation_tolerance)
             _draw_error(beside, mm, np.rad2deg(angles), tolerance, 1)
             for axes, colour in ((ax, 0), (beside, 1)):
                 axes.yaxis.label.set_color(style.COLOURS[colour])

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.gridspec import GridSpecBase, SubplotSpec
 
 
 @of_motion
@@ -138,10 +138,8 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     draw_holding(figure, grid[0, 1], trajectory, samples)
     joints = []
     for column, found in enumerate(columns):
-        cells = [grid[row + 1, column] for row in range(len(found))]
-        joints += draw_panels(figure, cells, trajectory, found)
-    lines = lines_of(joints, trajectory)
-    style.legend_below(figure, lines)
+        joints += draw_panels(figure, grid, trajectory, found, row=1, column=column)
+    style.legend_below(figure, lines_of(joints, trajectory))
     return figure
 
 
@@ -159,13 +157,13 @@ def draw_holding(
     others = [title for title in active if title not in torques[0].title.split(", ")]
     shown = [] if active and others == active else torques
     shown += [ratio_panel(trajectory, ratios, title) for title in others]
-    cells = place.subgridspec(len(shown), 1)
-    axes = draw_panels(
-        figure, [cells[row] for row in range(len(shown))], trajectory, shown
-    )
+    grid = place.subgridspec(len(shown), 1)
+    axes = draw_panels(figure, grid, trajectory, shown)
     style.mark_end(axes[0], trajectory.t_end)
-    for ax in axes if len(axes) > 2 else ():
-        ax.set_ylabel(ax.get_ylabel().replace(" / ", " /\n"), fontsize=style.LABEL_SIZE)
+    if len(axes) > 2:
+        for ax in axes:
+            label = ax.get_ylabel().replace(" / ", " /\n")
+            ax.set_ylabel(label, fontsize=style.LABEL_SIZE)
     figure.align_ylabels(axes)
     return axes
 
@@ -175,8 +173,7 @@ def _stack(trajectory: Trajectory, found: Sequence[Panel]) -> Figure:
     heights = [_height(panel) for panel in found]
     figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + 20.0)
     grid = figure.add_gridspec(len(found), 1, height_ratios=heights)
-    cells = [grid[row] for row in range(len(found))]
-    axes = draw_panels(figure, cells, trajectory, found)
+    axes = draw_panels(figure, grid, trajectory, found)
     style.legend_above(axes[0], style.COLUMN_WIDTH - 15.0, lines_of(axes, trajectory))
     style.mark_end(axes[-1], trajectory.t_end)
     return figure
@@ -189,16 +186,21 @@ def _height(panel: Panel) -> float:
 
 def draw_panels(
     figure: Figure,
-    cells: Sequence[SubplotSpec],
+    grid: GridSpecBase,
     trajectory: Trajectory,
     found: Sequence[Panel],
+    *,
+    row: int = 0,
+    column: int = 0,
 ) -> list[Axes]:
-    """Draw panels into cells one below the other, over one time axis."""
-    axes = [figure.add_subplot(cell) for cell in cells]
-    for number, (ax, panel) in enumerate(zip(axes, found, strict=True)):
+    """Draw panels into a column of a grid, from a row on downwards, over one time axis."""
+    axes = []
+    for number, panel in enumerate(found):
+        ax = figure.add_subplot(grid[row + number, column])
         _draw_panel(ax, panel)
         dress(ax, trajectory, panel.label)
         style.mark_phases(ax, trajectory.phases, labels=number == 0)
+        axes.append(ax)
     for ax in axes[:-1]:
         ax.sharex(axes[-1])
         ax.tick_params(labelbottom=False)
@@ -215,7 +217,7 @@ def _draw_panel(ax: Axes, panel: Panel) -> None:
     ends = panel.view()
     for limit, curves in panel.near_limits():
         if panel.is_ratio:
-            level = float(limit[0])
+            level = limit[0]
             ax.axhline(level, color=style.GREY, **style.LIMIT)
             outer = np.sign(level) * ends[1]
             ax.axhspan(level, outer, facecolor="#EFEFEF", edgecolor="none", zorder=0.0)
@@ -242,7 +244,9 @@ def lines_of(axes: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
 def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
     """Set the labels, with time to the right and the knots of the splines as faint ticks."""
     style.dress(ax, r"$t$ (s)", ylabel)
-    style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
+    ax.set_xlim(0.0, trajectory.t_end)
+    ax.set_xticks(knot_times(trajectory)[1:-1], minor=True)
+    ax.tick_params(axis="x", which="minor", length=2.0, color="#A0A0A0", width=0.5)
 
 
 @of_motion
@@ -277,26 +281,27 @@ def plot_timeline(
 
     ratios = limit_ratios(trajectory, limits)
     found = {entry.label: entry for entry in saturations(ratios)}
-    shown = [k for k, label in enumerate(ratios.labels) if found[label].is_half_used]
-    labels = [ratios.labels[column] for column in shown]
+    shown = {
+        column: found[label]
+        for column, label in enumerate(ratios.labels)
+        if found[label].is_half_used
+    }
     figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * max(len(shown), 1))
     ax = figure.add_subplot()
     blue: dict[str, Any] = {"cmap": "Blues", "norm": Normalize(0.0, 1.0)}
     orange = style.COLOURS[1]
     thick = 0.84  # of the distance between rows
-    for row, (column, label) in enumerate(zip(shown, labels, strict=True)):
+    for row, (column, entry) in enumerate(shown.items()):
         used = np.abs(ratios.values[:, column])
         cells = 0.5 * (used[1:] + used[:-1])[None]
         edges = (row - 0.5 * thick, row + 0.5 * thick)
         ax.pcolormesh(ratios.t, edges, cells, shading="flat", rasterized=True, **blue)
-        active = found[label].active
-        spans = [(interval.begin, interval.end - interval.begin) for interval in active]
-        ax.broken_barh(
-            spans, (edges[0], thick), facecolor=orange, edgecolor=orange, linewidth=0.8
-        )
+        spans = [(active.begin, active.end - active.begin) for active in entry.active]
+        ax.broken_barh(spans, (edges[0], thick), color=orange, linewidth=0.8)
     dress(ax, trajectory, "")
     style.mark_phases(ax, trajectory.phases, labels=False)
     ax.set_ylim(max(len(shown), 1) - 0.5, -0.5)
+    labels = [entry.label for entry in shown.values()]
     names = [f"{style.plain(label.subject)} {label.kind}" for label in labels]
     ax.set_yticks(range(len(shown)), names)
     ax.tick_params(axis="y", length=0.0)

@@ -6,14 +6,13 @@ A new panel is one row of `PANELS`, and a function if its values are not among t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.apps.bottleneck.saturation import LimitRatios
 from brachis.limits.tool import build_tool_speed
 from brachis.robot.joints import UNITS, shown_unit
-from brachis.robot.limits import Limits
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
 from brachis.trajectory import Samples, Trajectory
@@ -22,6 +21,9 @@ MOST_CURVES = 10
 """Curves of a panel of ratios, no more."""
 BLACK = 48
 """Style of curves of the whole arm: a number that gives a solid black line in all figures."""
+
+Bound = np.ndarray | float
+"""A limit over time, (K,), or at all times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +46,8 @@ class Curve:
     name: str
     style: int
     values: np.ndarray
-    lower: np.ndarray | float = -np.inf
-    upper: np.ndarray | float = np.inf
+    lower: Bound = -np.inf
+    upper: Bound = np.inf
     centre: float = 0.0
 
     @property
@@ -58,7 +60,7 @@ class Curve:
         """Values over the limits of their directions, both from the centre, (K,); of a curve that has both."""
         away = self.values - self.centre
         above = self.upper - self.centre
-        return np.asarray(away / np.where(away > 0.0, above, self.centre - self.lower))
+        return away / np.where(away > 0.0, above, self.centre - self.lower)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +119,7 @@ class Panel:
         list of ((K,) ndarray, list of Curve)
             The limit over time, NaN where it is far away, and the curves that share it.
         """
-        reach = 0.3 * max(float(np.ptp(self.values)), 1e-9)
+        reach = 0.3 * max(np.ptp(self.values), 1e-9)
         found: dict[bytes, tuple[np.ndarray, list[Curve]]] = {}
         for curve in self.curves:
             lowest = curve.values.min() - reach
@@ -158,16 +160,14 @@ class Row:
         Title and symbol for prismatic joints if they differ.
     ratio_title : str
         Title of the values over their limits if it is not ``... / limit``.
-    ranges : callable or None
-        Of the robot's limits: lower and upper ends of ranges, (2, n), whose middle uses nothing of them.
+    is_range : bool
+        Whether the limits are the ends of ranges, whose middle uses nothing of them.
     only_if_limited : bool
         Whether the row is of interest only if the robot limits it.
     unit : str or None
         Unit of the values; None for joints, which have their own.
-    largest : callable or None
-        Of trajectory and samples: the largest values that the task allows, (K,).
-    smallest : callable or None
-        Takes the trajectory: the smallest value that the task allows.
+    bounds : callable or None
+        Of trajectory and samples: the smallest and the largest values that the task allows, each a number or (K,).
     name : str
         Name of the curve, where there is one.
     ends : (float or None, float or None)
@@ -178,19 +178,19 @@ class Row:
     symbol: str
     prismatic: tuple[str, str] | None = None
     ratio_title: str = ""
-    ranges: Callable[[Limits], np.ndarray] | None = None
+    is_range: bool = False
     only_if_limited: bool = False
     unit: str | None = None
-    largest: Callable[[Trajectory, Samples], np.ndarray | float] | None = None
-    smallest: Callable[[Trajectory], float] | None = None
+    bounds: Callable[[Trajectory, Samples], tuple[Bound, Bound]] | None = None
     name: str = "tool"
     ends: tuple[float | None, float | None] = (None, None)
 
 
-def _allowed_tool_speed(trajectory: Trajectory, samples: Samples) -> np.ndarray | float:
-    """Return the largest speed of the tool that the task allows, (K,), m/s; infinite without a limit."""
+def _bound_tool_speed(trajectory: Trajectory, samples: Samples) -> tuple[Bound, Bound]:
+    """Return no lower bound, and the largest speed of the tool that the task allows, (K,), m/s."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
-    return np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
+    largest = np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
+    return -np.inf, largest
 
 
 def _smallest_distances(trajectory: Trajectory, samples: Samples) -> np.ndarray:
@@ -206,7 +206,7 @@ PANELS = {
         lambda _, samples: samples.q,
         "$q$",
         ratio_title="position in its range",
-        ranges=lambda limits: np.array([limits.position_lower, limits.position_upper]),
+        is_range=True,
     ),
     "velocity": Row(lambda _, samples: samples.qdot, r"$\dot{q}$"),
     "acceleration": Row(lambda _, samples: samples.qddot, r"$\ddot{q}$"),
@@ -225,14 +225,14 @@ PANELS = {
         lambda _, samples: samples.tool_speed,
         "tool speed",
         unit="m/s",
-        largest=_allowed_tool_speed,
+        bounds=_bound_tool_speed,
         ends=(0.0, None),
     ),
     "clearance": Row(
         _smallest_distances,
         "clearance",
         unit="m",
-        smallest=lambda trajectory: trajectory.task.collisions.clearance,
+        bounds=lambda trajectory, _: (trajectory.task.collisions.clearance, np.inf),
         name="closest pair",
     ),
 }
@@ -247,7 +247,7 @@ def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
         if row.unit is None
         and (
             not row.only_if_limited
-            or np.isfinite(_limits_of(trajectory.robot.limits, name)).any()
+            or np.isfinite(trajectory.robot.limits.both_ways(name)).any()
         )
     )
 
@@ -286,9 +286,8 @@ def panels_of(
             found += _joint_panels(trajectory, samples, name, degrees=degrees)
             continue
         values = row.values(trajectory, samples)
-        largest = row.largest(trajectory, samples) if row.largest else np.inf
-        smallest = row.smallest(trajectory) if row.smallest else -np.inf
-        curve = Curve(row.name, BLACK, values, smallest, largest)
+        bounds = row.bounds(trajectory, samples) if row.bounds else ()
+        curve = Curve(row.name, BLACK, values, *bounds)
         found.append(
             Panel(name, row.symbol, row.unit, samples.t, (curve,), ends=row.ends)
         )
@@ -301,9 +300,9 @@ def _joint_panels(
     """Make the panels of a row of joints, one for each unit."""
     row = PANELS[name]
     robot = trajectory.robot
-    lower, upper = _limits_of(robot.limits, name)
+    lower, upper = robot.limits.both_ways(name)
     middle = np.zeros(robot.n)
-    if row.ranges:
+    if row.is_range:
         is_range = np.isfinite(lower) & np.isfinite(upper)
         middle[is_range] = 0.5 * lower[is_range] + 0.5 * upper[is_range]
     columns = row.values(trajectory, samples).T
@@ -312,8 +311,7 @@ def _joint_panels(
         unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
         curves = []
         for joint in np.flatnonzero(is_shown).tolist():
-            values = (columns[joint], lower[joint], upper[joint], middle[joint])
-            scaled = (factor * each for each in values)
+            scaled = (factor * each[joint] for each in (columns, lower, upper, middle))
             curves.append(Curve(trajectory.joint_names[joint], joint, *scaled))
         if not curves:
             continue
@@ -323,12 +321,6 @@ def _joint_panels(
         ratio = row.ratio_title or f"{title} / limit"
         found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
     return found
-
-
-def _limits_of(limits: Limits, name: str) -> np.ndarray:
-    """Lower and upper limits of a row of joints, (2, n)."""
-    ranges = PANELS[name].ranges
-    return ranges(limits) if ranges else limits.both_ways(name)
 
 
 def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, Curve]]:
@@ -361,17 +353,12 @@ def ratio_panel(
         nearest = np.abs(ratios.values[:, shown]).max(axis=0)
         shown = np.array(shown)[np.argsort(-nearest)[:MOST_CURVES]].tolist()
     values = ratios.values[:, shown]
-    is_signed = bool(values.min() < 0.0)
-    curves = [
-        Curve(
-            subjects[k],
-            order.index(subjects[k]),
-            ratios.values[:, k],
-            -1.0 if is_signed else -np.inf,
-            1.0,
-        )
-        for k in shown
-    ]
+    is_signed = values.min() < 0.0
+    lower = -1.0 if is_signed else -np.inf
+    curves = []
+    for k, column in zip(shown, values.T, strict=True):
+        number = order.index(subjects[k])
+        curves.append(Curve(subjects[k], number, column, lower, 1.0))
     curves.sort(key=lambda curve: curve.style)
     title = ", ".join(titles)
     top = 1.15 * max(1.0, float(np.abs(values).max()))
@@ -385,6 +372,12 @@ def ratio_panel(
         is_ratio=True,
         ends=(-top if is_signed else -0.05 * top, top),
     )
+
+
+def at_distinct_times(ratios: LimitRatios) -> LimitRatios:
+    """Leave out the values before jumps, whose times occur twice."""
+    is_last = np.append(np.diff(ratios.t) > 0.0, True)
+    return replace(ratios, t=ratios.t[is_last], values=ratios.values[is_last])
 
 
 def torque_panels(

@@ -26,7 +26,7 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     They go through the base, every joint before and after its motion (one point if it is revolute) and the tool.
     """
     model = robot.model
-    base = int(model.getFrameId(robot.base_frame))
+    base = model.getFrameId(robot.base_frame)
     bones = np.empty((len(q), 2 * robot.n + 2, 3))
     for points, data in zip(bones, robot.place_joints(q), strict=True):
         points[0] = model.frames[base].placement.translation
@@ -95,28 +95,26 @@ def plot_postures(trajectory: Trajectory) -> Figure:
         Later postures are darker. Squares are prismatic joints, filled markers redundant ones.
     """
     figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
-    ax = draw_postures(figure, trajectory, dense_samples(trajectory))
+    place = figure.add_gridspec()[0]
+    ax = draw_postures(figure, trajectory, dense_samples(trajectory), place)
     legend_postures(ax, trajectory, style.COLUMN_WIDTH - 5.0)
     return figure
 
 
 def draw_postures(
-    figure: Figure,
-    trajectory: Trajectory,
-    samples: Samples,
-    place: SubplotSpec | None = None,
+    figure: Figure, trajectory: Trajectory, samples: Samples, place: SubplotSpec
 ) -> Axes:
     """Draw tool path and postures into new axes that suit the robot: in its plane, or in space."""
     plane = plane_of(trajectory)
     in_space = {} if plane else {"projection": "3d", "computed_zorder": False}
-    ax: Any = figure.add_subplot(*([place] if place else []), **in_space)
+    ax: Any = figure.add_subplot(place, **in_space)
     view = list(plane or (0, 1, 2))
     tool = samples.tool_position[:, view]
     times = np.linspace(0.0, trajectory.t_end, len(_SHADES))
-    postures = skeleton(trajectory.robot, trajectory.position(times))
+    postures = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
     for k, (bones, shade) in enumerate(zip(postures, _SHADES, strict=True)):
         ax.plot(
-            *bones[:, view].T,
+            *bones.T,
             color=shade,
             linewidth=2.2 if k in {0, len(_SHADES) - 1} else 1.0,
             solid_capstyle="round",
@@ -127,7 +125,7 @@ def draw_postures(
         for joint, name in enumerate(trajectory.joint_names):
             is_redundant = name in trajectory.redundant_joints
             ax.plot(
-                *bones[2 * joint + 2, view][:, None],
+                *bones[2 * joint + 2, :, None],
                 marker="o" if trajectory.robot.revolute[joint] else "s",
                 markeredgecolor=shade,
                 markerfacecolor=_REDUNDANT if is_redundant else "white",
@@ -137,7 +135,7 @@ def draw_postures(
     ax.plot(*tool.T, zorder=20.0, gid="tool path", **_PATH)
     ax.plot(*tool[-1:].T, "o", color=_PATH["color"], markersize=3.0, zorder=21.0)
     ground = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
-    base = postures[0, :1, view]
+    base = postures[0, :1].T
     ax.plot(*base, marker=ground, color=style.GREY, markersize=12.0, zorder=0.5)
     style.dress(ax, *(f"${'xyz'[axis]}$ (m)" for axis in view[:2]))
     if plane is None:
@@ -181,7 +179,7 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     """
     from matplotlib.ticker import MaxNLocator
 
-    floor = min(0.0, float(points[:, 2].min()))
+    floor = min(0.0, points[:, 2].min())
     shadow = {"color": "#C8C8C8", "zorder": 1.0, "gid": "shadow"}
     ax.plot(*tool[:, :2].T, np.full(len(tool), floor), linewidth=1.4, **shadow)
     ax.set_zlabel("$z$ (m)", fontsize=style.LABEL_SIZE, labelpad=-4.0)
@@ -196,8 +194,8 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     def look_from(elevation: float, azimuth: float) -> tuple[float, float]:
         """Turn the axes; return how much of the frame points take if the box fits into it, and what the box takes."""
         ax.view_init(elevation, azimuth)
-        extent = float(_spans(ax, corners).max())
-        return float(np.prod(_spans(ax, points))) / extent**2, extent
+        extent = _spans(ax, corners).max()
+        return np.prod(_spans(ax, points)) / extent**2, extent
 
     best = max(_VIEWS, key=lambda view: look_from(*view)[0])
     _, extent = look_from(*best)

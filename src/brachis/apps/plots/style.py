@@ -55,18 +55,14 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     import matplotlib as mpl
 
     suffix = check_suffix(path)
-    content = io.BytesIO()  # first, so that only errors of writing are reported as such
     fonts: dict[Any, Any] = {
         "pdf.fonttype": 42,
         "svg.fonttype": "none",
         "svg.hashsalt": "brachis",
     }
-    with mpl.rc_context(
-        fonts
-    ):  # these three have no other way in; the context puts them back
-        figure.savefig(content, format=suffix, dpi=_DPI, metadata=_METADATA[suffix])
-    with atomic_write(path) as stream:
-        stream.write(content.getvalue())
+    # These three have no other way in; the context puts them back.
+    with mpl.rc_context(fonts), atomic_write(path) as stream:
+        figure.savefig(stream, format=suffix, dpi=_DPI, metadata=_METADATA[suffix])
 
 
 def check_suffix(path: str | os.PathLike[str]) -> str:
@@ -193,13 +189,6 @@ def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
         spine.set_linewidth(0.6)
 
 
-def dress_time(ax: Axes, t_end: float, knots: np.ndarray) -> None:
-    """Let the time axis run from start to end, with the knots (s) as faint ticks inside the lower edge."""
-    ax.set_xlim(0.0, t_end)
-    ax.set_xticks(knots[(knots > 0.0) & (knots < t_end)], minor=True)
-    ax.tick_params(axis="x", which="minor", length=2.0, color="#A0A0A0", width=0.5)
-
-
 def mark_phases(ax: Axes, phases: Sequence[MotionPhase], *, labels: bool) -> None:
     """Draw a line where phases meet; with `labels`, write what they are, if there is room."""
     for phase in phases[:-1]:
@@ -245,9 +234,16 @@ def legend_above(
         What the legend shows; by default the labelled artists of the axes.
     """
     lines = lines_by_label([ax]) if lines is None else lines
-    look = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     if lines:
-        _add_legend(ax, width, lines, borderaxespad=0.2, borderpad=0.2, **look)
+        _add_legend(
+            ax,
+            width,
+            lines,
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            borderaxespad=0.2,
+            borderpad=0.2,
+        )
 
 
 def legend_below(figure: Figure, lines: Mapping[str, Artist]) -> None:

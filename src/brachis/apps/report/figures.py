@@ -12,6 +12,7 @@ from brachis.apps.plots import style
 from brachis.apps.plots.panels import (
     Curve,
     Panel,
+    at_distinct_times,
     curves_of,
     joint_rows_of,
     panels_of,
@@ -112,20 +113,18 @@ def _traces(
 
 def timeline_figure(motion: ReportedMotion) -> Figure:
     """Draw how near the motion is to every limit over time, a row each: blue, orange where active, red beyond it."""
-    ratios = motion.ratios
+    ratios = at_distinct_times(motion.ratios)
     columns = {label: column for column, label in enumerate(ratios.labels)}
     entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
-    is_last = np.append(np.diff(ratios.t) > 0.0, True)
-    t = ratios.t[is_last]
     shown = [columns[entry.label] for entry in entries]
-    part = np.abs(ratios.values[is_last][:, shown].T)
+    part = np.abs(ratios.values[:, shown].T)
     colours = part.copy()
     for row, entry in zip(colours, entries, strict=True):
         for active in entry.active:  # ripple included
-            inside = (t >= active.begin) & (t <= active.end)
+            inside = (ratios.t >= active.begin) & (ratios.t <= active.end)
             row[inside] = np.maximum(row[inside], THRESHOLD)
     heat = {
-        "x": encode(t),
+        "x": encode(ratios.t),
         "y": [str(entry.label) for entry in entries],
         "z": encode(colours),
         "customdata": encode(100.0 * part),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from brachis.apps import bottleneck
 from brachis.apps.bottleneck.report import write_active
@@ -21,11 +21,9 @@ from brachis.limits import Limit, describe_guarantees, limits_of
 from brachis.optimise.candidate import Candidate
 from brachis.problem.plausibility import of_robot, of_task
 from brachis.robot.plausibility import Issue
+from brachis.search.planned import PlannedMotion
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
-
-if TYPE_CHECKING:
-    from brachis.search.planned import PlannedMotion
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from brachis.apps.export.rows import require_library
 from brachis.apps.plots import as_html, plot_candidates, plot_fit, plot_overview
@@ -20,10 +20,8 @@ from brachis.apps.report import tables
 from brachis.apps.report.figures import motion_figure, scene, timeline_figure
 from brachis.apps.report.motion import ReportedMotion, reported_motion
 from brachis.common.files import atomic_write, check_suffix
+from brachis.search.planned import PlannedMotion
 from brachis.trajectory import PHASE_COLUMNS, Trajectory
-
-if TYPE_CHECKING:
-    from brachis.search.planned import PlannedMotion
 
 
 @dataclass(frozen=True, repr=False)

@@ -78,10 +78,10 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     samples = motion.samples
     verification = motion.verification
     boundary = trajectory.task.boundary
-    joints = coordinates(trajectory.redundant_joints, trajectory.branch)
     branch = trajectory.branch
+    joints = coordinates(trajectory.redundant_joints, branch)
     named = {} if branch in {"", joints} else {"branch": branch}
-    fastest = int(np.argmax(samples.tool_speed))
+    fastest = np.argmax(samples.tool_speed)
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
         first, last = samples.tool_speed[[0, -1]]
@@ -109,7 +109,7 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
     if trajectory.recovered is not None:
         source["recovered from"] = _file_name(trajectory.recovered.source)
     steps = np.diff(motion.samples.tool_position, axis=0)
-    length = float(np.linalg.norm(steps, axis=1).sum())
+    length = np.linalg.norm(steps, axis=1).sum()
     space = task.task_space
     rows = space if isinstance(space, str) else ", ".join(space)
     texts = {"URDF": trajectory.urdf, "task as it stands below": task_text(task)}
@@ -147,7 +147,7 @@ def _entry(key: str, value: object) -> str:
     nested = (list, tuple, dict)
     if isinstance(value, float):
         shown = f"{value:.4g}"
-    elif not isinstance(value, list | tuple | dict):
+    elif not isinstance(value, nested):
         shown = _file_name(str(value))
     elif len(value) > _LISTED or any(isinstance(each, nested) for each in value):
         shown = f"{len(value)} entries"
@@ -159,7 +159,7 @@ def _entry(key: str, value: object) -> str:
 
 def task_text(task: Task) -> str:
     """Write a task as YAML; of files without their folders, which say nothing to another reader."""
-    return str(yaml.safe_dump(_without_folders(task.to_dict()), sort_keys=False))
+    return yaml.safe_dump(_without_folders(task.to_dict()), sort_keys=False)
 
 
 def _without_folders(value: Any) -> Any:

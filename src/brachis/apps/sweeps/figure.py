@@ -53,14 +53,10 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
             found=len(keys),
             allowed="1 or 2 keys that vary",
         )
-    cells: dict[tuple[Any, ...], float] = {}
-    for row in rows:
-        cell = tuple(row[key] for key in keys)
-        t_end = row["t_end_s"] if row["status"] == VERIFIED else math.inf
-        cells[cell] = min(t_end, cells.get(cell, math.inf))
+    cells = _find_fastest(rows, keys)
     times = np.array([*cells.values()])
-    is_verified = np.isfinite(times)
-    if not is_verified.any():
+    is_missing = np.isnan(times)
+    if is_missing.all():
         raise InputError(
             "no plan is verified, so the figure would be empty",
             where="plans",
@@ -81,42 +77,39 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     figure = style.new_figure(width, height)
     ax = figure.add_subplot()
     x = places[0]
-    shown = np.where(is_verified, times, np.nan)
     if is_line:
-        y = np.full(len(x), times[is_verified].max())
-        order = np.argsort(x)
-        look = style.joint_style(0)
-        look["linestyle"] = "-" if _are_numbers(values[0]) else "none"
-        ax.plot(x[order], shown[order], marker="o", markersize=3.0, **look)
+        y = np.full(len(x), np.nanmax(times))
+        _draw_line(ax, x, times, is_joined=_are_numbers(values[0]))
         style.dress(ax, _title(keys[0]), _END_TIME)
     else:
         y = places[1]
         if is_heat_map:
-            image = _draw_heat_map(ax, x, y, shown)
+            image = _draw_heat_map(ax, x, y, times)
         else:
             image = ax.scatter(
-                x, y, c=shown, cmap=_COLOURS, s=14.0, plotnonfinite=False
+                x, y, c=times, cmap=_COLOURS, s=14.0, plotnonfinite=False
             )
-        style.dress(ax, _title(keys[0]), _title(keys[1]))
         style.dress(figure.colorbar(image, ax=ax).ax, "", _END_TIME)
-    if not is_verified.all():
-        ax.scatter(
-            x[~is_verified],
-            y[~is_verified],
-            marker="x",
-            color=style.COLOURS[1],
-            s=18.0,
-            linewidths=0.8,
-            label="no verified plan",
-            zorder=3.0,
-        )
-        style.legend_above(ax, style.COLUMN_WIDTH)
-    for axis, distinct in zip("xy", values, strict=False):
+        style.dress(ax, _title(keys[0]), _title(keys[1]))
+    if is_missing.any():
+        _draw_crosses(ax, x[is_missing], y[is_missing])
+    for axis, distinct in zip((ax.xaxis, ax.yaxis), values, strict=False):
         if is_heat_map or not _are_numbers(distinct):
             ticks = range(0, len(distinct), math.ceil(len(distinct) / _MOST_TICKS))
-            names = [_write_value(distinct[tick]) for tick in ticks]
-            ax.set(**{f"{axis}ticks": list(ticks), f"{axis}ticklabels": names})
+            axis.set_ticks(ticks, [_write_value(distinct[tick]) for tick in ticks])
     return figure
+
+
+def _find_fastest(
+    rows: Sequence[Mapping[str, Any]], keys: Sequence[str]
+) -> dict[tuple[Any, ...], float]:
+    """Find the least time for each combination of the keys' values, s; NaN where no plan is verified."""
+    cells: dict[tuple[Any, ...], float] = {}
+    for row in rows:
+        cell = tuple(row[key] for key in keys)
+        t_end = row["t_end_s"] if row["status"] == VERIFIED else math.nan
+        cells[cell] = np.fmin(t_end, cells.get(cell, math.nan))
+    return cells
 
 
 def _places(
@@ -140,6 +133,15 @@ def _are_numbers(values: Sequence[Any]) -> bool:
         isinstance(value, int | float) and not isinstance(value, bool)
         for value in values
     )
+
+
+def _draw_line(ax: Axes, x: np.ndarray, times: np.ndarray, *, is_joined: bool) -> None:
+    """Draw times over numbers as a line, or over names as points alone."""
+    order = np.argsort(x)
+    look = style.joint_style(0)
+    if not is_joined:
+        look["linestyle"] = "none"
+    ax.plot(x[order], times[order], marker="o", markersize=3.0, **look)
 
 
 def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
@@ -167,6 +169,21 @@ def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) ->
                 fontsize=style.TICK_SIZE,
             )
     return image
+
+
+def _draw_crosses(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
+    """Mark where no plan is verified."""
+    ax.scatter(
+        x,
+        y,
+        marker="x",
+        color=style.COLOURS[1],
+        s=18.0,
+        linewidths=0.8,
+        label="no verified plan",
+        zorder=3.0,
+    )
+    style.legend_above(ax, style.COLUMN_WIDTH)
 
 
 def _title(key: str) -> str:

@@ -222,6 +222,7 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
     unknown: dict[str, BrachisError | None] = {}
 
     def find_error(plan: Plan | BrachisError) -> BrachisError | None:
+        """Return why a task is refused, or a name that its robot does not have."""
         if isinstance(plan, BrachisError):
             return plan
         if plan.digest not in unknown:

@@ -221,6 +221,7 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
     processes = executor()
 
     def submit(plan: Plan) -> Future[Outcome]:
+        """Hand out a plan, to new processes if the old ones ended."""
         nonlocal processes
         with interrupts.block_in_children():  # this may start processes
             try:
@@ -240,6 +241,7 @@ def _end_with_parent(parent: int) -> None:
     """End this worker process soon after its parent: a parent that was killed cannot end its workers."""
 
     def watch() -> None:
+        """Wait for the end of the parent."""
         while os.getppid() == parent:
             time.sleep(HEARTBEAT)
         os._exit(1)

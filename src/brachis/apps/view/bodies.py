@@ -66,7 +66,7 @@ def link_shapes(
     unread = []
     absent = []
     room = _LARGEST
-    materials = [each for each in tree.robot if each.tag == "material"]
+    materials = tree.robot.findall("material")
     visuals = [
         (name, visual)
         for name, link in tree.links.items()
@@ -81,7 +81,8 @@ def link_shapes(
         try:
             for path in files.values():
                 room -= _check_size(Path(str(path)), room)
-            shapes.setdefault(name, []).extend(_meshes(name, visual, materials))
+            meshes = _meshes(name, visual, materials)
+            shapes.setdefault(name, []).extend(meshes)
         except InputError as error:
             unread.append(f"{name}: {error}")
         except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
@@ -93,8 +94,7 @@ def link_shapes(
         if absent[0].startswith("package://"):
             where = "; ROS_PACKAGE_PATH may name the folder of its package"
         unread.insert(0, f"{count} missing: {absent[0]}{more}{where}")
-    shown = {name: meshes for name, meshes in shapes.items() if meshes}
-    return shown, [reason[:500] for reason in unread]
+    return shapes, [reason[:500] for reason in unread]
 
 
 def _find_meshes(visual: Element, folder: Path) -> dict[str, Path | None]:
@@ -262,18 +262,18 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         links.setdefault(joint, []).extend(coloured)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     positions, quaternions = placements(robot, q)
-    size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
+    size = np.ptp(positions.reshape(-1, 3), axis=0).max()
     skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
-    fixed = [positions[:, 1:].reshape(-1, 3)]
-    moving = fixed.copy()
+    moving = [positions[:, 1:].reshape(-1, 3)]
+    still: list[np.ndarray] = []
     for joint, meshes in (links or skeleton).items():
         own = np.concatenate([trimesh.bounds.corners(mesh.bounds) for mesh in meshes])
         turns = Rotation.from_quat(quaternions[:, joint], scalar_first=True).as_matrix()
         corners = positions[:, joint, None] + own @ turns.transpose(0, 2, 1)
-        (moving if joint else fixed).append(corners.reshape(-1, 3))
+        (moving if joint else still).append(corners.reshape(-1, 3))
     box, moving_box = (
         np.array([points.min(axis=0), points.max(axis=0)])
-        for points in map(np.concatenate, (fixed + moving, moving))
+        for points in map(np.concatenate, (still + moving, moving))
     )
     return Bodies(links, skeleton, tuple(unread), box, moving_box)
 
@@ -289,6 +289,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
     drawn: Meshes = {}
 
     def draw(joint: int, mesh: trimesh.Trimesh, kind: str) -> None:
+        """Add a mesh in the colour of its kind to what a joint moves."""
         drawn.setdefault(joint, []).append(with_colour(mesh, _COLOURS[kind]))
 
     def draw_rod(
@@ -302,7 +303,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
     for joint in range(robot.n):
         placement = model.jointPlacements[joint + 1]
-        subspace = np.asarray(model.joints[joint + 1].createData().S).reshape(6, -1)
+        subspace = model.joints[joint + 1].createData().S.reshape(6, -1)
         axis = subspace[:3, 0] + subspace[3:, 0]  # one of them is zero
         draw_rod(joint, begin, placement.translation, 1.0, "bone")
         if robot.revolute[joint]:
@@ -321,9 +322,8 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
 def _range(trajectory: Trajectory, joint: int) -> np.ndarray:
     """Positions between which a prismatic joint can move, (2,), m; ends that it does not have are the motion's."""
-    limits = trajectory.robot.limits
     q = trajectory.q[:, joint]
-    ends = np.array([limits.position_lower[joint], limits.position_upper[joint]])
+    ends = trajectory.robot.limits.both_ways("position")[:, joint]
     return np.where(np.isfinite(ends), ends, [q.min(), q.max()])
 
 

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.apps.bottleneck.saturation import LimitRatios, limit_ratios
+from brachis.apps.bottleneck.saturation import limit_ratios
 from brachis.apps.plots import style
 from brachis.apps.plots.panels import (
     Panel,
+    at_distinct_times,
     panels_of,
     ratio_panel,
     titles_of,
@@ -54,10 +55,8 @@ def shown_panels(
     degrees : bool, optional
         Whether angles of joints without limits are in degrees.
     """
-    ratios = limit_ratios(trajectory)
-    is_last = np.append(np.diff(ratios.t) > 0.0, True)  # times of jumps occur twice
-    once = LimitRatios(ratios.t[is_last], ratios.labels, ratios.values[is_last])
-    found = [ratio_panel(trajectory, once, title) for title in titles_of(once)]
+    ratios = at_distinct_times(limit_ratios(trajectory))
+    found = [ratio_panel(trajectory, ratios, title) for title in titles_of(ratios)]
     rows = ("torque", "velocity", "position")
     for panel in panels_of(trajectory, samples, *rows, degrees=degrees):
         free = tuple(curve for curve in panel.curves if not curve.is_limited)
@@ -77,7 +76,7 @@ class Chart:
     """
 
     def __init__(self, gui: viser.GuiApi, panel: Panel) -> None:
-        self._t_end = float(panel.t[-1])
+        self._t_end = panel.t[-1]
         data = [panel.t]
         series: list[uplot.Series] = [{"label": "time (s)"}]
         for limit, _ in panel.near_limits():
@@ -276,7 +275,7 @@ class Controls:
         self._add_controls()
         colours = speed_colours(np.linspace(0.0, 1.0, 9)).tolist()
         stops = [f"rgb{tuple(colour)}" for colour in colours]
-        fastest = float(scene.samples.tool_speed.max())
+        fastest = scene.samples.tool_speed.max()
         self._gui.add_html(tables.speed_legend(stops, fastest))
         self._state = self._gui.add_html("")
         self._gui.add_html(tables.phases_table(trajectory))

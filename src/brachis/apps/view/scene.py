@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     Layer = list[viser.SceneNodeHandle]
 
-_RED = (200, 30, 30)
-"""Colour of the line between the closest bodies."""
 LAYERS = (
     "robot",
     "skeleton",
@@ -107,15 +105,9 @@ class Scene:
 
     def _draw_closest(self) -> None:
         """Draw the line between the closest bodies, and a label."""
-        line = self._api.add_line_segments(
-            "/closest/line",
-            np.zeros((1, 2, 3)),
-            _RED,
-            thickness=3.0,
-            thickness_units="screen",
-        )
-        label = self._api.add_label("/closest/label", "")
-        self.layers["closest pair"] += [line, label]
+        layer = "closest pair"
+        self._draw_line(layer, "/closest/line", np.zeros((2, 3)), (200, 30, 30), 3.0)
+        self.layers[layer].append(self._api.add_label("/closest/label", ""))
 
     def _show_closest(self, q: np.ndarray) -> None:
         """Move the line to the closest bodies in a posture, (n,), and write their distance."""
@@ -146,7 +138,7 @@ class Scene:
         layers = {"robot": self.bodies.links, "skeleton": self.bodies.skeleton}
         for layer, bodies in layers.items():
             for joint, meshes in bodies.items():
-                asset = trimesh.Scene(list(meshes)).export(file_type="glb")
+                asset = trimesh.Scene(meshes).export(file_type="glb")
                 handle = self._api.add_glb(f"/joint {joint}/{layer}", asset)
                 self.layers[layer].append(handle)
 
@@ -196,7 +188,7 @@ class Scene:
     def _draw_trace(self) -> None:
         """Draw the way of the tool in 32 colours of its speed; viser shows colours of single points too light."""
         speed = self.samples.tool_speed
-        parts = 0.5 * (speed[:-1] + speed[1:]) / max(float(speed.max()), 1e-9)
+        parts = 0.5 * (speed[:-1] + speed[1:]) / max(speed.max(), 1e-9)
         shades = np.round(31.0 * parts).astype(int)
         colours = speed_colours(np.linspace(0.0, 1.0, 32))
         points = self.samples.tool_position
@@ -269,4 +261,4 @@ def speed_colours(parts: np.ndarray) -> np.ndarray:
     """Colours (K, 3) from 0 to 255 of speeds (K,) as parts of the largest one: Matplotlib's plasma but its pale end."""
     from matplotlib import colormaps
 
-    return np.asarray(colormaps["plasma"](0.88 * parts, bytes=True)[:, :3])
+    return colormaps["plasma"](0.88 * parts, bytes=True)[:, :3]

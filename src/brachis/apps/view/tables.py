@@ -12,8 +12,6 @@ from brachis.apps.plots.panels import curves_of, panels_of
 from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import PHASE_COLUMNS, Samples, Trajectory, phase_rows
 
-_MANY = 60
-"""Candidates that are listed."""
 _CELL = "padding:0 0.35em;white-space:nowrap"
 _WRAPPED = "padding:0 0.35em 0.2em 0;vertical-align:top;overflow-wrap:anywhere"
 _STATE = {"position": 3, "velocity": 3, "torque": 2}
@@ -38,7 +36,7 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     ]
     phases = trajectory.phases
     if len(phases) > 1:
-        number = int(np.searchsorted(trajectory.phase_ends[:-1], now.t[0], "right"))
+        number = np.searchsorted(trajectory.phase_ends[:-1], now.t[0], "right")
         lines.append(f"phase {number + 1} of {len(phases)}: {phases[number].kind}")
     head = _paragraph(*lines)
     panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
@@ -68,10 +66,10 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
         return _paragraph(
             "The candidates of the search are not known: they are in result.json, in the folder of result.npz."
         )
-    rows = candidate_rows(candidates)
-    left = len(candidates) - len(rows[:_MANY])
+    rows = candidate_rows(candidates)[:60]
+    left = len(candidates) - len(rows)
     note = _paragraph(f"{left} more, slower or the same motion again") if left else ""
-    return _table((*WORDS, *TIMES, STATUS), rows[:_MANY], cell=_WRAPPED) + note
+    return _table((*WORDS, *TIMES, STATUS), rows, cell=_WRAPPED) + note
 
 
 def speed_legend(stops: Sequence[str], fastest: float) -> str:

@@ -211,7 +211,7 @@ def view(
         host=host,
         port=port,
     )
-    print(f"the motion is shown at {viewer.url}", file=sys.stderr)  # noqa: T201
+    sys.stderr.write(f"the motion is shown at {viewer.url}\n")
     if block if block is not None else not hasattr(sys, "ps1"):
         viewer.wait()
     return viewer
