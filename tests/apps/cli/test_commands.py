@@ -122,6 +122,19 @@ def no_space(path):
     )
 
 
+def test_without_figures_none_is_drawn_and_older_ones_go(
+    run, task, write, planned, tmp_path, monkeypatch
+):
+    out = planned.copied(tmp_path / "out")
+    assert list(out.glob("*.png"))
+    monkeypatch.delattr(plots, "save_figure")
+    task["spline"]["intervals"] = 10
+    outcome = run("plan", write(task), "--out", out, "--no-figures", "--json")
+    assert outcome.code == 0
+    assert sorted(path.name for path in out.iterdir()) == ["result.json", "result.npz"]
+    assert len(json.loads(outcome.out)["files"]) == 2
+
+
 def test_a_result_survives_a_full_disk_while_figures_are_written(
     run, task, write, planned, tmp_path, monkeypatch
 ):
