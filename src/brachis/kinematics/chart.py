@@ -72,7 +72,7 @@ class ChartRows:
         spline = make_interp_spline(
             s, np.concatenate([rows, offset[:, :, None]], axis=2), k=DEGREE
         )
-        return cls(np.asarray(spline.c), np.asarray(spline.t))
+        return cls(spline.c, spline.t)
 
     @classmethod
     def of_arrays(cls, coefficients: np.ndarray, knots: np.ndarray) -> ChartRows:
@@ -162,16 +162,13 @@ class ChartMap(PathMap):
     ) -> None:
         from scipy.interpolate import make_interp_spline
 
-        robot = task_map.robot
-        self.robot = robot
-        self.task_map = task_map
-        self.path = path
+        super().__init__(task_map, path, reference[0])
+        names = self.robot.joint_names
         self.rows = rows
         self.r = rows.r
-        self.redundant_joints = tuple(robot.joint_names[i] for i in rows.selected)
+        self.redundant_joints = tuple(names[i] for i in rows.selected)
         self.s = s
         self.reference = reference
-        self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
         augmented = self._augmented_at(s, reference)
         inverse = np.linalg.pinv(augmented, rcond=_SINGULAR)  # not regular throughout
@@ -180,7 +177,6 @@ class ChartMap(PathMap):
         self._lines = make_interp_spline(
             s, np.concatenate([reference, sigma, self_motion], axis=1), k=1
         )
-        self.sample_at = LastCall(path.sample)
         self._rows_at = LastCall(rows.at)
         self._reference_at = LastCall(self._between)
         even = np.linspace(0.0, 1.0, 33)
@@ -338,7 +334,7 @@ def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
     """
     if not null.shape[2]:
         return np.full(len(null), np.inf)
-    return np.asarray(np.linalg.svd(rows @ null, compute_uv=False)[:, -1])
+    return np.linalg.svd(rows @ null, compute_uv=False)[:, -1]
 
 
 def moving_most(null: np.ndarray) -> np.ndarray:

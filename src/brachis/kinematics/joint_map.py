@@ -83,7 +83,7 @@ class JointState(SharedTorques):
     def qdddot(self) -> np.ndarray:
         """Jerk of all joints, (K, n)."""
         exact = self.derivatives
-        return np.asarray(
+        return (
             apply_each(exact.qddot_y, self.ydot)
             + apply_each(exact.qddot_ydot, self.yddot)
             + apply_each(self.gradient, self.ydddot)
