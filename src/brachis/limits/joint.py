@@ -102,7 +102,7 @@ class JointLimit(Limit):
     @property
     def centre(self) -> np.ndarray:
         """Value at which the quantity is zero."""
-        return np.asarray(-self._middle * self._scale)
+        return -self._middle * self._scale
 
     @classmethod
     def build(cls, robot: Robot, _task: Task | None = None) -> Self | None:
@@ -116,20 +116,9 @@ class JointLimit(Limit):
     def quantity(self, motion: JointStates) -> np.ndarray:
         """Quantity of all joints, (K, n), in SI units."""
 
-    @abstractmethod
-    def quantity_partials(self, motion: JointStates) -> Partials:
-        """Differentiate `quantity`, (K, n, n) each."""
-
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._normalise(self.quantity(motion))
-
-    def partials(self, motion: JointStates) -> Partials:
-        return self.quantity_partials(motion).map(self._scale_rows)
-
-    def _normalise(self, quantity: np.ndarray) -> np.ndarray:
-        """Values, (K, c), from a quantity of all joints, (K, n)."""
-        own = self._of_joints(quantity)
-        return np.asarray((own - self._middle) * self._scale)
+        own = self._of_joints(self.quantity(motion))
+        return (own - self._middle) * self._scale
 
     def _of_joints(self, every: np.ndarray) -> np.ndarray:
         """Rows of the limited joints, (K, c, ...), from those of all joints, (K, n, ...)."""
@@ -137,7 +126,7 @@ class JointLimit(Limit):
 
     def _scale_rows(self, slopes: np.ndarray) -> np.ndarray:
         """Turn into derivatives of the values, (K, c, n), those of the quantity, (K, n, n)."""
-        return np.asarray(self._of_joints(slopes) * self._scale[:, None])
+        return self._of_joints(slopes) * self._scale[:, None]
 
 
 class _DerivativeLimit(JointLimit):
@@ -147,12 +136,7 @@ class _DerivativeLimit(JointLimit):
     """Name of the quantity in `JointStates` and in `Partials`."""
 
     def quantity(self, motion: JointStates) -> np.ndarray:
-        return np.asarray(getattr(motion, self.derivative))
-
-    def quantity_partials(self, motion: JointStates) -> Partials:
-        n = self._robot.n
-        by_itself = np.broadcast_to(np.eye(n), (len(motion.q), n, n))
-        return Partials(**{self.derivative: by_itself})
+        return getattr(motion, self.derivative)
 
     def partials(self, motion: JointStates) -> Partials:
         return Partials(**{self.derivative: self._rows(len(motion.q))})
@@ -231,7 +215,18 @@ class JerkLimit(_DerivativeLimit):
     order = 3
 
 
-class _TorqueLimit(JointLimit):
+class _DynamicLimit(JointLimit):
+    """A quantity of the joints that depends on several derivatives of their positions."""
+
+    @abstractmethod
+    def quantity_partials(self, motion: JointStates) -> Partials:
+        """Differentiate `quantity`, (K, n, n) each."""
+
+    def partials(self, motion: JointStates) -> Partials:
+        return self.quantity_partials(motion).map(self._scale_rows)
+
+
+class _TorqueLimit(_DynamicLimit):
     """A function of the joint torques within its limits."""
 
     def quantity(self, motion: JointStates) -> np.ndarray:
@@ -253,7 +248,7 @@ class TorqueLimit(_TorqueLimit, HasLatticeWeights):
         return self._scale_rows(dynamics.mass_matrices(self._robot, q)), None
 
 
-class TorqueRateLimit(JointLimit):
+class TorqueRateLimit(_DynamicLimit):
     """Rates of joint torques within their limits."""
 
     kind = "torque_rate"
@@ -266,9 +261,7 @@ class TorqueRateLimit(JointLimit):
             (exact.qdot, motion.qddot),
             (exact.qddot, motion.qdddot),
         )
-        return np.asarray(
-            sum(np.einsum("kij,kj->ki", slope, rate) for slope, rate in pairs)
-        )
+        return sum(np.einsum("kij,kj->ki", slope, rate) for slope, rate in pairs)
 
     def quantity_partials(self, motion: JointStates) -> Partials:
         exact = motion.torque_derivatives(self._robot)
@@ -297,7 +290,7 @@ def power_partials(robot: Robot, motion: JointStates) -> Partials:
     return Partials(exact.q * rate, by_qdot, exact.qddot * rate)
 
 
-class PowerLimit(JointLimit):
+class PowerLimit(_DynamicLimit):
     """Mechanical power of every joint within its limit."""
 
     kind = "power"
@@ -332,11 +325,11 @@ class RmsTorqueLimit(_TorqueLimit):
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """Measure the root mean square itself."""
-        return np.asarray(np.sqrt(np.maximum(values, 0.0)) - np.sqrt(self.upper))
+        return np.sqrt(np.maximum(values, 0.0)) - np.sqrt(self.upper)
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """Measure the root mean square itself."""
-        return np.asarray(np.sqrt(np.maximum(values, 0.0) / self.upper))
+        return np.sqrt(np.maximum(values, 0.0) / self.upper)
 
 
 JOINT_LIMITS = {

@@ -274,7 +274,7 @@ class Description:
     def centre(self) -> np.ndarray:
         """Value, (c,), that uses nothing of the limit; by default the middle between two finite bounds."""
         with np.errstate(invalid="ignore"):  # -inf + inf
-            return np.asarray(0.5 * self.lower + 0.5 * self.upper)
+            return 0.5 * self.lower + 0.5 * self.upper
 
     @cached_property
     def bounds(self) -> tuple[Bound, ...]:
@@ -345,7 +345,7 @@ class Limit(Description, ABC):
     def violation(self, values: np.ndarray) -> np.ndarray:
         """How far values, (K, c), are beyond their bounds; negative inside. See the module."""
         beyond = np.maximum(values - self.upper, self.lower - values)
-        return np.asarray(beyond * self.violation_scale)
+        return beyond * self.violation_scale
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """How near values, (K, c), are to their bounds; see the module."""

@@ -31,7 +31,7 @@ from brachis.task import Task
 
 def _along(direction: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """Differentiate sizes, (K, n): from directions, (K, 3), and the derivatives of the vectors, (K, 3, n)."""
-    return np.asarray(np.einsum("ki,kij->kj", direction, slopes))
+    return np.einsum("ki,kij->kj", direction, slopes)
 
 
 def _direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -62,13 +62,9 @@ class ToolSpeed:
 
     def speed(self, motion: JointStates) -> np.ndarray:
         """Speeds at K moments, (K,)."""
-        return self.slope(motion.q, motion.qdot)
-
-    def slope(self, q: np.ndarray, q_ds: np.ndarray) -> np.ndarray:
-        """Distance or angle per unit of the path, (S,), from postures and their derivatives."""
-        jacobian = self._jacobian(self._tool.twists(q))
-        velocity = np.einsum("kij,kj->ki", jacobian, q_ds)
-        return np.asarray(np.linalg.norm(velocity, axis=1))
+        jacobian = self._jacobian(self._tool.twists(motion.q))
+        velocity = np.einsum("kij,kj->ki", jacobian, motion.qdot)
+        return np.linalg.norm(velocity, axis=1)
 
     def _jacobian(self, twists: np.ndarray) -> np.ndarray:
         return self._tool.jacobian(twists)[:, self._rows] * self._moves
@@ -85,8 +81,8 @@ class ToolSpeed:
         return speed, _along(direction, by_q), _along(direction, jacobian)
 
 
-class _ToolLimit(Limit):
-    """Ratios of what the tool does to its limits.
+class ToolRatios(Limit):
+    """Ratios of what the tool does to its limits, at most 1.
 
     Parameters
     ----------
@@ -96,7 +92,6 @@ class _ToolLimit(Limit):
     """
 
     role = Role.PROCESS
-    longer_time = "relieves"
 
     def __init__(self, labels: Sequence[Label], figures: Sequence[float]) -> None:
         self.labels = tuple(labels)
@@ -108,7 +103,7 @@ class _ToolLimit(Limit):
         )
 
 
-class ToolAccelerationLimit(_ToolLimit):
+class ToolAccelerationLimit(ToolRatios):
     """Size of the acceleration of the tool frame's origin over its limit.
 
     Parameters
@@ -119,6 +114,7 @@ class ToolAccelerationLimit(_ToolLimit):
     """
 
     kind = "tool_acceleration"
+    longer_time = "relieves"
 
     def __init__(self, robot: Robot, figure: float) -> None:
         label = Label(
@@ -232,7 +228,7 @@ class SpeedTable:
         return np.where(is_free, np.inf, speeds), slopes[piece]
 
 
-class ToolSpeedLimit(_ToolLimit):
+class ToolSpeedLimit(ToolRatios):
     """Speed of the tool frame's origin over its limits.
 
     Parameters
@@ -244,6 +240,7 @@ class ToolSpeedLimit(_ToolLimit):
     """
 
     kind = "tool_speed"
+    longer_time = "relieves"
 
     def __init__(
         self, tool: ToolSpeed, tables: Sequence[SpeedTable], labels: Sequence[Label]
@@ -261,10 +258,7 @@ class ToolSpeedLimit(_ToolLimit):
         return np.column_stack(largest), np.column_stack(slopes)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._ratios(self._tool.speed(motion), motion.s)
-
-    def _ratios(self, speed: np.ndarray, s: np.ndarray) -> np.ndarray:
-        return np.asarray(speed[:, None] / self.largest_at(s)[0])
+        return self._tool.speed(motion)[:, None] / self.largest_at(motion.s)[0]
 
     def partials(self, motion: JointStates) -> Partials:
         largest, slope = self.largest_at(motion.s)
