@@ -19,11 +19,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.common.arrays import LastCall
+from brachis.common.arrays import LastCall, apply_each
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton
 from brachis.kernel import Conditions
-from brachis.kinematics.joint_map import apply_each
 from brachis.kinematics.path_map import PathMap, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -97,10 +96,12 @@ class ChartRows:
     def selected(self) -> tuple[int, ...]:
         """The joints that the rows select, ascending; none where they are other rows than unit rows."""
         rows = self.coefficients[0, :, :-1]
-        unit = self.knots is None and bool(
-            np.all((rows == 0.0) | (rows == 1.0)) and np.all(rows.sum(axis=1) == 1.0)
+        is_unit = np.all((rows == 0.0) | (rows == 1.0)) and np.all(
+            rows.sum(axis=1) == 1.0
         )
-        return tuple(int(joint) for joint in np.argmax(rows, axis=1)) if unit else ()
+        if self.knots is not None or not is_unit:
+            return ()
+        return tuple(np.argmax(rows, axis=1).tolist())
 
     def _spline(self) -> BSpline:
         from scipy.interpolate import BSpline

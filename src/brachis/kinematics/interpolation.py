@@ -92,8 +92,7 @@ def interpolate(
     times = spread(breaks, steps)
     inherited = np.full(len(times) - 1, np.inf)
     for _ in range(8):
-        middle = 0.5 * (times[1:] + times[:-1])
-        merged = np.sort(np.concatenate([times, middle]))
+        merged = spread(times, 2)
         state = joint_map.state(*curves(merged), t=merged)
         before = state.qddot
         if jumps:
@@ -106,7 +105,7 @@ def interpolate(
         bad = (excess > 1.0) & ((excess > noise) | (excess < 0.5 * inherited))
         if not bad.any():
             break
-        times = np.union1d(times, middle[bad])
+        times = np.union1d(times, merged[1::2][bad])
         inherited = np.repeat(np.where(bad, excess, 0.0), 1 + bad)
     error = _POSITION_TOLERANCE * float(gaps[0].max())
     if error > 1e-9:

@@ -26,15 +26,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from brachis.common.arrays import rates
+from brachis.common.arrays import apply_each, rates
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
-
-
-def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Apply K matrices (K, i, j) to K vectors (K, j)."""
-    return np.einsum("kij,kj->ki", matrices, vectors)
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,11 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
 
-from brachis.common.arrays import rates
+from brachis.common.arrays import apply_each, rates
 from brachis.limits.protocol import (
     Bound,
     Guarantee,
@@ -143,12 +142,8 @@ class _DerivativeLimit(JointLimit):
 
     def _rows(self, count: int) -> np.ndarray:
         """Differentiate the values by the quantity, (K, c, n), at `count` moments."""
-        rows = self._rows_of_all
+        rows = np.eye(self._robot.n)[self._joints] * self._scale[:, None]
         return np.broadcast_to(rows, (count, *rows.shape))
-
-    @cached_property
-    def _rows_of_all(self) -> np.ndarray:
-        return np.eye(self._robot.n)[self._joints] * self._scale[:, None]
 
 
 def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -256,12 +251,11 @@ class TorqueRateLimit(_DynamicLimit):
 
     def quantity(self, motion: JointStates) -> np.ndarray:
         exact = motion.torque_derivatives(self._robot)
-        pairs = (
-            (exact.q, motion.qdot),
-            (exact.qdot, motion.qddot),
-            (exact.qddot, motion.qdddot),
+        return (
+            apply_each(exact.q, motion.qdot)
+            + apply_each(exact.qdot, motion.qddot)
+            + apply_each(exact.qddot, motion.qdddot)
         )
-        return sum(np.einsum("kij,kj->ki", slope, rate) for slope, rate in pairs)
 
     def quantity_partials(self, motion: JointStates) -> Partials:
         exact = motion.torque_derivatives(self._robot)

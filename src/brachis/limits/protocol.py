@@ -305,7 +305,6 @@ class Limit(Description, ABC):
 
     def restrict_to(self, q: np.ndarray) -> Limit | None:
         """Return what matters of it while the motion stays close to postures, (K, n); None where nothing does."""
-        del q
         return self
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
@@ -317,7 +316,6 @@ class Limit(Description, ABC):
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
         """Tell on which straight steps from postures to others, (E, n), it holds as at both ends, (E,)."""
-        del last, slack
         return np.ones(len(first), dtype=bool)
 
     def relax(self, bound: Bound, amount: float) -> Self:

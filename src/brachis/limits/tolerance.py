@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.common.arrays import cross
+from brachis.common.arrays import apply_each, cross
 from brachis.limits.protocol import (
     Bound,
     JointStates,
@@ -154,17 +154,15 @@ class RangeLimit(Limit):
             for axis in "xyz"
         )
         self.bounds = tuple(
-            Bound(axis, float(ranges[axis, end]), float(width), float(per_m), side)
-            for axis, (width, per_m) in enumerate(
-                zip(2.0 / self._scale, self._scale, strict=True)
-            )
+            Bound(axis, float(ranges[axis, end]), 2.0 / per_m, per_m, side)
+            for axis, per_m in enumerate(self._scale.tolist())
             for end, side in enumerate(("lower", "upper"))
         )
 
     def values(self, motion: JointStates) -> np.ndarray:
         rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]
         away = motion.q[:, self._joints]
-        return np.einsum("kij,kj->ki", rotations, away) * self._scale
+        return apply_each(rotations, away) * self._scale
 
     def partials(self, motion: JointStates) -> Partials:
         rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]

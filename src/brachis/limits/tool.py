@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common.arrays import apply_each
 from brachis.limits.protocol import (
     Bound,
     JointStates,
@@ -63,7 +64,7 @@ class ToolSpeed:
     def speed(self, motion: JointStates) -> np.ndarray:
         """Speeds at K moments, (K,)."""
         jacobian = self._jacobian(self._tool.twists(motion.q))
-        velocity = np.einsum("kij,kj->ki", jacobian, motion.qdot)
+        velocity = apply_each(jacobian, motion.qdot)
         return np.linalg.norm(velocity, axis=1)
 
     def _jacobian(self, twists: np.ndarray) -> np.ndarray:
@@ -75,7 +76,7 @@ class ToolSpeed:
         """Speeds, (K,), and their derivatives by q and by qdot, (K, n)."""
         twists = self._tool.twists(motion.q)
         jacobian = self._jacobian(twists)
-        speed, direction = _direction(np.einsum("kij,kj->ki", jacobian, motion.qdot))
+        speed, direction = _direction(apply_each(jacobian, motion.qdot))
         qdot = motion.qdot * self._moves
         by_q = self._tool.velocity_slopes(twists, qdot)[:, self._rows]
         return speed, _along(direction, by_q), _along(direction, jacobian)
@@ -132,7 +133,7 @@ class ToolAccelerationLimit(ToolRatios):
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> np.ndarray:
         """Accelerations over the limit, (K, 3), world frame."""
-        tangential = np.einsum("kij,kj->ki", self._tool.jacobian(twists), qddot)
+        tangential = apply_each(self._tool.jacobian(twists), qddot)
         return (tangential + self._tool.bias(twists, qdot)) / self._figure
 
     def values(self, motion: JointStates) -> np.ndarray:
