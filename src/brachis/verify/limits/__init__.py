@@ -103,11 +103,8 @@ def _check_values(limit: Any, given: Given, subjects: Sequence[str]) -> Worst:
     if limit.guarantee.is_mean:
         means = ratios(given.states)[0]
         column = int(np.argmax(means))
-        time = float(given.states.t[-1])
-        worst = Worst(float(means[column]), subjects[column], time)
+        time = given.states.t[-1]
+        worst = Worst(means[column], subjects[column], time)
     else:
         worst = worst_between(given, ratios, subjects)
     return worst._replace(remark="checked by its own formula")
-
-
-__all__ = ["TABLE", "check_limits"]

@@ -110,8 +110,8 @@ class _Search:
             is_open = lower < self._goal
             self._halved += int(is_open.sum())
             if self._halved > _MOST:
-                return min(known, float(lower.min()))
-            known = min(known, float(lower.min(initial=np.inf, where=~is_open)))
+                return min(known, lower.min())
+            known = min(known, lower.min(initial=np.inf, where=~is_open))
             piece = piece[is_open]
             pair = pair[is_open]
             u = u[:, is_open]
@@ -145,8 +145,8 @@ class _Search:
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
         """Keep the smallest distance."""
         if distance.min(initial=np.inf) < self._least:
-            best = int(np.argmin(distance))
-            self._least = float(distance[best])
+            best = np.argmin(distance)
+            self._least = distance[best]
             self._place = float(t[best]), int(pair[best])
 
 

@@ -87,9 +87,9 @@ def _worst_rms_torque(given: Given) -> Worst | None:
     ends = states.tau[steps] ** 2 + states.tau[steps + 1] ** 2
     mean = lengths @ ((ends + 4.0 * between.tau**2) / 6.0) / lengths.sum()
     ratios = np.sqrt(mean) / limit
-    joint = int(np.argmax(ratios))
+    joint = np.argmax(ratios)
     name = given.robot.joint_names[joint]
-    return Worst(float(ratios[joint]), name, float(states.t[-1]))
+    return Worst(ratios[joint], name, states.t[-1])
 
 
 JOINT_CHECKS: dict[str, LimitCheck] = {
