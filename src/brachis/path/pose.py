@@ -87,11 +87,11 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
     """
     count = 64
     grid = spread(knots, count)
-    near = int(np.argmin(function(grid)))
+    near = np.argmin(function(grid))
     before, after = np.clip([near - 1, near + 1], 0, len(grid) - 1)
     fine = np.linspace(grid[before], grid[after], 2 * count + 1)
     values = function(fine)
-    best = int(np.argmin(values))
+    best = np.argmin(values)
     return float(fine[best]), float(values[best])
 
 
