@@ -216,6 +216,7 @@ class EaikSolver(DeterminantSolver):
     def _make_robots(self, values: np.ndarray, tolerance: float) -> list[Any]:
         """Make EAIK's robots at held values (U, h); None where it has no decomposition."""
         create = _import_eaik().Robot
+        use_double_precision = True
         screws = self._chain.screws_with(self._held, values)
         axes, points = exact_axes(
             screws.axes[:, self._joints], screws.points[:, self._joints], tolerance
@@ -230,7 +231,7 @@ class EaikSolver(DeterminantSolver):
         robots: list[Any] = []
         for h, p, rotation in zip(*parts, strict=True):
             try:
-                robot = create(h, p, rotation, [], True)  # noqa: FBT003  (double precision)
+                robot = create(h, p, rotation, [], use_double_precision)
             except RuntimeError:  # axes that are almost parallel
                 robots.append(None)
             else:

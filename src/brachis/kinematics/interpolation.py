@@ -54,6 +54,7 @@ def join_nodes(parts: Sequence[Nodes]) -> Nodes:
         times = np.concatenate([times[:-1], times[-1] + part.times])
 
     def join(name: str) -> np.ndarray:
+        """Put one quantity of all phases together, (L + 1, n)."""
         own = [getattr(part, name) for part in parts]
         return np.concatenate([*(each[:-1] for each in own[:-1]), own[-1]])
 

@@ -90,6 +90,7 @@ class JointState(SharedTorques):
         near = np.tile(self.q, (2, 1))
 
         def slopes(*curves: np.ndarray) -> tuple[np.ndarray]:
+            """Return dqddot/dy, (2 K, n, c), at moments nearby."""
             return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
 
         return rates(slopes, self.curves)[0]

@@ -261,6 +261,7 @@ class TorqueRateLimit(_DynamicLimit):
         exact = motion.torque_derivatives(self._robot)
 
         def slopes(*states: np.ndarray) -> tuple[np.ndarray, ...]:
+            """Return the derivatives of the torque by q, qdot and qddot, (2 K, n, n) each."""
             near = dynamics.torque_derivatives(self._robot, *states[:3])
             return near.q, near.qdot, near.qddot
 

@@ -201,20 +201,15 @@ class SpeedTable:
             length = min(ramp, 0.4 * gap)
             places[moved] += onwards * length
             speeds[moved] += length / gap * (speed[beyond] - speed[moved])
+        self.largest = float(speeds.max())
+        self._whole = whole
+        if not whole:  # beyond its ends the speed goes on rising within a ramp
+            places = np.concatenate([[places[0] - ramp], places, [places[-1] + ramp]])
+            speeds = np.concatenate([20.0 * speeds[:1], speeds, 20.0 * speeds[-1:]])
         slopes = np.concatenate([[np.nan], np.diff(speeds) / np.diff(places), [np.nan]])
         bends = ~np.isclose(slopes[1:], slopes[:-1], rtol=1e-12, atol=1e-12)
         self.places = places[bends]
         self.speeds = speeds[bends]
-        self.largest = float(self.speeds.max())
-        self._whole = whole
-        if not whole:  # beyond its ends the speed goes on rising within a ramp
-            first_place, last_place = self.places[[0, -1]]
-            self.places = np.concatenate(
-                [[first_place - ramp], self.places, [last_place + ramp]]
-            )
-            self.speeds = np.concatenate(
-                [20.0 * self.speeds[:1], self.speeds, 20.0 * self.speeds[-1:]]
-            )
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Largest speeds, (K,), m/s, at path coordinates s, (K,), and their derivatives by s; infinite off the path."""

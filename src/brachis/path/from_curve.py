@@ -124,6 +124,7 @@ def _of_function(
     """Fit a spline of degree 5 to a function, with ever more intervals, until it is met in between as well."""
 
     def values(u: Array) -> Array:
+        """Return the function's values, (K, m), after a check."""
         points = np.array([np.asarray(curve(float(each)), dtype=float) for each in u])
         if points.ndim != 2 or not np.isfinite(points).all():
             raise InputError(

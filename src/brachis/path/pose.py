@@ -67,6 +67,7 @@ def least_quality(columns: Curve) -> tuple[float, float]:
     """
 
     def quality(sigma: Array) -> Array:
+        """Return the quality of the quaternions, (K,), 1 at unit length."""
         quaternions = columns.derivatives(sigma, 0)[0, :, POSITIONS:]
         lengths = np.linalg.norm(quaternions, axis=1)
         return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))

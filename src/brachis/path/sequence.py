@@ -160,6 +160,7 @@ class SequencePath:
         """Arc length of the position rows, m, by Gauss quadrature between the knots."""
 
         def speeds(s: Array) -> Array:
+            """Return how far the position moves per unit s, (K,), m."""
             slope = self.derivatives(s, 1)[1, :, : self.positions]
             return np.linalg.norm(slope, axis=1)
 

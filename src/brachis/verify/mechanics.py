@@ -106,6 +106,7 @@ def torque_rates(
     """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s."""
 
     def rigid(*states: np.ndarray) -> tuple[np.ndarray]:
+        """Return the torques without friction at moments nearby, (2 K, n)."""
         return (_rigid(robot, *states[:3]),)
 
     (rate,) = rates(rigid, (q, qdot, qddot, qdddot))

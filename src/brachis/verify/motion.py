@@ -155,6 +155,7 @@ class Pieces:
         """Find the times, (P,), s, at which path coordinates, (P,), are reached; s(t) does not decrease."""
 
         def is_before(t: np.ndarray) -> np.ndarray:
+            """Tell which path coordinates are not reached yet."""
             return self.path_coordinate(t) < s
 
         return bisect(is_before, np.full(len(s), self.times[-1]))

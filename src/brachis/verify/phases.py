@@ -99,6 +99,7 @@ def check_process_speed(given: Given) -> list[Check]:
         misses.append(miss)
 
         def deviations(states: MotionStates, leg: Leg = leg) -> np.ndarray:
+            """Return relative deviations from the speed, (K, 1), in units of `_RESOLUTION`."""
             speeds = frame_motion(given.robot, states, "linear")
             return np.abs(speeds / leg.speed - 1.0) / _RESOLUTION
 
@@ -120,6 +121,7 @@ def _nearest_phase(given: Given, leg: Leg) -> tuple[MotionPhase, float]:
     """Return the phase that passes a leg, or nearly so, and how far its ends are off, in s."""
 
     def miss(phase: MotionPhase) -> float:
+        """Return how far the ends of a phase are from those of the leg, in s."""
         return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
 
     nearest = min(given.trajectory.phases, key=miss)

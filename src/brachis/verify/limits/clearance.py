@@ -106,7 +106,8 @@ class _Search:
         u = np.array(ends)
         d = np.array(values)
         while len(piece):
-            lower = 0.5 * (d.sum(axis=0) - self._moved(piece, pair, u[1] - u[0]))
+            approach = self._compute_approach(piece, pair, u[1] - u[0])
+            lower = 0.5 * (d.sum(axis=0) - approach)
             is_open = lower < self._goal
             self._halved += int(is_open.sum())
             if self._halved > _MOST:
@@ -127,7 +128,7 @@ class _Search:
             pair = np.tile(pair, 2)
         return known
 
-    def _moved(
+    def _compute_approach(
         self, piece: np.ndarray, pair: np.ndarray, step: np.ndarray
     ) -> np.ndarray:
         """How far the solids of pairs move towards each other within steps at most, (M,), m."""

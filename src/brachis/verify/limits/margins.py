@@ -79,6 +79,7 @@ def _worst_singularity(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return 2 - value / wanted, (K, 1)."""
         return 2.0 - _singular_values(given, states)[:, None] / wanted
 
     return worst_between(given, ratios, ("arm",))
@@ -92,6 +93,7 @@ def _worst_joint_end(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the distances from the middles over what is wanted, (K, c)."""
         return _parts_of_ranges(given, states)[0] / (1.0 - 2.0 * share)
 
     return worst_between(given, ratios, names)

@@ -28,6 +28,7 @@ def _worst_range(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the used parts of the ranges, (K, c)."""
         found = _deviations(given, states)
         columns = []
         for way, (low, high) in ranges.items():
@@ -46,6 +47,7 @@ def _worst_size(given: Given, name: str, largest: float | None) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the sizes over the largest one, (K, 1)."""
         return _deviations(given, states)[name][:, None] / largest
 
     return worst_between(given, ratios, ("tool",))
