@@ -106,6 +106,11 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return product
 
 
+def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Apply K matrices (K, i, j) to K vectors (K, j)."""
+    return np.einsum("kij,kj->ki", matrices, vectors)
+
+
 def rates(
     parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
 ) -> list[np.ndarray]:

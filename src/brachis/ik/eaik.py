@@ -136,19 +136,17 @@ class EaikSolver(DeterminantSolver):
     def _targets_between(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Targets of the chain in between, G_1^-1 T (G_2 M)^-1 M; the tool's placement is G M."""
         wanted = Poses.of_targets(targets)
-        for joints, positions in (
-            (self._before, q_r[:, : self._inner.start]),
-            (self._behind, q_r[:, self._inner.stop :]),
-        ):
-            if joints:
-                undo = Poses.of_tool(
-                    self._chain.screws_with(joints, positions)
-                ).inverse()
-                before = joints is self._before
-                wanted = (
-                    self._tool @ undo @ wanted if before else wanted @ undo @ self._tool
-                )
+        if self._before:
+            undo = self._undo(self._before, q_r[:, : self._inner.start])
+            wanted = self._tool @ undo @ wanted
+        if self._behind:
+            undo = self._undo(self._behind, q_r[:, self._inner.stop :])
+            wanted = wanted @ undo @ self._tool
         return wanted.targets()
+
+    def _undo(self, joints: list[int], positions: np.ndarray) -> Poses:
+        """Motions that undo the tool's placement with these joints alone at positions, (K, h)."""
+        return Poses.of_tool(self._chain.screws_with(joints, positions)).inverse()
 
     def _judge(
         self, q: np.ndarray, wanted: np.ndarray
@@ -218,6 +216,7 @@ class EaikSolver(DeterminantSolver):
     def _make_robots(self, values: np.ndarray, tolerance: float) -> list[Any]:
         """Make EAIK's robots at held values (U, h); None where it has no decomposition."""
         create = _import_eaik().Robot
+        use_double_precision = True
         screws = self._chain.screws_with(self._held, values)
         axes, points = exact_axes(
             screws.axes[:, self._joints], screws.points[:, self._joints], tolerance
@@ -232,7 +231,7 @@ class EaikSolver(DeterminantSolver):
         robots: list[Any] = []
         for h, p, rotation in zip(*parts, strict=True):
             try:
-                robot = create(h, p, rotation, [], True)  # noqa: FBT003  (double precision)
+                robot = create(h, p, rotation, [], use_double_precision)
             except RuntimeError:  # axes that are almost parallel
                 robots.append(None)
             else:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common.arrays import apply_each
 from brachis.ik.screws import ChainGeometry
 from brachis.kernel import find_postures
 from brachis.robot import TaskMap
@@ -54,9 +55,6 @@ class Newton:
         rows: np.ndarray,
         levels: np.ndarray,
         *,
-        steps: int = 15,
-        tolerance: float = 1e-10,
-        largest_step: float = 0.5,
         beside: bool = False,
     ) -> np.ndarray:
         """Find postures near given ones.
@@ -71,15 +69,10 @@ class Newton:
             C; with r = n - m.
         levels : (K, r) ndarray
             c.
-        steps : int, optional
-            How many at most.
-        tolerance : float, optional
-            Miss, in m or rad, after which one more step meets the target to rounding: Newton's method squares it.
-        largest_step : float, optional
-            rad or m; longer steps are shortened, since the linear model says little about postures so far away.
         beside : bool, optional
-            Give a posture up as soon as a step is too long, or does not halve. Tolerance and largest step are then in
-            proportion to the posture's size where that is above 1.
+            Take only postures beside the given ones: fewer and shorter steps, and a posture is given up as soon as a
+            step is too long, or does not halve. Lengths are then in proportion to the posture's size where that is
+            above 1.
 
         Returns
         -------
@@ -92,9 +85,11 @@ class Newton:
             targets,
             q,
             (rows, levels),
-            steps=steps,
-            tolerance=tolerance,
-            largest_step=largest_step,
+            steps=8 if beside else 15,
+            # A miss, m or rad, after which one more step meets the target to rounding: Newton's method squares it.
+            tolerance=1e-10,
+            # rad or m; the linear model says little about postures farther away.
+            largest_step=0.2 if beside else 0.5,
             beside=beside,
         )
 
@@ -105,14 +100,12 @@ class Newton:
         rows = np.broadcast_to(
             np.eye(q.shape[1])[held], (len(q), len(held), q.shape[1])
         )
-        return self.solve(
-            targets, q, rows, q[:, held], steps=8, largest_step=0.2, beside=True
-        )
+        return self.solve(targets, q, rows, q[:, held], beside=True)
 
     def nearest(self, targets: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Find the postures that meet targets, (K, c), without self-motion from given ones; (K, n), NaN where none."""
         rows = np.swapaxes(self.self_motions(q), 1, 2) / self.scales
-        return self.solve(targets, q, rows, np.einsum("kij,kj->ki", rows, q))
+        return self.solve(targets, q, rows, apply_each(rows, q))
 
     def self_motions(self, q: np.ndarray) -> np.ndarray:
         """Orthonormal bases, (K, n, r), of self-motion in postures (K, n); units of the joints are their scales."""

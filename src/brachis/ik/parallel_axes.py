@@ -47,14 +47,13 @@ from brachis.ik.arm import Arm, RemainingJoints
 from brachis.ik.branches import Factor, FactoredSolver, Steps, fit
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
-from brachis.ik.screws import ChainGeometry, Circle, Poses, Screw
+from brachis.ik.screws import ChainGeometry, Circle, Poses, Screw, rotate
 from brachis.ik.vectors import (
     angle_about,
     apply,
     apply_inverse,
     dot,
     meeting_point,
-    rotate,
     sign,
 )
 from brachis.robot import TaskMap

@@ -31,8 +31,8 @@ from brachis.common import tolerances
 from brachis.ik.branches import DeterminantSolver
 from brachis.ik.point_recipes import move_within_plane
 from brachis.ik.protocol import FormulaSolver, NotApplicableError, ik_family
-from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
-from brachis.ik.vectors import determinants, nan_where_negative, rotate, wrap
+from brachis.ik.screws import ChainGeometry, PosedScrews, Screw, rotate
+from brachis.ik.vectors import determinants, nan_where_negative, wrap
 from brachis.kernel import formula
 from brachis.robot import TaskMap
 from brachis.robot.joints import complement
@@ -73,9 +73,6 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         self._normal = np.cross(*basis)
         self._rows = np.eye(3)[list(task_map.axes)]
         self._senses = np.where(revolute, np.sign(geometry.axes @ self._normal), 1.0)
-        self._centres = geometry.points @ basis.T
-        self._slides = geometry.axes @ basis.T
-        self._tool = basis @ geometry.tool_position
         letters = [
             "R" if revolute[i] else "P" for i in complement(geometry.n, redundant)
         ]
@@ -87,45 +84,24 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         height = self._normal @ geometry.tool_position
         self._offset = self._rows @ self._normal * height
         self._lift = basis.T @ np.linalg.pinv(self._rows @ basis.T)
+        flatten = basis.T @ basis
         flat = replace(
             geometry,
-            axes=np.where(revolute[:, None], self._normal, self._slides @ basis),
-            points=self._centres @ basis,
-            tool_position=self._tool @ basis,
+            axes=np.where(revolute[:, None], self._normal, geometry.axes @ flatten),
+            points=geometry.points @ flatten,
+            tool_position=flatten @ geometry.tool_position,
         )
         super().__init__(flat, redundant, _LABELS["".join(letters)])
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
-        """Compute det J_nr from plane vectors (2, K), from the tool inwards; angles are about the normal.
-
-        The first vector is the tool as the joints so far have moved it, the others are velocities that they give it.
-        """
-        vectors = np.empty((2, 1, len(q)), q.dtype)
-        vectors[:] = self._tool[:, None, None]
-        for i in range(self._chain.n - 1, -1, -1):
-            own = self._slides[i][:, None]
-            if self._chain.revolute[i]:
-                centre = self._centres[i][:, None]
-                vectors[:, 0] -= centre
-                sin = self._senses[i] * formula.sin(q[:, i])
-                vectors = vectors * formula.cos(q[:, i]) + _turn(vectors) * sin
-                own = _turn(vectors[:, 0])
-                vectors[:, 0] += centre
-            else:
-                vectors[:, 0] += own * q[:, i]
-            if i in self._joints:
-                moved = np.empty((2, vectors.shape[1] + 1, len(q)), q.dtype)
-                moved[:, 0] = vectors[:, 0]
-                moved[:, 1] = own
-                moved[:, 2:] = vectors[:, 1:]
-                vectors = moved
-        rows = vectors[:, 1:]
-        if len(self._joints) == 1:
-            rows = np.tensordot(self._rows @ self._plane.T, rows, 1)
-        elif self._tool_axis is not None:
-            turns = np.empty((1, *rows.shape[1:]), q.dtype)
-            turns[0] = self._chain.revolute[self._joints, None]
-            rows = np.concatenate([rows, turns])
+        """Compute det J_nr from velocities in the plane, or along the row, and about the normal."""
+        screws = self._chain.screws_at(q * self._senses)
+        columns = screws.jacobian_columns(self._joints)
+        directions = self._rows if len(self._joints) == 1 else self._plane
+        rows = np.tensordot(directions, columns[:3], 1)
+        if self._tool_axis is not None:
+            turns = np.tensordot(self._normal, columns[3:], 1)
+            rows = np.concatenate([rows, turns[None]])
         return determinants(rows)
 
     def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
@@ -187,11 +163,6 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             levels = self._determinants(q) * np.array([[1.0], [-1.0]])
             answers = nan_where_negative(levels[:, :, None], answers)
         return np.swapaxes(answers, 0, 1)[:, :, None]
-
-
-def _turn(vectors: np.ndarray) -> np.ndarray:
-    """Turn plane vectors (2, ...) by a right angle."""
-    return np.stack([-vectors[1], vectors[0]])
 
 
 def _plane_normal(geometry: ChainGeometry) -> np.ndarray:

@@ -180,6 +180,7 @@ def ik_family(name: str, *, source: str) -> Callable[[Build], Family]:
     """
 
     def declare(build: Build) -> Family:
+        """Return the family that builds its solvers by the function."""
         return Family(name, build, source)
 
     return declare

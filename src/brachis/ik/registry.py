@@ -106,6 +106,7 @@ def _load(entry: importlib.metadata.EntryPoint) -> Family:
         )
 
     def refuse(*_arguments: object) -> IKSolver:
+        """Say why the family cannot be used."""
         raise NotApplicableError(reason)
 
     return Family(entry.name, refuse, entry.value)
@@ -141,6 +142,29 @@ def find(
         The number of redundant joints is wrong, or no family fits; lists the reasons and the choices that have one.
     """
     names = tuple(redundant_joints)
+    _check_names(robot, task_map, names)
+    tried = _Matcher(robot, task_map, families).match(names)
+    if isinstance(tried, Match):
+        return tried
+    raise DecompositionError(
+        f"no closed form for redundant joints [{', '.join(names)}]",
+        redundant_joints=names,
+        reasons=tried.reasons,
+        available=[
+            other.redundant_joints
+            for other in find_all(robot, task_map, families=families)
+            if other.solver is not None
+        ],
+    )
+
+
+def _check_names(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> None:
+    """Refuse redundant joints that do not exist, or that are too many or too few.
+
+    Raises
+    ------
+    UnknownNameError, DecompositionError
+    """
     for name in names:
         if name not in robot.joint_names:
             raise UnknownNameError(
@@ -165,19 +189,6 @@ def find(
             found=f"{len(names)} ({', '.join(names) or 'none'})",
             allowed=f"{r}: {joints} less {rows} ({', '.join(task_map.rows)})",
         )
-    tried = _Matcher(robot, task_map, families).match(names)
-    if isinstance(tried, Match):
-        return tried
-    raise DecompositionError(
-        f"no closed form for redundant joints [{', '.join(names)}]",
-        redundant_joints=names,
-        reasons=tried.reasons,
-        available=[
-            other.redundant_joints
-            for other in find_all(robot, task_map, families=families)
-            if other.solver is not None
-        ],
-    )
 
 
 def find_all(
@@ -328,21 +339,11 @@ def check_answers(
         Two branches have one label, an answer misses its target by more than 1e-8 m or rad, or none of the answers is
         the posture itself.
     """
-    low, high = _ranges_to_check(robot)
-    q = np.random.default_rng(1).uniform(low, high, (100, robot.n))
     if len(set(solver.branches)) < len(solver.branches):
         raise NotApplicableError(
             f"two of its branches have the same label: {', '.join(solver.branches)}"
         )
-    margins = [
-        _compute_margins(solver, q, b).min(axis=1, initial=np.inf)
-        for b in range(len(solver.branches))
-    ]
-    q = q[np.max(margins, axis=0) > 1e-2]
-    if not len(q):
-        raise NotApplicableError(
-            "none of 100 random postures lies inside a branch, so the solver was not checked"
-        )
+    q = _postures_inside(robot, solver)
     rest = complement(robot.n, redundant)
     targets = task_map.of_placements(*robot.tool_placements(q))
     answers = _compute_answers(solver, targets, q[:, list(redundant)])
@@ -361,15 +362,34 @@ def check_answers(
     sample = np.nonzero(exists)[0]
     reached = q[sample]
     reached[:, rest] = answers[exists]
-    miss = np.abs(
-        task_map.difference(
-            task_map.of_placements(*robot.tool_placements(reached)), targets[sample]
-        )
-    ).max()
+    placed = task_map.of_placements(*robot.tool_placements(reached))
+    miss = np.abs(task_map.difference(placed, targets[sample])).max()
     if not miss < 1e-8:
         raise NotApplicableError(
             f"its answers miss the target by {miss:.1e} m or rad; allowed: less than 1e-8"
         )
+
+
+def _postures_inside(robot: Robot, solver: IKSolver) -> np.ndarray:
+    """Return random postures, (K, n), that lie well inside a branch.
+
+    Raises
+    ------
+    NotApplicableError
+        No posture does.
+    """
+    low, high = _ranges_to_check(robot)
+    q = np.random.default_rng(1).uniform(low, high, (100, robot.n))
+    margins = [
+        _compute_margins(solver, q, b).min(axis=1, initial=np.inf)
+        for b in range(len(solver.branches))
+    ]
+    q = q[np.max(margins, axis=0) > 1e-2]
+    if not len(q):
+        raise NotApplicableError(
+            "none of 100 random postures lies inside a branch, so the solver was not checked"
+        )
+    return q
 
 
 def _ranges_to_check(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
@@ -416,13 +436,8 @@ def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:
 def default_task_space(robot: Robot) -> str | list[str]:
     """Return the task space of a whole pose, of three rows, or of those of the plane in which a robot moves."""
     geometry = ChainGeometry.of(robot)
-    along = np.abs(
-        np.where(
-            geometry.revolute[:, None],
-            1.0 - np.abs(geometry.axes),
-            np.abs(geometry.axes),
-        )
-    )
+    sizes = np.abs(geometry.axes)
+    along = np.where(geometry.revolute[:, None], 1.0 - sizes, sizes)
     normals = np.flatnonzero(np.all(along < tolerances.LENGTH, axis=0))
     if len(normals):
         return [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]

@@ -77,11 +77,8 @@ class Circle:
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         """Position at an angle, (3, ...)."""
-        return self.place(formula.cos(angle), formula.sin(angle))
-
-    def place(self, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
-        """Position at an angle of which cosine and sine are known, (3, ...)."""
-        return self.arm * cos + self.across * sin + self.middle
+        turned = self.arm * formula.cos(angle) + self.across * formula.sin(angle)
+        return turned + self.middle
 
     def component(
         self, direction: np.ndarray, level: np.ndarray, slot: int
@@ -100,6 +97,11 @@ class Circle:
         away = other - self.middle
         level = 0.5 * (dot(away, away) + dot(self.arm, self.arm) - squared)
         return cosine_roots(dot(away, self.arm), dot(away, self.across), level, slot)
+
+
+def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Turn a vector about a unit axis, shape (3, ...)."""
+    return Circle.of(axis, vector).at(angle)
 
 
 @dataclass(frozen=True)
@@ -213,8 +215,8 @@ class Poses:
 
     def __matmul__(self, other: Poses) -> Poses:
         """Move other poses as these ones move the origin; N or 1 of each."""
-        columns = [apply(self.rotation, other.rotation[:, i]) for i in range(3)]
-        return Poses(self.move(other.position), np.stack(columns, axis=1))
+        rotation = np.einsum("ij...,jk...->ik...", self.rotation, other.rotation)
+        return Poses(self.move(other.position), rotation)
 
     def inverse(self) -> Poses:
         """Return the motions that undo these."""
@@ -248,10 +250,7 @@ class ChainGeometry(Chain):
 
         They act from the left on the columns' index of rotation matrices (3, 3, K or 1): one product for all samples.
         """
-        skews = [
-            np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-            for x, y, z in self.axes
-        ]
+        skews = [np.cross(axis, np.eye(3)) for axis in self.axes]
         return [(skew, skew @ skew) for skew in skews]
 
     @cached_property
@@ -293,11 +292,11 @@ class ChainGeometry(Chain):
         points = np.empty_like(axes)
         rotation = np.eye(3)[:, :, None]
         offset = np.zeros((3, 1))
-        placed = 0
-        for i in np.flatnonzero(moving).tolist():
-            here = slice(placed, i + 1)
-            axes[:, here] = self.axes[here] @ rotation
-            points[:, here] = self.points[here] @ rotation + offset[:, None]
+        for i in range(self.n):
+            axes[:, i] = self.axes[i] @ rotation
+            points[:, i] = self.points[i] @ rotation + offset
+            if not moving[i]:
+                continue
             if self.revolute[i]:
                 first, second = self._generators[i]
                 rotation = (
@@ -305,13 +304,10 @@ class ChainGeometry(Chain):
                     + (first @ rotation) * formula.sin(q[i])
                     + (second @ rotation) * (1.0 - formula.cos(q[i]))
                 )
-                offset = points[:, i] - (self.points[i, None] @ rotation)[:, 0]
+                offset = points[:, i] - self.points[i] @ rotation
             else:
                 offset = offset + axes[:, i] * q[i]
-            placed = i + 1
-        axes[:, placed:] = self.axes[placed:] @ rotation
-        points[:, placed:] = self.points[placed:] @ rotation + offset[:, None]
-        position = (self.tool_position[None] @ rotation)[:, 0] + offset
+        position = self.tool_position @ rotation + offset
         tool = self.tool_rotation.T @ rotation
         return PosedScrews(
             axes,

@@ -202,8 +202,7 @@ def _nearest_ideal(
 
 def _least_rotation(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Rotation (3, 3) that turns a direction to another one nearby the shortest way."""
-    x, y, z = np.cross(start, end)
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    skew = np.cross(np.eye(3), np.cross(start, end))
     return np.eye(3) + skew + skew @ skew / (1.0 + start @ end)
 
 

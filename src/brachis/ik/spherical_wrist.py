@@ -33,9 +33,8 @@ from brachis.ik.arm import Arm, RemainingJoints
 from brachis.ik.branches import Factor, FactoredSolver, Steps, fit
 from brachis.ik.point_recipes import choose_recipe
 from brachis.ik.protocol import NotApplicableError, ik_family
-from brachis.ik.screws import ChainGeometry, Circle, Screw
+from brachis.ik.screws import ChainGeometry, Circle, Screw, rotate
 from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
-from brachis.kernel import formula
 from brachis.robot import TaskMap
 
 _FLIP = 2
@@ -109,23 +108,21 @@ def _solve_wrist(
     """Solve R_u R_v R_w = (R_a R_b R_c)^-1 R_D for the angles of u, v, w."""
     u, v, w = arm.screws[3:]
     turns = [
-        (joint.axis, formula.cos(q), formula.sin(q))
+        (joint.axis, q)
         for joint, q in zip(arm.base, base, strict=True)
         if joint.revolute
     ]
     end = apply(rotation, w.axis)
-    for axis, cos, sin in turns:
-        end = Circle.of(axis, end).place(cos, -sin)
+    for axis, q in turns:
+        end = rotate(-axis, q, end)
     start = u.axis
-    for axis, cos, sin in turns[::-1]:
-        start = Circle.of(axis, start).place(cos, sin)
+    for axis, q in turns[::-1]:
+        start = rotate(axis, q, start)
     start = apply_inverse(rotation, start)
     orbit = Circle.of(v.axis, w.axis)
     bend = orbit.component(-u.axis, -dot(u.axis, end), _FLIP)
-    cos = formula.cos(bend)
-    sin = formula.sin(bend)
-    first = angle_about(u.axis, orbit.place(cos, sin), end)
-    last = angle_about(w.axis, start, Circle.of(v.axis, u.axis).place(cos, -sin))
+    first = angle_about(u.axis, orbit.at(bend), end)
+    last = angle_about(w.axis, start, rotate(-v.axis, bend, u.axis))
     return first, bend, last
 
 

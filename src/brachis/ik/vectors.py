@@ -27,29 +27,14 @@ def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return vector - axis * dot(axis, vector)
 
 
-def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Turn a vector about a unit axis (Rodrigues' formula), shape (3, ...)."""
-    cos = formula.cos(angle)
-    sin = formula.sin(angle)
-    return (
-        vector * cos
-        + cross(axis, vector) * sin
-        + axis * (dot(axis, vector) * (1.0 - cos))
-    )
-
-
 def apply(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Apply rotation matrices (3, 3, ...) to vectors (3, ...)."""
-    return (
-        rotation[:, 0] * vector[0]
-        + rotation[:, 1] * vector[1]
-        + rotation[:, 2] * vector[2]
-    )
+    return np.einsum("ij...,j...->i...", rotation, vector)
 
 
 def apply_inverse(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Apply the inverses of rotation matrices (3, 3, ...) to vectors (3, ...)."""
-    return rotation[0] * vector[0] + rotation[1] * vector[1] + rotation[2] * vector[2]
+    return np.einsum("ji...,j...->i...", rotation, vector)
 
 
 def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -19,11 +19,10 @@ from functools import cached_property
 
 import numpy as np
 
-from brachis.common.arrays import LastCall
+from brachis.common.arrays import LastCall, apply_each
 from brachis.errors import UnreachableError
 from brachis.ik.newton import Newton
 from brachis.kernel import Conditions, Spline
-from brachis.kinematics.joint_map import apply_each
 from brachis.kinematics.path_map import PathMap, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -91,10 +90,12 @@ class ChartRows:
     def selected(self) -> tuple[int, ...]:
         """The joints that the rows select, ascending; none where they are other rows than unit rows."""
         rows = self.coefficients[0, :, :-1]
-        unit = self.knots is None and bool(
-            np.all((rows == 0.0) | (rows == 1.0)) and np.all(rows.sum(axis=1) == 1.0)
+        is_unit = np.all((rows == 0.0) | (rows == 1.0)) and np.all(
+            rows.sum(axis=1) == 1.0
         )
-        return tuple(int(joint) for joint in np.argmax(rows, axis=1)) if unit else ()
+        if self.knots is not None or not is_unit:
+            return ()
+        return tuple(np.argmax(rows, axis=1).tolist())
 
     @cached_property
     def _spline(self) -> Spline:
@@ -159,16 +160,13 @@ class ChartMap(PathMap):
         s: np.ndarray,
         reference: np.ndarray,
     ) -> None:
-        robot = task_map.robot
-        self.robot = robot
-        self.task_map = task_map
-        self.path = path
+        super().__init__(task_map, path, reference[0])
+        names = self.robot.joint_names
         self.rows = rows
         self.r = rows.r
-        self.redundant_joints = tuple(robot.joint_names[i] for i in rows.selected)
+        self.redundant_joints = tuple(names[i] for i in rows.selected)
         self.s = s
         self.reference = reference
-        self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
         augmented = self._augmented_at(s, reference)
         inverse = np.linalg.pinv(augmented, rcond=_SINGULAR)  # not regular throughout
@@ -176,7 +174,6 @@ class ChartMap(PathMap):
         sigma = rows.values(s, reference)
         table = np.concatenate([reference, sigma, self_motion], axis=1)
         self._lines = Spline.through(s, table, 1)
-        self.sample_at = LastCall(path.sample)
         self._reference_at = LastCall(self._between)
         even = np.linspace(0.0, 1.0, 33)
         augmented = self._augmented_at(even, self._between(even)[0])
@@ -333,7 +330,7 @@ def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
     """
     if not null.shape[2]:
         return np.full(len(null), np.inf)
-    return np.asarray(np.linalg.svd(rows @ null, compute_uv=False)[:, -1])
+    return np.linalg.svd(rows @ null, compute_uv=False)[:, -1]
 
 
 def moving_most(null: np.ndarray) -> np.ndarray:

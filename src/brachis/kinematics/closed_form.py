@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
 from brachis.kernel import Conditions, follow_turns, pick_nearest, set_turns
@@ -56,11 +55,8 @@ class ClosedFormMap(PathMap):
         branch: int,
         start: np.ndarray,
     ) -> None:
-        robot = task_map.robot
-        self.robot = robot
-        self.task_map = task_map
-        self.path = path
-        self.sample_at = LastCall(path.sample)
+        super().__init__(task_map, path, start)
+        robot = self.robot
         self.solver = solver
         self.redundant = list(redundant)
         self.nonredundant = complement(robot.n, redundant)
@@ -68,7 +64,6 @@ class ClosedFormMap(PathMap):
         self.redundant_joints = tuple(robot.joint_names[i] for i in redundant)
         self.branch = branch
         self.branch_label = solver.branches[branch]
-        self.start = start
         self._rows = np.eye(robot.n)[self.redundant]
         self._turning = robot.revolute[self.nonredundant]
         self._turns = np.isin(np.arange(robot.n), self.nonredundant) & robot.revolute
@@ -86,7 +81,7 @@ class ClosedFormMap(PathMap):
 
     def start_margins(self) -> np.ndarray:
         """Margins of the branch at the start."""
-        return np.asarray(self.branch_margins(self.start[None])[0])
+        return self.branch_margins(self.start[None])[0]
 
     def margins(self, state: JointState) -> np.ndarray:
         """Margins of the branch."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
 from brachis.kinematics.joint_map import JointMap, JointState
 
@@ -53,6 +54,7 @@ def join_nodes(parts: Sequence[Nodes]) -> Nodes:
         times = np.concatenate([times[:-1], times[-1] + part.times])
 
     def join(name: str) -> np.ndarray:
+        """Put one quantity of all phases together, (L + 1, n)."""
         own = [getattr(part, name) for part in parts]
         return np.concatenate([*(each[:-1] for each in own[:-1]), own[-1]])
 
@@ -88,15 +90,10 @@ def interpolate(
     """
     # Two pieces in the longest interval; shorter ones have one: rounding shows in the jerk of short pieces.
     steps = np.ceil(2 * np.diff(breaks) / np.diff(breaks).max()).astype(int)
-    pieces = [
-        np.linspace(a, b, n, endpoint=False)
-        for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)
-    ]
-    times = np.append(np.concatenate(pieces), breaks[-1])
+    times = spread(breaks, steps)
     inherited = np.full(len(times) - 1, np.inf)
     for _ in range(8):
-        middle = 0.5 * (times[1:] + times[:-1])
-        merged = np.sort(np.concatenate([times, middle]))
+        merged = spread(times, 2)
         state = joint_map.state(*curves(merged), t=merged)
         before = state.qddot
         if jumps:
@@ -109,7 +106,7 @@ def interpolate(
         bad = (excess > 1.0) & ((excess > noise) | (excess < 0.5 * inherited))
         if not bad.any():
             break
-        times = np.union1d(times, middle[bad])
+        times = np.union1d(times, merged[1::2][bad])
         inherited = np.repeat(np.where(bad, excess, 0.0), 1 + bad)
     error = _POSITION_TOLERANCE * float(gaps[0].max())
     if error > 1e-9:
@@ -132,8 +129,7 @@ def _sum_positions(
     What the sum is off at the end is shared by the pieces so that it adds the same jerk to each.
     """
     h = np.diff(times)[:, None]
-    with_middles = np.sort(np.concatenate([times, times[:-1] + 0.5 * h[:, 0]]))
-    jerk = joint_map.state(*curves(with_middles)).qdddot[1::2]
+    jerk = joint_map.state(*curves(spread(times, 2))).qdddot[1::2]
     v = state.qdot
     change = before[1:] - state.qddot[:-1]
     way = (

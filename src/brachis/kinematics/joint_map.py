@@ -26,15 +26,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from brachis.common.arrays import rates
+from brachis.common.arrays import apply_each, rates
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
-
-
-def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Apply K matrices (K, i, j) to K vectors (K, j)."""
-    return np.einsum("kij,kj->ki", matrices, vectors)
 
 
 @dataclass(frozen=True)
@@ -83,7 +78,7 @@ class JointState(SharedTorques):
     def qdddot(self) -> np.ndarray:
         """Jerk of all joints, (K, n)."""
         exact = self.derivatives
-        return np.asarray(
+        return (
             apply_each(exact.qddot_y, self.ydot)
             + apply_each(exact.qddot_ydot, self.yddot)
             + apply_each(self.gradient, self.ydddot)
@@ -95,6 +90,7 @@ class JointState(SharedTorques):
         near = np.tile(self.q, (2, 1))
 
         def slopes(*curves: np.ndarray) -> tuple[np.ndarray]:
+            """Return dqddot/dy, (2 K, n, c), at moments nearby."""
             return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
 
         return rates(slopes, self.curves)[0]

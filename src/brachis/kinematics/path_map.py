@@ -66,10 +66,16 @@ class PathState(JointState):
 class PathMap(JointMap):
     """A path of the tool and a measure of self-motion as a `JointMap`.
 
-    Attributes
+    Parameters
     ----------
     task_map : TaskMap
         Of the robot.
+    path : Path
+    start : (n,) ndarray
+        Posture at, or near, the beginning.
+
+    Attributes
+    ----------
     no_posture : str
         The message where a posture does not exist.
     sample_at : LastCall
@@ -77,9 +83,15 @@ class PathMap(JointMap):
     """
 
     path: Path
-    task_map: TaskMap
     no_posture: str
     sample_at: LastCall[PathSample]
+
+    def __init__(self, task_map: TaskMap, path: Path, start: np.ndarray) -> None:
+        self.robot = task_map.robot
+        self.task_map = task_map
+        self.path = path
+        self.start = start
+        self.sample_at = LastCall(path.sample)
 
     @abstractmethod
     def postures(

@@ -67,12 +67,14 @@ TABLE: dict[str, Build] = {}
 for _kind in LIMIT_KINDS:
     TABLE[_kind] = JOINT_LIMITS[_kind].build
     TABLE |= _AFTER.get(_kind, {})
-TABLE["singularity"] = build_singularity
-TABLE["joint_ends"] = build_joint_ends
-TABLE["tool_tilt"] = build_tool_tilt
-TABLE["tool_distance"] = build_tool_distance
-TABLE["tool_range"] = build_tool_range
-TABLE["clearance"] = build_clearance
+TABLE |= {
+    "singularity": build_singularity,
+    "joint_ends": build_joint_ends,
+    "tool_tilt": build_tool_tilt,
+    "tool_distance": build_tool_distance,
+    "tool_range": build_tool_range,
+    "clearance": build_clearance,
+}
 
 
 def limits_of(

@@ -98,12 +98,13 @@ def _check_array(where: str, shape: tuple[int, ...], array: np.ndarray) -> None:
         )
 
 
-_Part = tuple[str, tuple[int, ...], object]
-"""Where a part of a limit stands, the shape that it must have, and the part."""
+def _parts_of(
+    limit: Limit, n: int, where: str
+) -> Iterator[tuple[str, tuple[int, ...], object]]:
+    """Go through the arrays of a limit, those of its functions last; refuse what is missing or of the wrong type.
 
-
-def _parts_of(limit: Limit, n: int, where: str) -> Iterator[_Part]:
-    """Go through the arrays of a limit, those of its functions last; refuse what is missing or of the wrong type."""
+    Of each: where it stands, the shape that it must have, and the array.
+    """
     parts = ("kind", "labels", "lower", "upper")
     missing = [name for name in parts if not hasattr(limit, name)]
     if missing:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.common.arrays import LastCall
 from brachis.limits.protocol import Bound, JointStates, Label, Limit, Partials, Role
 from brachis.robot import Robot
 from brachis.scene import UNIT, ClosePairs, Scene, scene_of
@@ -51,7 +52,7 @@ class Clearance(Limit):
         self._chain = chain
         self._scene = scene
         self._clearance = clearance
-        self._last: tuple[bytes, ClosePairs] | None = None
+        self._close_pairs = LastCall(self._find_close_pairs)
         self.labels = tuple(
             Label(scene.names(pair), "clearance", "m", "collisions.clearance")
             for pair in range(count)
@@ -95,12 +96,8 @@ class Clearance(Limit):
         free[number[~holds]] = False
         return free
 
-    def _close_pairs(self, q: np.ndarray) -> ClosePairs:
-        key = q.tobytes()
-        if self._last is None or self._last[0] != key:
-            within = self._clearance + _FAR
-            self._last = (key, self._scene.find_close(self._chain.place(q), within))
-        return self._last[1]
+    def _find_close_pairs(self, q: np.ndarray) -> ClosePairs:
+        return self._scene.find_close(self._chain.place(q), self._clearance + _FAR)
 
     def values(self, motion: JointStates) -> np.ndarray:
         """Distances, (K, P), in units of `UNIT`."""
@@ -121,10 +118,6 @@ class Clearance(Limit):
         by_q = np.zeros((len(motion.q), len(self.labels), motion.q.shape[1]))
         by_q[close.posture, close.pair] = slopes / UNIT
         return Partials(q=by_q)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave out what was computed last."""
-        return {**vars(self), "_last": None}
 
 
 def build_clearance(robot: Robot, task: Task) -> Clearance | None:

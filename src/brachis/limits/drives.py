@@ -138,13 +138,13 @@ class RoundedCurve:
         y = np.clip(x / self.widths, -1.0, 1.0)
         rounded = self.widths * (3.0 + y * (8.0 + y * (6.0 - y * y))) / 16.0
         ramp = rounded + np.maximum(x - self.widths, 0.0)
-        return np.asarray(self.at_rest + (ramp @ self.bends).sum(axis=0))
+        return self.at_rest + (ramp @ self.bends).sum(axis=0)
 
     def slopes(self, velocity: np.ndarray) -> np.ndarray:
         """Differentiate `values` by the velocities, (K,)."""
         y = np.clip(self._distances(velocity) / self.widths, -1.0, 1.0)
         forward, backward = (2.0 + y * (3.0 - y * y)) @ self.bends / 4.0
-        return np.asarray(forward - backward)
+        return forward - backward
 
 
 class TorqueSpeedLimit(Limit):
@@ -208,7 +208,7 @@ class TorqueSpeedLimit(Limit):
         tau = motion.torque(self._robot)[:, self._joints]
         allowed = self._by_curve(RoundedCurve.values, motion)
         excess = self._signs * tau - allowed
-        return np.asarray(excess / self._at_rest)
+        return excess / self._at_rest
 
     def partials(self, motion: JointStates) -> Partials:
         exact = motion.torque_derivatives(self._robot)

@@ -19,12 +19,11 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
 
-from brachis.common.arrays import rates
+from brachis.common.arrays import apply_each, rates
 from brachis.limits.protocol import (
     Bound,
     Guarantee,
@@ -102,7 +101,7 @@ class JointLimit(Limit):
     @property
     def centre(self) -> np.ndarray:
         """Value at which the quantity is zero."""
-        return np.asarray(-self._middle * self._scale)
+        return -self._middle * self._scale
 
     @classmethod
     def build(cls, robot: Robot, _task: Task | None = None) -> Self | None:
@@ -116,20 +115,9 @@ class JointLimit(Limit):
     def quantity(self, motion: JointStates) -> np.ndarray:
         """Quantity of all joints, (K, n), in SI units."""
 
-    @abstractmethod
-    def quantity_partials(self, motion: JointStates) -> Partials:
-        """Differentiate `quantity`, (K, n, n) each."""
-
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._normalise(self.quantity(motion))
-
-    def partials(self, motion: JointStates) -> Partials:
-        return self.quantity_partials(motion).map(self._scale_rows)
-
-    def _normalise(self, quantity: np.ndarray) -> np.ndarray:
-        """Values, (K, c), from a quantity of all joints, (K, n)."""
-        own = self._of_joints(quantity)
-        return np.asarray((own - self._middle) * self._scale)
+        own = self._of_joints(self.quantity(motion))
+        return (own - self._middle) * self._scale
 
     def _of_joints(self, every: np.ndarray) -> np.ndarray:
         """Rows of the limited joints, (K, c, ...), from those of all joints, (K, n, ...)."""
@@ -137,7 +125,7 @@ class JointLimit(Limit):
 
     def _scale_rows(self, slopes: np.ndarray) -> np.ndarray:
         """Turn into derivatives of the values, (K, c, n), those of the quantity, (K, n, n)."""
-        return np.asarray(self._of_joints(slopes) * self._scale[:, None])
+        return self._of_joints(slopes) * self._scale[:, None]
 
 
 class _DerivativeLimit(JointLimit):
@@ -147,24 +135,15 @@ class _DerivativeLimit(JointLimit):
     """Name of the quantity in `JointStates` and in `Partials`."""
 
     def quantity(self, motion: JointStates) -> np.ndarray:
-        return np.asarray(getattr(motion, self.derivative))
-
-    def quantity_partials(self, motion: JointStates) -> Partials:
-        n = self._robot.n
-        by_itself = np.broadcast_to(np.eye(n), (len(motion.q), n, n))
-        return Partials(**{self.derivative: by_itself})
+        return getattr(motion, self.derivative)
 
     def partials(self, motion: JointStates) -> Partials:
         return Partials(**{self.derivative: self._rows(len(motion.q))})
 
     def _rows(self, count: int) -> np.ndarray:
         """Differentiate the values by the quantity, (K, c, n), at `count` moments."""
-        rows = self._rows_of_all
+        rows = np.eye(self._robot.n)[self._joints] * self._scale[:, None]
         return np.broadcast_to(rows, (count, *rows.shape))
-
-    @cached_property
-    def _rows_of_all(self) -> np.ndarray:
-        return np.eye(self._robot.n)[self._joints] * self._scale[:, None]
 
 
 def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -231,7 +210,18 @@ class JerkLimit(_DerivativeLimit):
     order = 3
 
 
-class _TorqueLimit(JointLimit):
+class _DynamicLimit(JointLimit):
+    """A quantity of the joints that depends on several derivatives of their positions."""
+
+    @abstractmethod
+    def quantity_partials(self, motion: JointStates) -> Partials:
+        """Differentiate `quantity`, (K, n, n) each."""
+
+    def partials(self, motion: JointStates) -> Partials:
+        return self.quantity_partials(motion).map(self._scale_rows)
+
+
+class _TorqueLimit(_DynamicLimit):
     """A function of the joint torques within its limits."""
 
     def quantity(self, motion: JointStates) -> np.ndarray:
@@ -253,7 +243,7 @@ class TorqueLimit(_TorqueLimit, HasLatticeWeights):
         return self._scale_rows(dynamics.mass_matrices(self._robot, q)), None
 
 
-class TorqueRateLimit(JointLimit):
+class TorqueRateLimit(_DynamicLimit):
     """Rates of joint torques within their limits."""
 
     kind = "torque_rate"
@@ -261,19 +251,17 @@ class TorqueRateLimit(JointLimit):
 
     def quantity(self, motion: JointStates) -> np.ndarray:
         exact = motion.torque_derivatives(self._robot)
-        pairs = (
-            (exact.q, motion.qdot),
-            (exact.qdot, motion.qddot),
-            (exact.qddot, motion.qdddot),
-        )
-        return np.asarray(
-            sum(np.einsum("kij,kj->ki", slope, rate) for slope, rate in pairs)
+        return (
+            apply_each(exact.q, motion.qdot)
+            + apply_each(exact.qdot, motion.qddot)
+            + apply_each(exact.qddot, motion.qdddot)
         )
 
     def quantity_partials(self, motion: JointStates) -> Partials:
         exact = motion.torque_derivatives(self._robot)
 
         def slopes(*states: np.ndarray) -> tuple[np.ndarray, ...]:
+            """Return the derivatives of the torque by q, qdot and qddot, (2 K, n, n) each."""
             near = dynamics.torque_derivatives(self._robot, *states[:3])
             return near.q, near.qdot, near.qddot
 
@@ -297,7 +285,7 @@ def power_partials(robot: Robot, motion: JointStates) -> Partials:
     return Partials(exact.q * rate, by_qdot, exact.qddot * rate)
 
 
-class PowerLimit(JointLimit):
+class PowerLimit(_DynamicLimit):
     """Mechanical power of every joint within its limit."""
 
     kind = "power"
@@ -332,11 +320,11 @@ class RmsTorqueLimit(_TorqueLimit):
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """Measure the root mean square itself."""
-        return np.asarray(np.sqrt(np.maximum(values, 0.0)) - np.sqrt(self.upper))
+        return np.sqrt(np.maximum(values, 0.0)) - np.sqrt(self.upper)
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """Measure the root mean square itself."""
-        return np.asarray(np.sqrt(np.maximum(values, 0.0) / self.upper))
+        return np.sqrt(np.maximum(values, 0.0) / self.upper)
 
 
 JOINT_LIMITS = {

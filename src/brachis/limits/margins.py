@@ -44,7 +44,7 @@ class SingularityLimit(Limit):
     def values(self, motion: JointStates) -> np.ndarray:
         jacobian = self._arm_jacobian(self._task_map.twists(motion.q))
         least = np.linalg.svd(jacobian, compute_uv=False)[:, -1:]
-        return np.asarray(least / self._figure)
+        return least / self._figure
 
     def partials(self, motion: JointStates) -> Partials:
         twists = self._task_map.twists(motion.q)
@@ -99,7 +99,7 @@ class JointEndLimit(Limit):
         return super().holds_at_rest(turned, slack)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        return np.asarray((motion.q[:, self._joints] - self._begin) / self._width)
+        return (motion.q[:, self._joints] - self._begin) / self._width
 
     def partials(self, motion: JointStates) -> Partials:
         shape = (len(motion.q), *self._rows.shape)

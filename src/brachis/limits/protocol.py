@@ -285,7 +285,7 @@ class Description:
     def centre(self) -> np.ndarray:
         """Value, (c,), that uses nothing of the limit; by default the middle between two finite bounds."""
         with np.errstate(invalid="ignore"):  # -inf + inf
-            return np.asarray(0.5 * self.lower + 0.5 * self.upper)
+            return 0.5 * self.lower + 0.5 * self.upper
 
     @cached_property
     def bounds(self) -> tuple[Bound, ...]:
@@ -316,7 +316,6 @@ class Limit(Description, ABC):
 
     def restrict_to(self, q: np.ndarray) -> Limit | None:
         """Return what matters of it while the motion stays close to postures, (K, n); None where nothing does."""
-        del q
         return self
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
@@ -328,7 +327,6 @@ class Limit(Description, ABC):
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
         """Tell on which straight steps from postures to others, (E, n), it holds as at both ends, (E,)."""
-        del last, slack
         return np.ones(len(first), dtype=bool)
 
     def relax(self, bound: Bound, amount: float) -> Self:
@@ -356,7 +354,7 @@ class Limit(Description, ABC):
     def violation(self, values: np.ndarray) -> np.ndarray:
         """How far values, (K, c), are beyond their bounds; negative inside. See the module."""
         beyond = np.maximum(values - self.upper, self.lower - values)
-        return np.asarray(beyond * self.violation_scale)
+        return beyond * self.violation_scale
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """How near values, (K, c), are to their bounds; see the module."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.common.arrays import cross
+from brachis.common.arrays import apply_each, cross
 from brachis.limits.protocol import (
     Bound,
     JointStates,
@@ -18,40 +18,58 @@ from brachis.limits.protocol import (
     Role,
     compute_inset,
 )
+from brachis.limits.tool import ToolRatios
 from brachis.robot import Robot
 from brachis.robot.task_map import Pose
 from brachis.task import Task
 
 
-class _Tolerance(Limit):
-    """Ratio of how far the tool is from the path to the largest that is allowed.
+def _joints_of(robot: Robot, *ways: str) -> list[int]:
+    """Return the virtual joints of the tool that move it in some ways, as far as there are such joints."""
+    names = [joint.way for joint in robot.tool_joints]
+    first = len(robot.urdf_joints)
+    return [first + names.index(way) for way in ways if way in names]
+
+
+class _Size(ToolRatios):
+    """How far the tool is from the path, zero or more, over the largest size that is allowed.
 
     Parameters
     ----------
     robot : Robot
-    ways : tuple of str
-        Of the virtual joints on which it depends.
+    joints : list of int
+        The virtual joints on which it depends.
+    label : Label
+    figure : float
+        The largest size, in the unit of the label.
+    largest : float
+        The same, rad or m.
     """
 
-    role = Role.PROCESS
     at_rest = "posture"
 
-    def __init__(self, robot: Robot, ways: tuple[str, ...]) -> None:
-        names = [joint.way for joint in robot.tool_joints]
-        first = len(robot.urdf_joints)
-        self._robot = robot
-        self._columns = [first + names.index(way) for way in ways if way in names]
+    def __init__(
+        self,
+        robot: Robot,
+        joints: list[int],
+        label: Label,
+        figure: float,
+        largest: float,
+    ) -> None:
+        super().__init__([label], [figure])
+        self._n = robot.n
+        self._joints = joints
+        self._largest = largest
+        self.inset = compute_inset(largest)
 
-
-class _Size(_Tolerance):
-    """A size, zero or more, over the largest one."""
-
-    def _describe(self, label: Label, figure: float) -> None:
-        """Set label and bounds; `figure` is the largest size, in the unit of the label."""
-        self.labels = (label,)
-        self.lower = np.full(1, -np.inf)
-        self.upper = np.ones(1)
-        self.bounds = (Bound(0, figure, figure, 1.0 / figure),)
+    def _divide(self, slopes: np.ndarray, size: np.ndarray) -> Partials:
+        """Return `slopes` by the virtual joints, (K, j), over a size, (K, 1), and the largest one; 0 for size 0."""
+        by_q = np.zeros((len(slopes), 1, self._n))
+        zero = np.zeros_like(slopes)
+        by_q[:, 0, self._joints] = np.divide(
+            slopes, self._largest * size, out=zero, where=size > 0.0
+        )
+        return Partials(q=by_q)
 
 
 class TiltLimit(_Size):
@@ -67,29 +85,20 @@ class TiltLimit(_Size):
     kind = "tool_tilt"
 
     def __init__(self, robot: Robot, figure: float) -> None:
-        super().__init__(robot, ("side", "lead"))
-        key = "tolerances.orientation.tilt"
-        self._describe(Label("tool", "tilt", "deg", key), figure)
-        self._largest = np.radians(figure)
-        self.inset = compute_inset(self._largest)
+        joints = _joints_of(robot, "side", "lead")
+        label = Label("tool", "tilt", "deg", "tolerances.orientation.tilt")
+        super().__init__(robot, joints, label, figure, np.radians(figure))
 
     def values(self, motion: JointStates) -> np.ndarray:
-        angles = motion.q[:, self._columns]
+        angles = motion.q[:, self._joints]
         cosine = np.cos(angles).prod(axis=1, keepdims=True)
-        return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)) / self._largest)
+        return np.arccos(np.clip(cosine, -1.0, 1.0)) / self._largest
 
     def partials(self, motion: JointStates) -> Partials:
-        angles = motion.q[:, self._columns]
+        angles = motion.q[:, self._joints]
         tilt = self.values(motion) * self._largest
         falls = np.tan(angles) * np.cos(angles).prod(axis=1, keepdims=True)
-        by_q = np.zeros((len(angles), 1, self._robot.n))
-        by_q[:, 0, self._columns] = np.divide(
-            falls,
-            self._largest * np.sin(tilt),
-            out=np.zeros_like(angles),
-            where=tilt > 0.0,
-        )
-        return Partials(q=by_q)
+        return self._divide(falls, np.sin(tilt))
 
 
 class DistanceLimit(_Size):
@@ -105,27 +114,21 @@ class DistanceLimit(_Size):
     kind = "tool_distance"
 
     def __init__(self, robot: Robot, figure: float) -> None:
-        super().__init__(robot, ("x", "y", "z"))
+        joints = _joints_of(robot, "x", "y", "z")
         key = "tolerances.position.sphere"
-        self._describe(Label("tool", "distance from the path", "m", key), figure)
-        self._largest = figure
-        self.inset = compute_inset(figure)
+        label = Label("tool", "distance from the path", "m", key)
+        super().__init__(robot, joints, label, figure, figure)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        away = motion.q[:, self._columns]
+        away = motion.q[:, self._joints]
         return np.linalg.norm(away, axis=1, keepdims=True) / self._largest
 
     def partials(self, motion: JointStates) -> Partials:
-        away = motion.q[:, self._columns]
-        size = np.linalg.norm(away, axis=1, keepdims=True)
-        by_q = np.zeros((len(away), 1, self._robot.n))
-        by_q[:, 0, self._columns] = np.divide(
-            away, self._largest * size, out=np.zeros_like(away), where=size > 0.0
-        )
-        return Partials(q=by_q)
+        away = motion.q[:, self._joints]
+        return self._divide(away, np.linalg.norm(away, axis=1, keepdims=True))
 
 
-class RangeLimit(_Tolerance):
+class RangeLimit(Limit):
     """Displacement of the tool from the path along the world's axes within ranges.
 
     Parameters
@@ -136,9 +139,12 @@ class RangeLimit(_Tolerance):
     """
 
     kind = "tool_range"
+    role = Role.PROCESS
+    at_rest = "posture"
 
     def __init__(self, robot: Robot, ranges: np.ndarray) -> None:
-        super().__init__(robot, ("x", "y", "z"))
+        self._robot = robot
+        self._joints = _joints_of(robot, "x", "y", "z")
         self._pose = Pose(robot)
         self._scale = 2.0 / (ranges[:, 1] - ranges[:, 0])
         self.inset = compute_inset(1.0 / self._scale)
@@ -148,24 +154,22 @@ class RangeLimit(_Tolerance):
             for axis in "xyz"
         )
         self.bounds = tuple(
-            Bound(axis, float(ranges[axis, end]), float(width), float(per_m), side)
-            for axis, (width, per_m) in enumerate(
-                zip(2.0 / self._scale, self._scale, strict=True)
-            )
+            Bound(axis, float(ranges[axis, end]), 2.0 / per_m, per_m, side)
+            for axis, per_m in enumerate(self._scale.tolist())
             for end, side in enumerate(("lower", "upper"))
         )
 
     def values(self, motion: JointStates) -> np.ndarray:
         rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]
-        away = motion.q[:, self._columns]
-        return np.asarray(np.einsum("kij,kj->ki", rotations, away) * self._scale)
+        away = motion.q[:, self._joints]
+        return apply_each(rotations, away) * self._scale
 
     def partials(self, motion: JointStates) -> Partials:
         rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]
-        away = motion.q[:, self._columns]
+        away = motion.q[:, self._joints]
         turning = self._pose.twists(motion.q)[3:]
         by_q = cross(turning, away.T[:, :, None])
-        for axis, column in enumerate(self._columns):
+        for axis, column in enumerate(self._joints):
             by_q[axis, :, column] += 1.0
         in_world = np.einsum("kij,jkn->kin", rotations, by_q)
         return Partials(q=in_world * self._scale[:, None])

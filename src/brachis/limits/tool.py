@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.common.arrays import apply_each
 from brachis.limits.protocol import (
     Bound,
     JointStates,
@@ -31,7 +32,7 @@ from brachis.task import Task
 
 def _along(direction: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """Differentiate sizes, (K, n): from directions, (K, 3), and the derivatives of the vectors, (K, 3, n)."""
-    return np.asarray(np.einsum("ki,kij->kj", direction, slopes))
+    return np.einsum("ki,kij->kj", direction, slopes)
 
 
 def _direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -62,13 +63,9 @@ class ToolSpeed:
 
     def speed(self, motion: JointStates) -> np.ndarray:
         """Speeds at K moments, (K,)."""
-        return self.slope(motion.q, motion.qdot)
-
-    def slope(self, q: np.ndarray, q_ds: np.ndarray) -> np.ndarray:
-        """Distance or angle per unit of the path, (S,), from postures and their derivatives."""
-        jacobian = self._jacobian(self._tool.twists(q))
-        velocity = np.einsum("kij,kj->ki", jacobian, q_ds)
-        return np.asarray(np.linalg.norm(velocity, axis=1))
+        jacobian = self._jacobian(self._tool.twists(motion.q))
+        velocity = apply_each(jacobian, motion.qdot)
+        return np.linalg.norm(velocity, axis=1)
 
     def _jacobian(self, twists: np.ndarray) -> np.ndarray:
         return self._tool.jacobian(twists)[:, self._rows] * self._moves
@@ -79,14 +76,14 @@ class ToolSpeed:
         """Speeds, (K,), and their derivatives by q and by qdot, (K, n)."""
         twists = self._tool.twists(motion.q)
         jacobian = self._jacobian(twists)
-        speed, direction = _direction(np.einsum("kij,kj->ki", jacobian, motion.qdot))
+        speed, direction = _direction(apply_each(jacobian, motion.qdot))
         qdot = motion.qdot * self._moves
         by_q = self._tool.velocity_slopes(twists, qdot)[:, self._rows]
         return speed, _along(direction, by_q), _along(direction, jacobian)
 
 
-class _ToolLimit(Limit):
-    """Ratios of what the tool does to its limits.
+class ToolRatios(Limit):
+    """Ratios of what the tool does to its limits, at most 1.
 
     Parameters
     ----------
@@ -96,7 +93,6 @@ class _ToolLimit(Limit):
     """
 
     role = Role.PROCESS
-    longer_time = "relieves"
 
     def __init__(self, labels: Sequence[Label], figures: Sequence[float]) -> None:
         self.labels = tuple(labels)
@@ -108,7 +104,7 @@ class _ToolLimit(Limit):
         )
 
 
-class ToolAccelerationLimit(_ToolLimit):
+class ToolAccelerationLimit(ToolRatios):
     """Size of the acceleration of the tool frame's origin over its limit.
 
     Parameters
@@ -119,6 +115,7 @@ class ToolAccelerationLimit(_ToolLimit):
     """
 
     kind = "tool_acceleration"
+    longer_time = "relieves"
 
     def __init__(self, robot: Robot, figure: float) -> None:
         label = Label(
@@ -136,7 +133,7 @@ class ToolAccelerationLimit(_ToolLimit):
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> np.ndarray:
         """Accelerations over the limit, (K, 3), world frame."""
-        tangential = np.einsum("kij,kj->ki", self._tool.jacobian(twists), qddot)
+        tangential = apply_each(self._tool.jacobian(twists), qddot)
         return (tangential + self._tool.bias(twists, qdot)) / self._figure
 
     def values(self, motion: JointStates) -> np.ndarray:
@@ -204,20 +201,15 @@ class SpeedTable:
             length = min(ramp, 0.4 * gap)
             places[moved] += onwards * length
             speeds[moved] += length / gap * (speed[beyond] - speed[moved])
+        self.largest = float(speeds.max())
+        self._whole = whole
+        if not whole:  # beyond its ends the speed goes on rising within a ramp
+            places = np.concatenate([[places[0] - ramp], places, [places[-1] + ramp]])
+            speeds = np.concatenate([20.0 * speeds[:1], speeds, 20.0 * speeds[-1:]])
         slopes = np.concatenate([[np.nan], np.diff(speeds) / np.diff(places), [np.nan]])
         bends = ~np.isclose(slopes[1:], slopes[:-1], rtol=1e-12, atol=1e-12)
         self.places = places[bends]
         self.speeds = speeds[bends]
-        self.largest = float(self.speeds.max())
-        self._whole = whole
-        if not whole:  # beyond its ends the speed goes on rising within a ramp
-            first_place, last_place = self.places[[0, -1]]
-            self.places = np.concatenate(
-                [[first_place - ramp], self.places, [last_place + ramp]]
-            )
-            self.speeds = np.concatenate(
-                [20.0 * self.speeds[:1], self.speeds, 20.0 * self.speeds[-1:]]
-            )
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Largest speeds, (K,), m/s, at path coordinates s, (K,), and their derivatives by s; infinite off the path."""
@@ -232,7 +224,7 @@ class SpeedTable:
         return np.where(is_free, np.inf, speeds), slopes[piece]
 
 
-class ToolSpeedLimit(_ToolLimit):
+class ToolSpeedLimit(ToolRatios):
     """Speed of the tool frame's origin over its limits.
 
     Parameters
@@ -244,6 +236,7 @@ class ToolSpeedLimit(_ToolLimit):
     """
 
     kind = "tool_speed"
+    longer_time = "relieves"
 
     def __init__(
         self, tool: ToolSpeed, tables: Sequence[SpeedTable], labels: Sequence[Label]
@@ -261,10 +254,7 @@ class ToolSpeedLimit(_ToolLimit):
         return np.column_stack(largest), np.column_stack(slopes)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._ratios(self._tool.speed(motion), motion.s)
-
-    def _ratios(self, speed: np.ndarray, s: np.ndarray) -> np.ndarray:
-        return np.asarray(speed[:, None] / self.largest_at(s)[0])
+        return self._tool.speed(motion)[:, None] / self.largest_at(motion.s)[0]
 
     def partials(self, motion: JointStates) -> Partials:
         largest, slope = self.largest_at(motion.s)

@@ -133,7 +133,7 @@ def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
     )
     curve = septic(start, end, (chord + (before + after)) / 2)
     velocity = curve.derivatives(np.linspace(0.0, curve.length, 201), 1)[1]
-    speed = float(np.linalg.norm(velocity[:, :rows], axis=1).min())
+    speed = np.linalg.norm(velocity[:, :rows], axis=1).min()
     slowest = 0.2  # it is 1 on a line
     if not speed > slowest:
         raise join.wrong_blend(

@@ -68,8 +68,9 @@ def build_path(
         raise PathError("a path needs at least one segment", where="path")
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
-        curves.append(coordinates.curve(segment, i, point))
-        point = curves[-1].derivatives(np.array([curves[-1].length]), 0)[0, 0]
+        curve = coordinates.curve(segment, i, point)
+        point = curve.derivatives(np.array([curve.length]), 0)[0, 0]
+        curves.append(curve)
     pieces = _join(curves, segments, coordinates)
     positions = len(position_rows(coordinates.rows))
     stopping = [i for i, segment in enumerate(segments) if segment.stop]
@@ -163,7 +164,7 @@ def check_on_path(
     """
     place = task_map.value(posture)
     miss = np.abs(task_map.difference(place, target))
-    worst = int(np.argmax(miss))
+    worst = np.argmax(miss)
     largest = tolerances.WRITTEN
     if miss[worst] > largest:
         unit = task_map.units[worst]

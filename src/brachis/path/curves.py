@@ -206,7 +206,7 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
         )
     to_center = np.linalg.solve(gram, np.diag(gram) / 2) @ sides
     outward = -to_center
-    radius = float(np.linalg.norm(outward))
+    radius = np.linalg.norm(outward)
     # An inversion about the start makes a line of the circle, and this the direction in which via comes before the end.
     forward = to_via / gram[0, 0] - to_end / gram[1, 1]
     forward -= (forward @ outward) / radius**2 * outward
@@ -261,8 +261,8 @@ def _normal(
             allowed="the axis of rotation, [nx, ny, nz]",
             hint="Or use via and to",
         )
-    unit = np.asarray(normal) / float(np.linalg.norm(normal))
-    slope = float(unit @ outward / np.linalg.norm(outward))
+    unit = np.asarray(normal) / np.linalg.norm(normal)
+    slope = unit @ outward / np.linalg.norm(outward)
     largest = 1e-3  # coordinates are given with a few digits
     if abs(slope) > largest:
         raise context.wrong(
@@ -270,7 +270,7 @@ def _normal(
             ".normal",
             found=f"{np.rad2deg(np.arccos(np.clip(slope, -1, 1))):.6g} degrees between them",
             allowed=f"90 degrees to within {np.rad2deg(largest):.2g}",
-            hint=f"Move the centre by {float(unit @ outward):.6g} m along the normal, or use via and to",
+            hint=f"Move the centre by {unit @ outward:.6g} m along the normal, or use via and to",
         )
     return unit
 
@@ -279,7 +279,7 @@ def _with_yaw(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
     """Return the arc with the yaw that the segment asks for."""
     tangent = turning == "tangent"
     if "yaw" in context.rows:
-        sense = float(np.sign(np.linalg.det([arc.outward, arc.forward])))
+        sense = np.sign(np.linalg.det([arc.outward, arc.forward]))
         return replace(
             arc,
             center=np.append(arc.center, context.start[-1]),

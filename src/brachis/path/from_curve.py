@@ -105,7 +105,7 @@ def _of_pieces(
         values = _rows(pieces(after, nu=order))
         jumps = np.abs(values - _rows(pieces(before, nu=order))).max(axis=1)
         if jumps.max() > 1e-7 * (1.0 + np.abs(values).max()):
-            place = float(after[int(np.argmax(jumps))])
+            place = after[np.argmax(jumps)]
             raise InputError(
                 "the curve is not smooth enough: a path must be smooth to the third derivative",
                 where="curve",
@@ -124,6 +124,7 @@ def _of_function(
     """Fit a spline of degree 5 to a function, with ever more intervals, until it is met in between as well."""
 
     def values(u: Array) -> Array:
+        """Return the function's values, (K, m), after a check."""
         points = np.array([np.asarray(curve(float(each)), dtype=float) for each in u])
         if points.ndim != 2 or not np.isfinite(points).all():
             raise InputError(
@@ -137,7 +138,7 @@ def _of_function(
         breaks = np.linspace(*interval, count + 1)
         spline = _interpolate(values, breaks, 5, multiplicity=1)
         between = breaks[:-1] + np.diff(breaks) * 0.37
-        miss = float(np.abs(spline(between) - values(between)).max())
+        miss = np.abs(spline(between) - values(between)).max()
         if miss <= tolerance:
             return spline
     raise InputError(

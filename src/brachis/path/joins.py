@@ -136,7 +136,7 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
         Number of position rows.
     """
     # The k-th derivative times length^(k - 1) compares with the speed, which is about 1.
-    size = max(float(np.linalg.norm(before[1])), 1.0)
+    size = max(np.linalg.norm(before[1]), 1.0)
     jumps = (
         np.linalg.norm(after - before, axis=1) * length ** np.arange(-1.0, 3.0) / size
     )
@@ -144,7 +144,7 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
         return None
     if jumps[1] > tolerances.WRITTEN:
         corner = angle_between(before[1], after[1])
-        speed, new_speed = (float(np.linalg.norm(one[1])) for one in (before, after))
+        speed, new_speed = (np.linalg.norm(one[1]) for one in (before, after))
         # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
         if corner > 0.01 * abs(new_speed - speed):
             return f"a corner of {np.rad2deg(corner):.4g} degrees{_of_yaw(before, after, positions)}"

@@ -136,7 +136,7 @@ def _check_motion(
     s = np.linspace(*part.s, 401)
     velocity = tool_derivatives(task_map, path.between(*part.s), s)[0]
     speeds = np.linalg.norm(velocity, axis=1)
-    worst = int(np.argmin(speeds))
+    worst = np.argmin(speeds)
     if speeds[worst] <= tolerances.LENGTH:
         raise PathError(
             "the tool has a process speed where its position stands still",
@@ -159,7 +159,7 @@ def _check_ends(task: Task, task_map: TaskMap, path: Path, number: int) -> None:
         if part.s[end] != s or boundary.periodic:
             continue
         velocity = tool_derivatives(task_map, path, np.array([s]))[0, 0]
-        ratio = float(np.linalg.norm(velocity)) / path_speed(task_map, path, s)
+        ratio = np.linalg.norm(velocity) / path_speed(task_map, path, s)
         found = speed * ratio
         if abs(found - part.speed) <= tolerances.WRITTEN * part.speed:
             continue

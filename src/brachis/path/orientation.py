@@ -205,6 +205,7 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> Orientatio
         )
 
     def sine(sigma: Array) -> Array:
+        """Return the sine of the angle between the tangent and up, (K,)."""
         tangent = unit(curve.derivatives(sigma, 1)[1:])[0]
         return np.linalg.norm(np.cross(up, tangent), axis=1)
 

@@ -67,6 +67,7 @@ def least_quality(columns: Curve) -> tuple[float, float]:
     """
 
     def quality(sigma: Array) -> Array:
+        """Return the quality of the quaternions, (K,), 1 at unit length."""
         quaternions = columns.derivatives(sigma, 0)[0, :, POSITIONS:]
         lengths = np.linalg.norm(quaternions, axis=1)
         return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))
@@ -87,11 +88,11 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
     """
     count = 64
     grid = spread(knots, count)
-    near = int(np.argmin(function(grid)))
+    near = np.argmin(function(grid))
     before, after = np.clip([near - 1, near + 1], 0, len(grid) - 1)
     fine = np.linspace(grid[before], grid[after], 2 * count + 1)
     values = function(fine)
-    best = int(np.argmin(values))
+    best = np.argmin(values)
     return float(fine[best]), float(values[best])
 
 

@@ -71,13 +71,9 @@ def sine_cosine(angle: Array) -> tuple[Array, Array]:
     return both.imag, both.real
 
 
-# Of the three axes, the matrices of the cross product: row i of that of axis k is axis i x axis k.
-_OF_AXES = np.cross(np.eye(3)[None, :], np.eye(3)[:, None])
-
-
 def hat(vector: Array) -> Array:
     """Return the matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
-    return np.tensordot(vector, _OF_AXES, axes=1)
+    return np.cross(np.eye(3), vector[..., None, :])
 
 
 def quaternion_derivatives(rotation: Array) -> Array:

@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import apply_each
 from brachis.errors import PathError
 from brachis.path.protocol import Array, Curve, Path, PathSample
 from brachis.robot import TaskMap, task_map_of
@@ -159,6 +160,7 @@ class SequencePath:
         """Arc length of the position rows, m, by Gauss quadrature between the knots."""
 
         def speeds(s: Array) -> Array:
+            """Return how far the position moves per unit s, (K,), m."""
             slope = self.derivatives(s, 1)[1, :, : self.positions]
             return np.linalg.norm(slope, axis=1)
 
@@ -250,21 +252,14 @@ def tool_derivatives(task_map: TaskMap, path: Path, s: Array) -> Array:
     twists = tool.twists(sample.target)
     jacobian = tool.jacobian(twists)
     slopes = tool.derivatives(twists, sample.xi, sample.xi_ds)
-    terms = (
-        [(jacobian, sample.xi)],
-        [(jacobian, sample.xi_ds), (slopes.velocity_q, sample.xi)],
-        [
-            (jacobian, sample.xi_dds),
-            (slopes.acceleration_qdot, sample.xi_ds),
-            (slopes.acceleration_q, sample.xi),
-        ],
+    velocity = apply_each(jacobian, sample.xi)
+    v_ds = apply_each(jacobian, sample.xi_ds) + apply_each(slopes.velocity_q, sample.xi)
+    v_dds = (
+        apply_each(jacobian, sample.xi_dds)
+        + apply_each(slopes.acceleration_qdot, sample.xi_ds)
+        + apply_each(slopes.acceleration_q, sample.xi)
     )
-    return np.stack(
-        [
-            sum(np.einsum("kij,kj->ki", matrix, vector) for matrix, vector in order)
-            for order in terms
-        ]
-    )
+    return np.stack([velocity, v_ds, v_dds])
 
 
 def check_closed(task_map: TaskMap, path: Path) -> None:
@@ -276,7 +271,7 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
     """
     ends = path.sample(np.array([0.0, 1.0]))
     gap = np.abs(task_map.difference(*ends.target))
-    worst = int(np.argmax(gap))
+    worst = np.argmax(gap)
     largest = tolerances.WRITTEN  # of derivatives relative to their size
     if gap[worst] > largest:
         raise PathError(
@@ -286,7 +281,7 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
             where="boundary.periodic",
         )
     for derivative, name in ((ends.xi, "tangent"), (ends.xi_ds, "curvature")):
-        jump = float(np.linalg.norm(derivative[1] - derivative[0]))
+        jump = np.linalg.norm(derivative[1] - derivative[0])
         size = max(np.linalg.norm(ends.xi[0]), np.linalg.norm(derivative))
         if jump > largest * size:
             raise PathError(

@@ -186,7 +186,7 @@ def _check_start(key: str, off: Array, context: SegmentContext) -> None:
     hint = place_hint(context.position, context.position - moved, context.positions)
     unit = "rad or m" if joints_of(context.rows) else "m"
     for away, of, looks in ((moved, unit, hint), (turned, "rad", None)):
-        distance = float(np.linalg.norm(away))
+        distance = np.linalg.norm(away)
         if distance > START_TOLERANCE:
             here = place(context.rows, context.start)
             found = f"{here}, {distance:.4g} {of} off"

@@ -106,7 +106,7 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
         if len(breaks) > _MOST_INTERVALS:
             break
         breaks = np.sort(np.concatenate([breaks, middles[is_off]]))
-    worst = float(middles[int(np.argmax(deviation))])
+    worst = float(middles[np.argmax(deviation)])
     raise PathError(
         "the path bends too abruptly for a constant speed of the tool",
         s_interval=(worst, worst),

@@ -26,19 +26,19 @@ def check_progress(given: Given) -> list[Check]:
         times, velocity = _path_speeds(curves, given.states.t[inside] - phase.begin)
         found.append(np.stack([phase.begin + times, velocity]))
     times, velocity = np.hstack(found)
-    backwards = abs(float(np.minimum(0.0, velocity).min()))
-    time = float(times[int(np.argmin(velocity))]) if backwards else None
+    backwards = abs(np.minimum(0.0, velocity).min())
+    time = times[np.argmin(velocity)] if backwards else None
     s = np.array([[phase.s_begin, phase.s_end] for phase in trajectory.phases])
-    ends = float(np.abs([s[0, 0], s[-1, -1] - 1.0]).max())
+    ends = np.abs([s[0, 0], s[-1, -1] - 1.0]).max()
     checks = [
         Check("ds/dt below zero", backwards, allowed, "1/s", time=time),
         Check("s at the ends", ends, allowed, "-"),
     ]
     if len(s) > 1:
         jumps = np.abs(s[1:, 0] - s[:-1, 1])
-        worst = int(np.argmax(jumps))
+        worst = np.argmax(jumps)
         time = trajectory.phases[worst].end
-        jump = float(jumps[worst])
+        jump = jumps[worst]
         checks.append(Check("s where phases meet", jump, allowed, "-", time=time))
     return checks
 
@@ -113,7 +113,7 @@ def _check_speed(given: Given, name: str, wanted: float, time: float) -> list[Ch
     jacobian = task_map.jacobian(task_map.twists(trajectory.position(time)[None]))[0]
     position, angle = task_map.norms(jacobian @ trajectory.velocity(time))
     per_s, _ = task_map.norms(given.path.sample(trajectory.path_spline([time])).xi)
-    moves = float(per_s[0]) > tolerances.WRITTEN
+    moves = per_s[0] > tolerances.WRITTEN
     unit = "m/s" if moves else "rad/s"
     off = abs(float(position if moves else angle) - wanted)
     allowed = given.options.rest_velocity_tolerance * (1.0 + wanted)
@@ -184,8 +184,8 @@ def check_continuity(given: Given) -> list[Check]:
             jumps = np.abs(getattr(after, part) - left).max(axis=1, initial=0.0)
             if part in ("qddot", "tau") and what == " jump":
                 jumps[at_stops] = 0.0
-            value = float(jumps.max(initial=0.0) / scale)
-            time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
+            value = jumps.max(initial=0.0) / scale
+            time = after.t[np.argmax(jumps)] if len(jumps) else None
             allowed = given.options.jump_tolerance
             checks.append(Check(f"{name}{what}", value, allowed, "relative", time=time))
     return checks

@@ -17,69 +17,50 @@ Its rate is taken by differences along the motion, that of the last three terms 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from brachis.common.arrays import cross, rates
 from brachis.robot import Robot
-from brachis.robot.urdf_bodies import Body, placement_matrix
+from brachis.robot.urdf_bodies import Body, placement_matrix, symmetric_matrix
 
 _AXES = np.eye(3)
 
 
-@dataclass(frozen=True, eq=False)
-class _Weight:
-    """A rigid body in the frame of the joint that carries it: mass (kg), centre (3, 1) m, inertia (3, 3) kg m^2."""
-
-    mass: float
-    com: np.ndarray
-    inertia: np.ndarray
-
-    def resistance(
-        self, spin: np.ndarray, gain: np.ndarray, acceleration: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Force, and moment about the joint's origin, (3, K), that its motion takes: w, e and a of the frame."""
-        turning = cross(gain, self.com) + cross(spin, cross(spin, self.com))
-        force = self.mass * (acceleration + turning)
-        moment = self.inertia @ gain + cross(spin, self.inertia @ spin)
-        return force, moment + cross(self.com, force)
-
-
-def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def tool_placements(
+    robot: Robot, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n).
 
-    Positions of virtual joints say how far the tool is from the path; the place on the path is returned then.
+    Positions of virtual joints say how far the tool is from the path; the place on the path is returned then. `joints`
+    are the `joint_placements` if they are known.
     """
-    tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
+    origin, rotation = real_tool_placements(
+        robot, *(joints or joint_placements(robot, q))
+    )
     count = len(robot.urdf_joints)
     away = dict(zip(robot.joint_names[count:], q.T[count:], strict=True))
+    if not away:
+        return origin, rotation
     still = np.zeros(len(q))
     x, y, z, side, lead, roll = (
         away.get(f"tool_{way}", still)
         for way in ("x", "y", "z", "side", "lead", "roll")
     )
-    axes = [
-        _rotate(
-            _AXES[2], -roll, _rotate(_AXES[1], -lead, _rotate(_AXES[0], side, each))
-        )
-        for each in (axis[:, None] + still for axis in _AXES)
-    ]
-    # The path's axes and its origin, (3, K) each, in the frame of one joint after the other.
-    vectors = [tool[:3, :3] @ axis for axis in axes]
-    origin = -sum(axis * length for axis, length in zip(axes, (x, y, z), strict=True))
-    vectors.append(tool[:3, :3] @ origin + tool[:3, 3:])
-    for body, position in reversed(
-        list(zip(robot.urdf_dynamics.bodies, q.T, strict=False))
-    ):
-        if body.sliding:
-            vectors[3] = vectors[3] + body.axis[:, None] * position
-        vectors = _to_parent(body, position, *vectors)
-        vectors[3] = vectors[3] + body.placement[:3, 3, None]
-    base = placement_matrix(robot.settings.mounting)
-    *turned, origin = (base[:3, :3] @ part for part in vectors)
-    rotations = np.moveaxis(np.stack(turned, axis=1), 2, 0)
-    return (origin + base[:3, 3, None]).T, rotations
+    # The path's axes in the tool frame.
+    turned = _turns(_AXES[2], -roll) @ _turns(_AXES[1], -lead) @ _turns(_AXES[0], side)
+    rotation = rotation @ turned
+    return origin - np.einsum("kij,jk->ki", rotation, np.array([x, y, z])), rotation
+
+
+def real_tool_placements(
+    robot: Robot, rotations: np.ndarray, origins: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame by `joint_placements`, without virtual joints."""
+    tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
+    last = rotations[:, -1]
+    return origins[:, -1] + last @ tool[:3, 3], last @ tool[:3, :3]
 
 
 def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,23 +81,10 @@ def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
         if body.sliding:
             origin = origin + (rotation @ body.axis) * position[:, None]
         else:
-            flat = np.zeros(len(q))
-            turned = [
-                _rotate(body.axis, position, axis[:, None] + flat) for axis in _AXES
-            ]
-            rotation = rotation @ np.array(turned).transpose(2, 1, 0)
+            rotation = rotation @ _turns(body.axis, position)
         rotations.append(rotation)
         origins.append(origin)
     return np.stack(rotations, axis=1), np.stack(origins, axis=1)
-
-
-def _to_parent(
-    body: Body, position: np.ndarray, *vectors: np.ndarray
-) -> list[np.ndarray]:
-    """Return vectors (3, K) in a joint's frame in the frame of the joint before, at positions (K,)."""
-    if not body.sliding:
-        vectors = tuple(_rotate(body.axis, position, part) for part in vectors)
-    return [body.placement[:3, :3] @ part for part in vectors]
 
 
 def torques(
@@ -138,6 +106,7 @@ def torque_rates(
     """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s."""
 
     def rigid(*states: np.ndarray) -> tuple[np.ndarray]:
+        """Return the torques without friction at moments nearby, (2 K, n)."""
         return (_rigid(robot, *states[:3]),)
 
     (rate,) = rates(rigid, (q, qdot, qddot, qdddot))
@@ -159,14 +128,19 @@ def _rigid(
     for joint in reversed(range(len(bodies))):
         body = bodies[joint]
         for weight in _weights(robot, joint):
-            push, turn = weight.resistance(*motions[joint])
+            push, turn = _resistance(weight, *motions[joint])
             force = force + push
             moment = moment + turn
         tau[:, joint] = body.axis @ (force if body.sliding else moment)
+        position = q[:, joint]
         if body.sliding:
-            moment = moment + cross(body.axis[:, None] * q[:, joint], force)
-        force, moment = _to_parent(body, q[:, joint], force, moment)
-        moment = moment + cross(body.placement[:3, 3, None], force)
+            moment = moment + cross(body.axis[:, None] * position, force)
+        else:
+            force = _rotate(body.axis, position, force)
+            moment = _rotate(body.axis, position, moment)
+        rotation = body.placement[:3, :3]
+        force = rotation @ force
+        moment = rotation @ moment + cross(body.placement[:3, 3, None], force)
     return tau
 
 
@@ -205,24 +179,32 @@ def _motions(
     return motions
 
 
-def _weights(robot: Robot, joint: int) -> list[_Weight]:
+def _weights(robot: Robot, joint: int) -> list[Body]:
     """List what a joint carries: its own body and, at the end of the chain, the payload."""
-    body = robot.urdf_dynamics.bodies[joint]
+    bodies = robot.urdf_dynamics.bodies
+    body = bodies[joint]
     payload = robot.settings.payload
-    weights = [_Weight(body.mass, body.com[:, None], body.inertia)]
-    if payload is not None and joint == len(robot.urdf_dynamics.bodies) - 1:
-        tool = robot.urdf_dynamics.tool
-        rotation = tool[:3, :3]
-        i = payload.inertia
-        inertia = np.zeros((3, 3))
-        if i is not None:
-            inertia = np.array(
-                [[i.ixx, i.ixy, i.ixz], [i.ixy, i.iyy, i.iyz], [i.ixz, i.iyz, i.izz]]
-            )
-        com = rotation @ payload.com + tool[:3, 3]
-        turned = rotation @ inertia @ rotation.T
-        weights.append(_Weight(payload.mass, com[:, None], turned))
-    return weights
+    if payload is None or joint < len(bodies) - 1:
+        return [body]
+    tool = robot.urdf_dynamics.tool
+    rotation = tool[:3, :3]
+    inertia = np.zeros((3, 3))
+    if payload.inertia is not None:
+        inertia = symmetric_matrix(payload.inertia.model_dump())
+    com = rotation @ payload.com + tool[:3, 3]
+    turned = rotation @ inertia @ rotation.T
+    return [body, replace(body, mass=payload.mass, com=com, inertia=turned)]
+
+
+def _resistance(
+    body: Body, spin: np.ndarray, gain: np.ndarray, acceleration: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force, and moment about the joint's origin, (3, K), that a body's motion takes: w, e and a of the frame."""
+    com = body.com[:, None]
+    turning = cross(gain, com) + cross(spin, cross(spin, com))
+    force = body.mass * (acceleration + turning)
+    moment = body.inertia @ gain + cross(spin, body.inertia @ spin)
+    return force, moment + cross(com, force)
 
 
 def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -231,3 +213,10 @@ def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.nda
     cosine = np.cos(angles)
     parallel = along * (axis @ vectors) * (1.0 - cosine)
     return vectors * cosine + cross(along, vectors) * np.sin(angles) + parallel
+
+
+def _turns(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Return the rotation matrices, (K, 3, 3), about a unit vector by angles (K,), rad."""
+    still = np.zeros(len(angles))
+    columns = [_rotate(axis, angles, unit[:, None] + still) for unit in _AXES]
+    return np.array(columns).transpose(2, 1, 0)

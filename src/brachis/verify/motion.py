@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import bisect
 from brachis.errors import InputError
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of
@@ -177,14 +178,12 @@ class Pieces:
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates, (P,), are reached; s(t) does not decrease."""
-        low = np.zeros(len(s))
-        high = np.full(len(s), self.times[-1])
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            before = self.path_coordinate(middle) < s
-            low = np.where(before, middle, low)
-            high = np.where(before, high, middle)
-        return 0.5 * (low + high)
+
+        def is_before(t: np.ndarray) -> np.ndarray:
+            """Tell which path coordinates are not reached yet."""
+            return self.path_coordinate(t) < s
+
+        return bisect(is_before, np.full(len(s), self.times[-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -366,7 +365,7 @@ def _spread(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> P
     wanted = np.nan_to_num(np.maximum(by_interval, by_travel))
     steps = np.ceil(np.clip(wanted, _LEAST_STEPS, 10_000)).astype(int)
     count = steps + 1
-    _check_count(int(count.sum()))
+    _check_count(count.sum())
     begins = np.repeat(np.cumsum(count) - count, count)
     part = (np.arange(len(begins)) - begins) / np.repeat(steps, count)
     u = (1.0 - part) * np.repeat(low, count) + part * np.repeat(high, count)

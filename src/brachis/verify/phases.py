@@ -28,8 +28,9 @@ def check_stops(given: Given) -> list[Check]:
     options = given.options
     trajectory = given.trajectory
     ends = np.array([phase.s_end for phase in trajectory.phases])
-    misses = [float(np.abs(ends - leg.end).min()) for leg in stops]
-    waits = [sum(phase.duration for phase in _dwells(given, leg)) for leg in stops]
+    misses = [np.abs(ends - leg.end).min() for leg in stops]
+    dwells = [_dwells(given, leg) for leg in stops]
+    waits = [sum(phase.duration for phase in phases) for phases in dwells]
     off = [abs(wait - leg.dwell) for wait, leg in zip(waits, stops, strict=True)]
     places = [f"s = {leg.end:g}" for leg in stops]
     checks = [
@@ -49,8 +50,8 @@ def check_stops(given: Given) -> list[Check]:
         checks.append(check_joints(given, title, values, states.t, kind, allowed))
     moved = [
         given.during(phase.begin, phase.end).states
-        for leg in stops
-        for phase in _dwells(given, leg)
+        for phases in dwells
+        for phase in phases
     ]
     if moved:
         speeds = np.concatenate([each.qdot for each in moved])
@@ -98,13 +99,14 @@ def check_process_speed(given: Given) -> list[Check]:
         misses.append(miss)
 
         def deviations(states: MotionStates, leg: Leg = leg) -> np.ndarray:
+            """Return relative deviations from the speed, (K, 1), in units of `_RESOLUTION`."""
             speeds = frame_motion(given.robot, states, "linear")
             return np.abs(speeds / leg.speed - 1.0) / _RESOLUTION
 
         part = given.during(phase.begin, phase.end)
         worst = worst_between(part, deviations, (subject,))
         found.append(worst._replace(ratio=worst.ratio * _RESOLUTION))
-    worst = found[int(np.argmax([each.ratio for each in found]))]
+    worst = found[np.argmax([each.ratio for each in found])]
     speed = (worst.ratio, _SPEED, "relative", worst.subject, worst.time, worst.remark)
     tolerance = given.options.progress_tolerance
     return [
@@ -119,6 +121,7 @@ def _nearest_phase(given: Given, leg: Leg) -> tuple[MotionPhase, float]:
     """Return the phase that passes a leg, or nearly so, and how far its ends are off, in s."""
 
     def miss(phase: MotionPhase) -> float:
+        """Return how far the ends of a phase are from those of the leg, in s."""
         return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
 
     nearest = min(given.trajectory.phases, key=miss)
@@ -139,7 +142,7 @@ def _check_worst(
     name: str, misses: list[float], allowed: float, unit: str, subjects: list[str]
 ) -> Check:
     """Check what misses most."""
-    worst = int(np.argmax(misses))
+    worst = np.argmax(misses)
     return Check(name, misses[worst], allowed, unit, subjects[worst])
 
 
@@ -158,9 +161,9 @@ def check_joints(
     if not len(times):
         return Check(name, np.inf, allowed, "relative")
     size = np.abs(values)
-    k, joint = np.unravel_index(int(np.argmax(size)), size.shape)
+    k, joint = np.unravel_index(np.argmax(size), size.shape)
     robot = given.robot
     unit = UNITS[kind][robot.position_units[joint]] if kind in UNITS else kind
     subject = robot.joint_names[joint]
-    value = float(size[k, joint])
-    return Check(name, value, allowed, unit, subject, float(times[k]))
+    value = size[k, joint]
+    return Check(name, value, allowed, unit, subject, times[k])

@@ -83,7 +83,10 @@ class Check:
     is_kept: bool = True
 
     def __post_init__(self) -> None:
-        """Compare."""
+        """Make plain numbers of NumPy's, and compare."""
+        object.__setattr__(self, "value", float(self.value))
+        if self.time is not None:
+            object.__setattr__(self, "time", float(self.time))
         object.__setattr__(self, "passed", bool(self.value <= self.allowed))
 
     def figures(self, *, degrees: bool) -> tuple[str, str, str]:

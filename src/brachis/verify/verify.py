@@ -114,17 +114,17 @@ def _check_path(given: Given) -> Check:
     states = given.states.only(once)
     task_map = given.task_map
     targets = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
-    placements = tool_placements(task_map.robot, states.q)
-    of_joints = isinstance(task_map, JointSpace)
-    found = states.q if of_joints else task_map.of_placements(*placements)
+    found = states.q
+    if not isinstance(task_map, JointSpace):
+        found = task_map.of_placements(*tool_placements(task_map.robot, states.q))
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
-    worst = int(np.argmax(errors))
+    worst = np.argmax(errors)
     tolerance = given.options.path_tolerance
     remark = ""
     recovered = given.trajectory.recovered
     if recovered is not None:
         tolerance = max(tolerance, recovered.tolerance)
         remark = "the path was recovered from the motion"
-    error = float(errors[worst])
-    time = float(states.t[worst])
+    error = errors[worst]
+    time = states.t[worst]
     return Check("path error", error, tolerance, "m, rad", time=time, remark=remark)

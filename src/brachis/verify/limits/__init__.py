@@ -79,6 +79,7 @@ def _check_model(model: LimitModel, given: Given) -> tuple[str, Worst]:
         return limit.name, _check_values(limit, given, subjects)
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the ratios by the model's own check, (K, c)."""
         motion = (states.q, states.qdot, states.qddot, states.tau)
         found = np.abs(formula(given.robot, *motion))
         shape = (len(states.t), len(subjects))
@@ -98,16 +99,14 @@ def _check_values(limit: Any, given: Given, subjects: Sequence[str]) -> Worst:
     """Find the worst ratio by the values of a `brachis.limits.Limit` itself."""
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the sizes of the limit's ratios, (K, c)."""
         return np.abs(limit.ratios(states, states.t))
 
     if limit.guarantee.is_mean:
         means = ratios(given.states)[0]
         column = int(np.argmax(means))
-        time = float(given.states.t[-1])
-        worst = Worst(float(means[column]), subjects[column], time)
+        time = given.states.t[-1]
+        worst = Worst(means[column], subjects[column], time)
     else:
         worst = worst_between(given, ratios, subjects)
     return worst._replace(remark="checked by its own formula")
-
-
-__all__ = ["TABLE", "check_limits"]

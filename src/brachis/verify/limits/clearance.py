@@ -106,12 +106,13 @@ class _Search:
         u = np.array(ends)
         d = np.array(values)
         while len(piece):
-            lower = 0.5 * (d.sum(axis=0) - self._moved(piece, pair, u[1] - u[0]))
+            approach = self._compute_approach(piece, pair, u[1] - u[0])
+            lower = 0.5 * (d.sum(axis=0) - approach)
             is_open = lower < self._goal
             self._halved += int(is_open.sum())
             if self._halved > _MOST:
-                return min(known, float(lower.min()))
-            known = min(known, float(lower.min(initial=np.inf, where=~is_open)))
+                return min(known, lower.min())
+            known = min(known, lower.min(initial=np.inf, where=~is_open))
             piece = piece[is_open]
             pair = pair[is_open]
             u = u[:, is_open]
@@ -127,7 +128,7 @@ class _Search:
             pair = np.tile(pair, 2)
         return known
 
-    def _moved(
+    def _compute_approach(
         self, piece: np.ndarray, pair: np.ndarray, step: np.ndarray
     ) -> np.ndarray:
         """How far the solids of pairs move towards each other within steps at most, (M,), m."""
@@ -145,8 +146,8 @@ class _Search:
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
         """Keep the smallest distance."""
         if distance.min(initial=np.inf) < self._least:
-            best = int(np.argmin(distance))
-            self._least = float(distance[best])
+            best = np.argmin(distance)
+            self._least = distance[best]
             self._place = float(t[best]), int(pair[best])
 
 

@@ -64,6 +64,7 @@ def _worst_quantity(
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the ratios to the limits in both directions, (K, n)."""
         values = quantity(robot, states)
         return np.maximum(values / upper, values / lower)
 
@@ -87,9 +88,9 @@ def _worst_rms_torque(given: Given) -> Worst | None:
     ends = states.tau[steps] ** 2 + states.tau[steps + 1] ** 2
     mean = lengths @ ((ends + 4.0 * between.tau**2) / 6.0) / lengths.sum()
     ratios = np.sqrt(mean) / limit
-    joint = int(np.argmax(ratios))
+    joint = np.argmax(ratios)
     name = given.robot.joint_names[joint]
-    return Worst(float(ratios[joint]), name, float(states.t[-1]))
+    return Worst(ratios[joint], name, states.t[-1])
 
 
 JOINT_CHECKS: dict[str, LimitCheck] = {
@@ -114,6 +115,7 @@ def worst_total_power(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the total power over its limit, (K, 1)."""
         return np.abs(np.einsum("ki,ki->k", states.tau, states.qdot))[:, None] / limit
 
     return worst_between(given, ratios, ("all joints",))
@@ -131,6 +133,7 @@ def worst_torque_at_speed(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return 1 plus the excess over the curves, (K, c), as parts of the torques at rest."""
         columns = []
         for joint in joints:
             speed, torque = np.array(curves[joint]).T

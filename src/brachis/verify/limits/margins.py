@@ -23,13 +23,13 @@ def find_margins(given: Given) -> tuple[Margin, ...]:
         return ()
     if not isinstance(given.task_map, JointSpace):
         singular = _singular_values(given, states)
-        k = int(np.argmin(singular))
+        k = np.argmin(singular)
         time = float(states.t[k])
         name = "smallest singular value"
         margins.append(Margin(name, float(singular[k]), "-", "arm", time))
     used, names = _parts_of_ranges(given, states)
     if names:
-        place, joint = np.unravel_index(int(np.argmax(used)), used.shape)
+        place, joint = np.unravel_index(np.argmax(used), used.shape)
         left = 50.0 * (1.0 - float(used[place, joint]))
         time = float(states.t[place])
         name = "smallest distance from the end of a range"
@@ -39,8 +39,9 @@ def find_margins(given: Given) -> tuple[Margin, ...]:
 
 def _singular_values(given: Given, states: MotionStates) -> np.ndarray:
     """Least singular values, (K,), of the Jacobian of the rows that the task prescribes, by the arm's own joints."""
-    rotations, origins = joint_placements(given.robot, states.q)
-    tool = tool_placements(given.robot, states.q)[0]
+    joints = joint_placements(given.robot, states.q)
+    rotations, origins = joints
+    tool = tool_placements(given.robot, states.q, joints)[0]
     columns = []
     for number, body in enumerate(given.robot.urdf_dynamics.bodies, 1):
         axis = rotations[:, number] @ body.axis
@@ -78,6 +79,7 @@ def _worst_singularity(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return 2 - value / wanted, (K, 1)."""
         return 2.0 - _singular_values(given, states)[:, None] / wanted
 
     return worst_between(given, ratios, ("arm",))
@@ -91,6 +93,7 @@ def _worst_joint_end(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the distances from the middles over what is wanted, (K, c)."""
         return _parts_of_ranges(given, states)[0] / (1.0 - 2.0 * share)
 
     return worst_between(given, ratios, names)

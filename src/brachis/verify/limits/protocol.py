@@ -71,14 +71,14 @@ def worst_between(
             k = int(np.argmax(most))
             column = int(np.argmax(ratio[steps[k]]))
             remark = f"not searched to the end: {ratio.max():.6g} was found, and more than this is not possible"
-            time = float(states.t[steps[k]])
-            return Worst(float(most[k]), subjects[column], time, remark)
+            time = states.t[steps[k]]
+            return Worst(most[k], subjects[column], time, remark)
         middle = 0.5 * (states.u[steps] + states.u[steps + 1])
         new = MotionStates.at(given.pieces, states.piece[steps], middle)
         states, order = states.merge(new)
         ratio = np.concatenate([ratio, ratio_at(new)])[order]
-    k, column = map(int, np.unravel_index(int(np.argmax(ratio)), ratio.shape))
-    return Worst(float(ratio[k, column]), subjects[column], float(states.t[k]))
+    k, column = map(int, np.unravel_index(np.argmax(ratio), ratio.shape))
+    return Worst(ratio[k, column], subjects[column], states.t[k])
 
 
 def _may_hold_more(
@@ -110,17 +110,17 @@ def largest(given: Given, above: np.ndarray, below: np.ndarray) -> Worst:
     """
     flat = np.concatenate([above, below], axis=1).reshape(len(above), -1)
     ends = flat[[0, -1]]
-    end, column = map(int, np.unravel_index(int(np.argmax(ends)), ends.shape))
+    end, column = map(int, np.unravel_index(np.argmax(ends), ends.shape))
     value = float(ends[end, column])
     u = np.array([float(end)])
     higher = np.flatnonzero(flat.max(axis=0) > value)
     turning, at, values = turns(flat[:, higher])
     if values.max(initial=-np.inf) > value:
-        k = int(np.argmax(values))
-        value = float(values[k])
-        column = int(higher[turning[k]])
+        k = np.argmax(values)
+        value = values[k]
+        column = higher[turning[k]]
         u = at[[k]]
     _, count, n = above.shape
     piece = np.array([column // n % count])
-    time = float(given.pieces.time(piece, u)[0])
+    time = given.pieces.time(piece, u)[0]
     return Worst(value, given.robot.joint_names[column % n], time)

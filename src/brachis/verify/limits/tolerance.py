@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.robot.urdf_bodies import placement_matrix
+from brachis.common.arrays import apply_each
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
-from brachis.verify.mechanics import joint_placements
+from brachis.verify.mechanics import joint_placements, real_tool_placements
 from brachis.verify.motion import Given, MotionStates
 
 _ANGLES = ("lead", "side", "roll")
@@ -28,6 +28,7 @@ def _worst_range(given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the used parts of the ranges, (K, c)."""
         found = _deviations(given, states)
         columns = []
         for way, (low, high) in ranges.items():
@@ -46,6 +47,7 @@ def _worst_size(given: Given, name: str, largest: float | None) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the sizes over the largest one, (K, 1)."""
         return _deviations(given, states)[name][:, None] / largest
 
     return worst_between(given, ratios, ("tool",))
@@ -53,18 +55,15 @@ def _worst_size(given: Given, name: str, largest: float | None) -> Worst | None:
 
 def _deviations(given: Given, states: MotionStates) -> dict[str, np.ndarray]:
     """Angles, degrees, and displacements, m, by which the tool is not where the path wants it, (K,) each."""
-    robot = given.robot
-    rotations, origins = joint_placements(robot, states.q)
-    tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
-    rotation = rotations[:, -1] @ tool[:3, :3]
-    origin = origins[:, -1] + rotations[:, -1] @ tool[:3, 3]
+    joints = joint_placements(given.robot, states.q)
+    origin, rotation = real_tool_placements(given.robot, *joints)
     target = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
     shift = origin - target[:, :3]
     wanted = target[:, 3:].reshape(-1, 3, 3) if given.task.of_poses else rotation
     back = np.swapaxes(wanted, 1, 2)
     turned = back @ rotation
     if given.task.tolerances.position.axes == "tool":
-        shift = np.einsum("kij,kj->ki", back, shift)
+        shift = apply_each(back, shift)
     x, y, z = turned[:, :, 2].T
     radians = {
         "tilt": np.arctan2(np.hypot(x, y), z),

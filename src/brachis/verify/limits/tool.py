@@ -42,6 +42,7 @@ def _worst_motion(key: str, vector: str, given: Given) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the sizes over the limit, (K, 1)."""
         return frame_motion(given.robot, states, vector) / limit
 
     return worst_between(given, ratios, ("tool",))
@@ -62,6 +63,7 @@ def _worst_speed(given: Given) -> Worst | None:
         return _worst_motion("speed", "linear", given)
 
     def ratios(states: MotionStates) -> np.ndarray:
+        """Return the speeds over the lowest limit at each s, (K, 1)."""
         s = states.s
         limit = np.full(
             len(s), limits.speed if isinstance(limits.speed, float) else np.inf
