@@ -407,7 +407,7 @@ class PlanningError(BrachisError):
 def nearest(
     name: str, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
-    """Suggest a valid name: one for a word of other libraries, else the longest beginning of `name`, else the nearest.
+    """Suggest a valid name: one for a word of other libraries, one with a slip, the longest beginning, the nearest.
 
     If an attribute is asked for, functions elsewhere in brachis count as well.
     """
@@ -421,9 +421,10 @@ def nearest(
     begun = [one for one in by_small if small.startswith(f"{one}_")]
     if known and small not in by_small:
         return known[0]
-    if begun:
-        return by_small[max(begun, key=len)]
     near = difflib.get_close_matches(small, by_small, n=1, cutoff=0.5)
+    has_slip = difflib.get_close_matches(small, near, n=1, cutoff=0.9)
+    if begun and not has_slip:
+        return by_small[max(begun, key=len)]
     return by_small[near[0]] if near else None
 
 

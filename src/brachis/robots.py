@@ -16,15 +16,14 @@ import os
 from functools import cache
 from pathlib import Path
 
-from brachis.common.files import is_file, shipped_folder
+from brachis.common.files import is_file, shipped_folder, shipped_robots
 from brachis.errors import check_names, no_attribute
 from brachis.robot import Robot
 
 
 def names() -> tuple[str, ...]:
     """Return the names of the robots, in alphabetical order."""
-    files = shipped_folder("robots").glob("*/robot.urdf")
-    return tuple(sorted(path.parent.name for path in files))
+    return shipped_robots()
 
 
 def path_of(name: str) -> Path:

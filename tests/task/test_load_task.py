@@ -355,6 +355,9 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         {"task_space": ["x", "w"]},
         ["task_space[1]: not one of the allowed values; found 'w'", "'yaw'"],
     ),
+    ({"task_space": "poze"}, ["found 'poze'", "Did you mean 'pose'?"]),
+    ({"task_space": "pose_free_rol"}, ["Did you mean 'pose_free_roll'?"]),
+    ({"search": {"effort": "fas"}}, ["found 'fas'", "Did you mean 'fast'?"]),
     ({"task_space": "poses"}, ["task_space: ", "found 'poses'", "pose_free_roll"]),
     ({"path": []}, ["task: path: too few items"]),
     (

@@ -220,6 +220,12 @@ def shipped_folder(folder: str) -> Path:
     return installed if installed.is_dir() else package.parents[1] / folder
 
 
+def shipped_robots() -> tuple[str, ...]:
+    """Return the names of the robots that come with brachis, in alphabetical order."""
+    files = shipped_folder("robots").glob("*/robot.urdf")
+    return tuple(sorted(path.parent.name for path in files))
+
+
 def locate_urdf(name: str, folder: Path) -> str:
     """Return the absolute path of a URDF: a file relative to `folder`; without such a file, an included robot's."""
     own = os.path.abspath(folder / name)  # noqa: PTH100  (a linked folder keeps its name; meshes may be beside it)

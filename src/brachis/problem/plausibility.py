@@ -328,6 +328,16 @@ def _masses(robot: Robot) -> Iterator[Check]:
         yield _figure("body inertia", moment, body.mass, where)
 
 
+def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
+    """Say after how much of its way the tool is at a path coordinate; nothing of a path of joints."""
+    if not task_map.axes:
+        return ""
+    places = path.sample(np.append(np.linspace(0.0, s, 201), np.linspace(s, 1.0, 201)))
+    positions = places.target[:, : len(task_map.axes)]
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return f", after {steps[:200].sum():.3g} m of {steps.sum():.3g} m"
+
+
 def check_within_reach(task_map: TaskMap, path: Path) -> None:
     """Refuse a path of the tool that is farther away than the arm's links and slides together can reach.
 
@@ -348,10 +358,10 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
         return
     beyond = s[away > far]
     found, most = write_apart(furthest, far)
-    # A path that is only a little too long is less than three times as far.
-    looks_like_mm = furthest / 1000.0 < 3.0 * far < furthest
+    # A path that is only a little too long is some times as far; in mm it would be within the arm's first links.
+    looks_like_mm = 0.05 * far < furthest / 1000.0 < 3.0 * far
     raise PathError(
-        f"the path is out of reach from s = {beyond[0]:.3g} on",
+        f"the path is out of reach from s = {beyond[0]:.3g} on{say_how_far(task_map, path, beyond[0])}",
         s_interval=(float(beyond[0]), float(beyond[-1])),
         found=f"{found} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
         allowed=f"at most {most} m, which is all links and slides in one line",

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from brachis.errors import InputError, TaskError
+from brachis.common.files import shipped_robots
+from brachis.errors import InputError, TaskError, UrdfError, suggest
 from brachis.robot.friction import Friction
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import (
@@ -62,6 +63,15 @@ def robot_from_settings(
             "the URDF is missing", where="robot.urdf", allowed="path of a URDF file"
         )
     path = Path(source or "saved URDF")
+    if urdf is None and urdf_text is None and not path.exists():
+        robots = shipped_robots()
+        raise UrdfError(
+            "the file does not exist",
+            where="robot.urdf",
+            found=str(path),
+            allowed=f"a URDF file, or the name of an included robot: {', '.join(robots)}",
+            hint=suggest(path.name, robots),
+        )
     named = settings.model_copy(update={"urdf": str(path.absolute())})
     return Robot.from_settings(named, str(path), urdf_text)
 

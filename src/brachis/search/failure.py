@@ -19,6 +19,7 @@ from brachis.errors import BrachisError, PathError, PlanningError, Remedy
 from brachis.limits import Limit, Moments, Role
 from brachis.optimise.candidate import Candidate
 from brachis.problem.feasibility import in_figures, load_remedies
+from brachis.problem.plausibility import say_how_far
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
 from brachis.robot.joints import in_turn_of
@@ -115,7 +116,9 @@ def explain_reach(
             return None
         first, last = (float(end) for end in s[np.flatnonzero(~possible)[[0, -1]]])
         return Failure(
-            cause.format(first=first),
+            cause.format(
+                first=first, far=say_how_far(problem.task_map, problem.path, first)
+            ),
             phase="path",
             s_interval=(first, last),
             hint=hint,
@@ -128,7 +131,7 @@ def explain_reach(
     failure = (
         fail(
             _has_any(_exist(anywhere)),
-            "the path is out of reach from s = {first:.3g} on (no posture was found)",
+            "the path is out of reach from s = {first:.3g} on{far} (no posture was found)",
             "Shorten or move the path, or choose another start posture",
         )
         or fail(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from typing import Final, TypeVar, get_args, get_type_hints
@@ -247,7 +248,12 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
             allowed += f" with keys out of {', '.join(keys)}"
         return "wrong type", found, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
-    return problem, found, form.format(**detail.get("ctx", {})) or None
+    allowed = form.format(**detail.get("ctx", {}))
+    word = detail["input"]
+    hint = (
+        _meant([word], re.findall(r"\w+", allowed)) if isinstance(word, str) else None
+    )
+    return problem, found, allowed or None, hint
 
 
 _MAPPING = "a mapping"

@@ -47,7 +47,7 @@ WRONG_TASKS = {
     "out of reach": (
         "path",
         [{"line": {"length": 5.0, "angle_deg": 0}}],
-        ["out of reach from s = 0.2"],
+        ["out of reach from s = 0.2", " m of 5 m", "Shorten or move the path"],
     ),
     "out of limits": (
         "robot.limits.position",
@@ -71,6 +71,11 @@ WRONG_TASKS = {
         "robot.urdf",
         "nowhere.urdf",
         ["nowhere.urdf", "the file does not exist"],
+    ),
+    "robot that is not included": (
+        "robot.urdf",
+        "scara4",
+        ["robot.urdf: the file does not exist", "iiwa14", "Did you mean 'scara3'?"],
     ),
     "no limit at all": (
         "robot.limits.torque",
