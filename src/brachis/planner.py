@@ -19,7 +19,7 @@ from threadpoolctl import ThreadpoolController
 from brachis import ik
 from brachis.common.arguments import check_callable, check_list, count
 from brachis.common.deadline import Deadline
-from brachis.common.progress import Listener, report_progress
+from brachis.common.progress import Listener, ignore, report_progress
 from brachis.errors import BrachisError, InputError, write_count
 from brachis.optimise.candidate import Candidate
 from brachis.optimise.layout import SHORTEST_TIME
@@ -44,7 +44,7 @@ from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, locate
 from brachis.search import Search, first_maps, try_remedies
 from brachis.search.given_motion import with_tolerances
-from brachis.search.processes import ignore, process_count, run_in_processes
+from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import has_charts
 from brachis.task import (
     Source,

@@ -14,6 +14,10 @@ Listener = Callable[[str], None]
 """Takes what the planner is doing in plain words, between iterations; may raise KeyboardInterrupt."""
 
 
+def ignore(_text: str) -> None:
+    """Listen to nothing."""
+
+
 class Iteration(str):
     """A step of a stage: logged at level DEBUG, where stages are logged at INFO."""
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
-from brachis.common.progress import Listener
+from brachis.common.progress import Listener, ignore
 from brachis.errors import write_count
 from brachis.optimise.backends import SolveStatus
 from brachis.optimise.candidate import Candidate, InitialGuess, coordinates
@@ -40,7 +40,7 @@ from brachis.search.failure import (
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.hopeless import explain_holding, explain_postures, explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
-from brachis.search.processes import ignore, process_count, run_in_processes
+from brachis.search.processes import process_count, run_in_processes
 from brachis.search.same_motion import is_same_motion
 from brachis.search.schedule import Batch, batches
 from brachis.trajectory import Trajectory

@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.common import interrupts
 from brachis.common.deadline import NEVER, Deadline
-from brachis.common.progress import Listener
+from brachis.common.progress import Listener, ignore
 from brachis.errors import BrachisError
 
 _MAIN = "MainProcess"
@@ -136,7 +136,3 @@ def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
     """Run in a process of its own: one thread for linear algebra, nobody listening."""
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         return function(*arguments, ignore)
-
-
-def ignore(_text: str) -> None:
-    """Listen to nothing."""

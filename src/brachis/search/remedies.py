@@ -9,13 +9,13 @@ from typing import Any
 from brachis import ik
 from brachis.common import interrupts
 from brachis.common.deadline import Deadline
+from brachis.common.progress import ignore
 from brachis.errors import BrachisError, Remedy
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.portfolio import Search
-from brachis.search.processes import ignore
 from brachis.task import Task, load_task, task_with, with_keys
 
 _TIME = 20.0

@@ -16,7 +16,7 @@ import numpy as np
 
 from brachis.common.arrays import interpolate_columns
 from brachis.common.deadline import NEVER, Deadline
-from brachis.common.progress import Listener
+from brachis.common.progress import Listener, ignore
 from brachis.errors import PathError, UnreachableError
 from brachis.kernel import Spline, collocation
 from brachis.kinematics import (
@@ -41,7 +41,6 @@ from brachis.search.phase_plane import (
     spread_stations,
 )
 from brachis.search.posture_lattice import PostureLattice
-from brachis.search.processes import ignore
 from brachis.search.screening import screen
 
 SCREENED = 4

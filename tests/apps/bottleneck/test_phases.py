@@ -60,7 +60,13 @@ def test_costs_are_those_of_all_phases(stopping):
 
 
 def test_a_saved_motion_is_solved_again_by_phase(stopping):
-    again = brachis.bottleneck.report(stopping.trajectory, reference=True)
+    lines: list[str] = []
+    again = brachis.bottleneck.report(
+        stopping.trajectory, reference=True, listener=lines.append
+    )
+    assert lines[0] == "solving the problem of the motion again"
+    assert any("iteration 1," in line for line in lines)
+    assert lines[-1] == "planning again with discontinuous torque"
     now = brachis.bottleneck.report(stopping)
     for entry in now.sensitivities.limits:
         other = again.sensitivities.of(entry.label.subject, entry.label.kind)

@@ -13,6 +13,7 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.common.arrays import spread
 from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener, ignore
 from brachis.errors import PlanningError, UnreachableError
 from brachis.kinematics import ChartRows, JointMap, JointSpaceMap, chart_around
 from brachis.limits.safeguards import MARGINS
@@ -32,13 +33,15 @@ from brachis.robot.task_map import JOINTS
 from brachis.trajectory import Trajectory
 
 
-def solve_again(trajectory: Trajectory) -> SolvedProgram:
+def solve_again(trajectory: Trajectory, listener: Listener = ignore) -> SolvedProgram:
     """Solve the problem of a saved motion from where it ended; a timing alone stays as it is.
 
     Parameters
     ----------
     trajectory : Trajectory
         As `brachis.plan` made it, or loaded.
+    listener : callable, optional
+        Is told of every iteration.
 
     Returns
     -------
@@ -78,7 +81,7 @@ def solve_again(trajectory: Trajectory) -> SolvedProgram:
                 task.solver,
                 first,
                 deadline,
-                lambda _text: None,
+                listener,
                 has_time_law=has_law,
             )
             try:

@@ -27,6 +27,7 @@ from brachis.apps.bottleneck.sensitivities import (
     Sensitivity,
     sensitivities,
 )
+from brachis.common.progress import Listener, ignore
 from brachis.common.summary import LINES
 from brachis.errors import InputError
 from brachis.optimise.retiming import SOLVER
@@ -136,6 +137,7 @@ def report(
     *,
     check: bool = False,
     reference: bool = False,
+    listener: Listener = ignore,
 ) -> BottleneckReport:
     """Find out what holds a planned motion back.
 
@@ -148,6 +150,8 @@ def report(
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
         Plan again with discontinuous torque allowed on a fine mesh: the best value known, not a proven bound.
+    listener : callable, optional
+        Is told what is being done, in one line of text.
 
     Returns
     -------
@@ -182,7 +186,8 @@ def report(
         phases = limits_by_phase(trajectory, active)
         return BottleneckReport(trajectory.t_end, None, active, phases)
     if isinstance(motion, Trajectory):
-        refined = optimum = solve_again(trajectory)
+        listener("solving the problem of the motion again")
+        refined = optimum = solve_again(trajectory, listener)
     elif motion.candidate.refined is None:
         raise InputError(
             "the result contains no solved optimisation problem",
@@ -192,19 +197,30 @@ def report(
     else:
         refined = optimum = motion.candidate.refined
         if refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r:
-            optimum = solve_again(trajectory)
+            listener("solving the problem of the motion again")
+            optimum = solve_again(trajectory, listener)
+    listener("computing what every limit costs")
     found = sensitivities(optimum)
     tolerance = trajectory.task.refinement.tolerance
     limits = limits_in(refined.program)
+    listener("looking for what is active, and when")
     active = saturations(trajectory, limits)
+    checked = None
+    if check:
+        listener("solving again with every limit raised")
+        checked = check_sensitivities(optimum, found)
+    best = None
+    if reference:
+        listener("planning again with discontinuous torque")
+        best = find_reference(refined, tolerance=tolerance)
     return BottleneckReport(
         t_end=trajectory.t_end,
         sensitivities=found,
         saturations=active,
         phases=limits_by_phase(trajectory, active),
         timing=find_timing_gap(trajectory, limits),
-        check=check_sensitivities(optimum, found) if check else None,
-        reference=find_reference(refined, tolerance=tolerance) if reference else None,
+        check=checked,
+        reference=best,
         reference_sought=reference,
     )
 

@@ -230,9 +230,8 @@ def bottleneck(
             result = _plan_task(task, urdf, changes, strict, listener)
             trajectory = result.trajectory
             data = result.to_dict()
-        listener("looking for what holds the motion back")
         report = brachis.bottleneck.report(
-            result or trajectory, check=check, reference=reference
+            result or trajectory, check=check, reference=reference, listener=listener
         )
     data["bottleneck"] = report.to_dict()
     redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
