@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolverReport,
     SolveStatus,
+    solver_of_large,
 )
 from brachis.optimise.near_rows import solve_near_rows
 from brachis.optimise.path_program import PathProgram
@@ -251,6 +253,8 @@ def _worst_ratio(program: Program, x: np.ndarray) -> float:
 _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
+_LARGE = 250
+"""Variables of a program over the path from which on an interior-point method takes less time, about."""
 _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
 
@@ -270,6 +274,8 @@ class SolverSession:
         Called between iterations with their number and the objective.
     acceptable : float
         An answer with no larger violation is usable, however the solve ended.
+    large : Solver, optional
+        What is tried first on large programs over the path, which are sparse; see `solver_of_large`.
     """
 
     backend: Solver
@@ -277,6 +283,7 @@ class SolverSession:
     deadline: Deadline
     progress: Progress | None = None
     acceptable: float = -np.inf
+    large: Solver | None = None
 
     @classmethod
     def for_task(
@@ -305,10 +312,11 @@ class SolverSession:
             options = dataclasses.replace(options, progress=_PROGRESS, patience=5)
 
         def progress(iteration: int, objective: float) -> None:
-            text = f"{backend.name}: iteration {iteration}, t_E = {objective:.4f} s"
+            text = f"iteration {iteration}, t_E = {objective:.4f} s"
             listener(Iteration(text))
 
-        return cls(backend, options, deadline, progress)
+        large = solver_of_large(settings.name)
+        return cls(backend, options, deadline, progress, large=large)
 
     def over_path(self, options: SolverOptions) -> SolverSession:
         """Return the session for programs over the path, under other options.
@@ -332,12 +340,21 @@ class SolverSession:
         progress = share * self.options.progress
         until = self.deadline.within(self.options.time_limit)
 
-        def solve(problem: Problem, x: np.ndarray) -> SolverReport:
+        def solve_with(
+            backend: Solver, problem: Problem, x: np.ndarray
+        ) -> SolverReport:
+            """Solve in the time that is left."""
             options = dataclasses.replace(
                 self.options, time_limit=until.left, progress=progress
             )
-            return self.backend.solve(problem, x, options, self.progress)
+            return backend.solve(problem, x, options, self.progress)
 
+        is_large = isinstance(program, PathProgram) and len(x) > _LARGE
+        if is_large and self.large is not None:
+            report = solve_with(self.large, program, x)
+            if report.status.usable:
+                return report
+        solve = partial(solve_with, self.backend)
         is_interior = self.backend.is_interior
         report = (
             solve(program, x) if is_interior else solve_near_rows(program, x, solve)

@@ -254,4 +254,4 @@ def _starts_of(
     if deadline.passed:
         return []
     listener(f"looking for joint paths on the lattice of {decomposition.name}")
-    return lattice_starts(decomposition, level, deadline)
+    return lattice_starts(decomposition, level, deadline, listener)

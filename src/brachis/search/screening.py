@@ -17,7 +17,7 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
-from brachis.optimise.backends import SolverOptions, solvers_for
+from brachis.optimise.backends import SolverOptions, solver_of_large, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
@@ -119,7 +119,9 @@ def _improve(
         return start
     problem = start.problem
     (backend,) = solvers_for(solvers_of(problem)[0])
-    session = SolverSession(backend, SolverOptions(time_limit=np.inf), deadline)
+    options = SolverOptions(time_limit=np.inf)
+    large = solver_of_large(problem.task.solver.name)
+    session = SolverSession(backend, options, deadline, large=large)
     try:
         maps = start.maps_by_leg()
         program = program_of(problem, maps, [breaks_of(problem)] * len(maps))

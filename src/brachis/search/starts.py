@@ -87,6 +87,8 @@ class SearchLevel:
     fallback: bool = False
 
 
+_LOOKED_AT = 4
+"""Joint paths that are looked at for each one that is taken, where several joints are redundant."""
 _NEARLY = 0.2
 """Violation of a limit of the scene with which a joint path still is a guess."""
 _SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
@@ -108,22 +110,41 @@ SEARCH_LEVELS = {
 
 
 def lattice_starts(
-    decomposition: Decomposition, level: SearchLevel, deadline: Deadline = NEVER
+    decomposition: Decomposition,
+    level: SearchLevel,
+    deadline: Deadline = NEVER,
+    listener: Listener = ignore,
 ) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
+
+    Where several joints are redundant they are the most promising ones of more joint paths.
 
     Parameters
     ----------
     decomposition : Decomposition
     level : SearchLevel
     deadline : Deadline, optional
+    listener : callable, optional
 
     Returns
     -------
     list of InitialGuess or DeadEnd
         Empty if the time was up.
     """
-    most = max(1, level.joint_paths // max(1, len(decomposition.redundant)))
+    r = len(decomposition.redundant)
+    most = max(1, level.joint_paths // max(1, r))
+    if r < 2 or most == 1:
+        return _joint_paths(decomposition, level, most, deadline)
+    found = _joint_paths(decomposition, level, _LOOKED_AT * most, deadline)
+    if isinstance(found, DeadEnd) or len(found) <= most:
+        return found
+    return screen(found, most * len(decomposition.branches), deadline, listener)
+
+
+def _joint_paths(
+    decomposition: Decomposition, level: SearchLevel, most: int, deadline: Deadline
+) -> list[InitialGuess] | DeadEnd:
+    """Take up to `most` joint paths for every branch from a decomposition's lattice."""
     for finer, density in ((1, 1.0), (3, 2.0)):
         lattice = ClosedFormLattice(
             decomposition,

@@ -24,6 +24,7 @@ __all__ = [
     "SolverOptions",
     "SolverReport",
     "residual",
+    "solver_of_large",
     "solvers_for",
 ]
 TABLE = {
@@ -55,3 +56,12 @@ def solvers_for(name: str, *, curved: bool = False) -> tuple[Solver, ...]:
     if name not in TABLE:
         raise UnknownNameError("solver", name, NAMES, where="solver.name")
     return (TABLE[name],)
+
+
+def solver_of_large(name: str) -> Solver | None:
+    """Return what ``auto`` tries first for large, sparse programs; None for the name of a single solver.
+
+    The effort of an interior-point method grows with the entries of the Jacobian, that of an active-set method with the
+    square of the variables at least.
+    """
+    return TABLE["ipopt"] if name == "auto" else None
