@@ -506,3 +506,9 @@ def test_missing_file_and_folder(tmp_path):
         Trajectory.load(tmp_path / "gone.npz")
     with pytest.raises(ResultFileError, match=r"not a brachis result.*a folder"):
         Trajectory.load(tmp_path)
+
+
+def test_no_time_and_derivatives_beyond_the_degree(trajectory):
+    assert trajectory.position([]).shape == (0, trajectory.robot.n)
+    assert trajectory.jerk([]).shape == (0, trajectory.robot.n)
+    assert not trajectory.pieces([0.0, 0.1], nu=6).any()

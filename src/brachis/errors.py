@@ -407,7 +407,9 @@ class PlanningError(BrachisError):
 def nearest(
     name: str, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
-    """Suggest a valid name: one for a word of other libraries, one with a slip, the longest beginning, the nearest.
+    """Suggest a valid name.
+
+    In turn: the one for a word of other libraries, one with a slip, the longest beginning of `name`, the nearest.
 
     If an attribute is asked for, functions elsewhere in brachis count as well.
     """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 
-from brachis.kernel import Spline, collocation
+from brachis.kernel import Spline, blossom, collocation, sum_basis
 
 KNOTS = np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.5, 0.5, 0.5, 0.5, 0.9, 1.0, 1.0, 1.0, 1.0])
 """Of a cubic spline; two phases meet at 0.5."""
@@ -62,6 +62,36 @@ def test_collocation():
     for nu in range(3):
         matrix = collocation(KNOTS, 3, X, nu)
         np.testing.assert_allclose(matrix @ points, Spline(KNOTS, points, 3)(X, nu))
+
+
+@pytest.mark.parametrize("count", [7, 9])
+def test_as_many_values_as_places(count):
+    with pytest.raises(ValueError, match=f"{count} values for 8 places"):
+        Spline.through(np.arange(8.0), np.ones((count, 2)))
+
+
+def test_values_in_any_order_of_memory():
+    values = np.random.default_rng(5).normal(size=(8, 3))
+    own = Spline.through(np.arange(8.0), np.asfortranarray(values))
+    np.testing.assert_allclose(own(np.arange(8.0)), values, atol=1e-14)
+
+
+def test_no_place_and_no_curve():
+    assert Spline(KNOTS, np.ones((len(KNOTS) - 4, 2)), 3)([]).shape == (0, 2)
+    assert Spline(KNOTS, np.ones((len(KNOTS) - 4, 0)), 3)([0.1]).shape == (1, 0)
+
+
+def test_numbers_that_do_not_exist():
+    points = np.ones((len(KNOTS) - 4, 1))
+    for piece in (2, len(points)):
+        with pytest.raises(ValueError, match="a piece does not exist"):
+            blossom(KNOTS, points, np.array([piece]), [np.zeros(1)] * 3)
+    basis = np.ones((4, 1, 4))
+    for first in (-1, len(points) - 3):
+        with pytest.raises(ValueError, match="a control point does not exist"):
+            sum_basis(basis, np.array([first]), points.T)
+    with pytest.raises(ValueError, match="one number for each place"):
+        sum_basis(basis, np.array([0, 1]), points.T)
 
 
 @pytest.mark.parametrize(

@@ -355,7 +355,8 @@ def test_joints_without_a_limit_on_their_acceleration_are_named():
     key = "acceleration limits"
     assert in_use(free)[key] == "none (robot.limits.acceleration)"
     qddot = np.array([[1.0, -5.0], [-3.0, 2.0]])
-    assert in_use(free, qddot)[key].endswith("; the largest is 5 m/s^2, of j2")
+    said = in_use(free, qddot)[key]
+    assert said.endswith("; the largest is 3 rad/s^2, of j1, and 5 m/s^2, of j2")
     some = of(DAMPED, tool_frame="tool", limits={"acceleration": {"j2": 9.0}})
     said = in_use(some, qddot)[key]
     assert said.startswith("none for j1 (robot.limits.acceleration); the largest is 3 ")

@@ -611,3 +611,13 @@ def test_a_search_without_time_says_where_its_lattices_ended(robot, clock):
     assert len(calls) == 1
     first, last = refused.value.s_interval
     assert first < 0.5 < last
+
+
+def test_a_motion_far_from_its_timing_gets_a_second_opinion(monkeypatch):
+    line = {"redundant_joints": ["j1"], "intervals": 8, "least_motion": False}
+    plain = brachis.plan(brachis.examples.scara_line, **line)
+    assert {one.solver for one in plain.candidates} == {"uno"}
+    monkeypatch.setattr(portfolio, "_FAR", 0.01)
+    again = brachis.plan(brachis.examples.scara_line, **line)
+    assert {one.solver for one in again.candidates} == {"uno", "ipopt"}
+    assert again.t_end <= plain.t_end

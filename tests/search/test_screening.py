@@ -9,10 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brachis import examples
 from brachis.common.deadline import NEVER, Deadline
+from brachis.optimise import improve
+from brachis.optimise.backends import TABLE, SolverReport, SolveStatus
 from brachis.optimise.retiming import COARSE, ROUGH
 from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
+from brachis.robot.from_task import robot_from_settings
 from brachis.search import screening
 from brachis.search import starts as module
 from brachis.task import load_task
@@ -142,3 +146,50 @@ def test_the_better_half_of_a_coarse_search_is_searched_again(starts, monkeypatc
     origins = [start.origin for start in starts]
     assert searched[COARSE] == origins
     assert searched[ROUGH] == origins[::-1][: (len(starts) + 1) // 2]
+
+
+def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms():
+    task = load_task(examples.free_roll)
+    problem = Problem.of(robot_from_settings(task.robot), task)
+    (decomposition,) = decompositions_of(problem)
+    (level,) = module.SEARCH_LEVELS["fast"]
+    found = module.lattice_starts(decomposition, level)
+    assert isinstance(found, list)
+    assert len(found) == level.joint_paths // 2
+    assert all(start.is_improved for start in found)
+    estimates = [start.estimate for start in found]
+    assert estimates == sorted(estimates)
+    # Those of the shortest joint paths alone.
+    few = dataclasses.replace(level, joint_paths=2)
+    (shortest,) = module.lattice_starts(decomposition, few)
+    assert not shortest.is_improved
+    assert estimates[0] < shortest.estimate
+
+
+def test_large_programs_over_the_path_go_to_an_interior_point_first(
+    starts, monkeypatch
+):
+    monkeypatch.setattr(improve, "_LARGE_PROGRAM", 20)
+    solvers = []
+    solved = improve.solve_near_rows
+
+    def near_rows(program, x, solve):
+        report = solved(program, x, solve)
+        solvers.append(report.solver)
+        return report
+
+    monkeypatch.setattr(improve, "solve_near_rows", near_rows)
+    plain = screening.screen(starts[:2], MOST, NEVER, quiet)
+    assert not solvers
+
+    # What it leaves is solved as any other.
+    def give_up(monitor, x):
+        none = np.zeros(len(monitor.problem.lower))
+        status = SolveStatus.ITERATION_LIMIT
+        return SolverReport("ipopt", status, x, 9.0, 9.0, none, 0, 0.0, "given up")
+
+    failing = dataclasses.replace(TABLE["ipopt"], run=give_up)
+    monkeypatch.setitem(TABLE, "ipopt", failing)
+    again = screening.screen(starts[:2], MOST, NEVER, quiet)
+    assert set(solvers) == {"uno"}
+    assert again[0].estimate == pytest.approx(plain[0].estimate, rel=1e-2)

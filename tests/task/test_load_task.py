@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from brachis import robots
+from brachis import examples, robots
 from brachis.errors import TaskError
 from brachis.task import FROM_URDF, LineBy, Task, load_task
 
@@ -622,3 +622,13 @@ def test_the_given_mapping_is_not_changed() -> None:
     before = copy.deepcopy(given_task)
     load_task(given_task)
     assert given_task == before
+
+
+@pytest.mark.parametrize(
+    ("key", "word"),
+    [("start.joints", "home"), ("search.effort", "for"), ("path_start", "home")],
+)
+def test_words_of_a_sentence_are_not_suggested(key: str, word: str) -> None:
+    with pytest.raises(TaskError) as caught:
+        load_task(examples.scara_line, changes={key: word})
+    assert "Did you mean" not in str(caught.value)

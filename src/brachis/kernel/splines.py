@@ -43,10 +43,12 @@ class Spline:
         Raises
         ------
         ValueError
-            The places are too few, or do not ascend.
+            The places are too few, or do not ascend, or there are more or fewer values.
         """
         if not (len(places) > degree and (np.diff(places) > 0.0).all()):
             raise ValueError("the places of an interpolation are few, or do not ascend")
+        if len(values) != len(places):
+            raise ValueError(f"{len(values)} values for {len(places)} places")
         beside = (degree + 1) // 2
         inner = places[beside : len(places) - beside]
         outer = np.ones(degree + 1)
@@ -59,7 +61,7 @@ class Spline:
         basis = cls(knots, np.eye(degree + 1)[every], degree)(places)
         matrix = np.zeros((len(places), 2 * degree + 1))
         matrix[number, column - number + degree] = basis[number, every[column]]
-        points = np.array(values, dtype=float)
+        points = np.array(values, dtype=float, order="C")
         columns = points.size // len(points)
         load().brachis_solve_band(
             len(points), degree, columns, address(matrix), address(points)
@@ -67,7 +69,7 @@ class Spline:
         return cls(knots, points, degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> np.ndarray:
-        """Value, or derivative of the order `nu`, at x, of any shape; at a knot the one behind it."""
+        """Value, or derivative of the order `nu`, at x, of any shape; at a knot that just after it."""
         if nu > 0:
             return self.derivative(x, nu - 1)
         x = np.asarray(x, dtype=float)
@@ -158,7 +160,7 @@ def sum_basis(
     orders, count, width = basis.shape
     curves, many = control_points.shape
     if first.shape != (count,):
-        raise ValueError("a place has no first control point")
+        raise ValueError("first needs one number for each place")
     if count and not 0 <= first.min() <= first.max() <= many - width:
         raise ValueError(f"a control point does not exist; there are {many}")
     kept = (

@@ -158,7 +158,10 @@ class BoundarySpline:
 
 
 def stack_splines(
-    splines: Sequence[BoundarySpline], slices: Sequence[slice], shape: tuple[int, int]
+    splines: Sequence[BoundarySpline],
+    slices: Sequence[slice],
+    count: int,
+    variables: int,
 ) -> tuple[FreePart, np.ndarray]:
     """Put splines over the same knots together: the control points of one follow those of the one before.
 
@@ -167,8 +170,8 @@ def stack_splines(
     splines : sequence of BoundarySpline
     slices : sequence of slice
         Where the free variables of each are among all variables.
-    shape : tuple of int
-        Number of control points of each spline, and of all variables.
+    count, variables : int
+        Numbers of control points of each spline, and of all variables.
 
     Returns
     -------
@@ -177,7 +180,6 @@ def stack_splines(
     given : (1 + k, all control points) ndarray
         By powers of the duration.
     """
-    count, variables = shape
     most = max((len(spline.given) for spline in splines), default=1)
     given = np.zeros((most, len(splines), count))
     matrix = np.zeros((len(splines), count, variables))

@@ -25,7 +25,7 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolverReport,
     SolveStatus,
-    solver_of_large,
+    solver_for_large,
 )
 from brachis.optimise.near_rows import solve_near_rows
 from brachis.optimise.path_program import PathProgram
@@ -253,8 +253,8 @@ def _worst_ratio(program: Program, x: np.ndarray) -> float:
 _ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess."""
 
-_LARGE = 250
-"""Variables of a program over the path from which on an interior-point method takes less time, about."""
+_LARGE_PROGRAM = 250
+"""Variables of a program over the path above which an interior-point method is as fast as others, or faster."""
 _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
 
@@ -274,8 +274,8 @@ class SolverSession:
         Called between iterations with their number and the objective.
     acceptable : float
         An answer with no larger violation is usable, however the solve ended.
-    large : Solver, optional
-        What is tried first on large programs over the path, which are sparse; see `solver_of_large`.
+    for_large : Solver, optional
+        What is tried first on large programs over the path, which are sparse; see `solver_for_large`.
     """
 
     backend: Solver
@@ -283,7 +283,7 @@ class SolverSession:
     deadline: Deadline
     progress: Progress | None = None
     acceptable: float = -np.inf
-    large: Solver | None = None
+    for_large: Solver | None = None
 
     @classmethod
     def for_task(
@@ -315,8 +315,8 @@ class SolverSession:
             text = f"iteration {iteration}, t_E = {objective:.4f} s"
             listener(Iteration(text))
 
-        large = solver_of_large(settings.name)
-        return cls(backend, options, deadline, progress, large=large)
+        for_large = solver_for_large(settings.name)
+        return cls(backend, options, deadline, progress, for_large=for_large)
 
     def over_path(self, options: SolverOptions) -> SolverSession:
         """Return the session for programs over the path, under other options.
@@ -349,9 +349,9 @@ class SolverSession:
             )
             return backend.solve(problem, x, options, self.progress)
 
-        is_large = isinstance(program, PathProgram) and len(x) > _LARGE
-        if is_large and self.large is not None:
-            report = solve_with(self.large, program, x)
+        is_large = isinstance(program, PathProgram) and len(x) > _LARGE_PROGRAM
+        if is_large and self.for_large not in (None, self.backend):
+            report = solve_with(self.for_large, program, x)
             if report.status.usable:
                 return report
         solve = partial(solve_with, self.backend)

@@ -118,9 +118,10 @@ class Phase:
         self.intervals = len(grid.breaks) - 1
         self.t_norm = grid.t_norm
         self.variables = len(layout.x_lower)
-        self._points = len(self.splines), self.intervals + self.degree
-        shape = self._points[1], self.variables
-        self._together = stack_splines(self.splines, layout.slices, shape)
+        self._points_shape = len(self.splines), self.intervals + self.degree
+        self._stacked = stack_splines(
+            self.splines, layout.slices, self._points_shape[1], self.variables
+        )
         self.x_lower = layout.x_lower
         self.x_upper = layout.x_upper
         self.lower = layout.lower
@@ -222,9 +223,9 @@ class Phase:
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
-        free_part, given = self._together
+        free_part, given = self._stacked
         points = free_part.control_points(x) + sum_powers(given, x[0])
-        return points.reshape(self._points)
+        return points.reshape(self._points_shape)
 
     def _orders(
         self, x: np.ndarray, control_points: np.ndarray, *, is_slope: bool = False
@@ -473,7 +474,9 @@ class Phase:
         slower = np.array(self.state(x).curves) * rates[:, None, None]
         if not self._ends_by_duration:
             return slower
-        points = sum_powers(self._together[1], x[0], slope=True).reshape(self._points)
+        points = sum_powers(self._stacked[1], x[0], slope=True).reshape(
+            self._points_shape
+        )
         moving = per_second(self._orders(x, points, is_slope=True), x[0])
         return np.array(moving) + slower
 

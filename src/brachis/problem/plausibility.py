@@ -329,8 +329,8 @@ def _masses(robot: Robot) -> Iterator[Check]:
 
 
 def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
-    """Say after how much of its way the tool is at a path coordinate; nothing of a path of joints."""
-    if not task_map.axes:
+    """Say how far along its way the tool is at a path coordinate; nothing at the start, and of a path of joints."""
+    if not task_map.axes or s == 0.0:
         return ""
     places = path.sample(np.append(np.linspace(0.0, s, 201), np.linspace(s, 1.0, 201)))
     positions = places.target[:, : len(task_map.axes)]
@@ -358,7 +358,7 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
         return
     beyond = s[away > far]
     found, most = write_apart(furthest, far)
-    # A path that is only a little too long is some times as far; in mm it would be within the arm's first links.
+    # A path that is only a little too long is not hundreds of times as far.
     looks_like_mm = 0.05 * far < furthest / 1000.0 < 3.0 * far
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on{say_how_far(task_map, path, beyond[0])}",

@@ -228,7 +228,7 @@ def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
     """Describe what is in use in words, with units: payload, placements, slower limits, armature, friction.
 
     Friction is always described, with where it comes from: the URDF, unless the task says otherwise. So are joints
-    without a limit on their acceleration, with the largest one among the accelerations of a motion, (K, n), if given.
+    without a limit on their acceleration; and, if accelerations of a motion, (K, n), are given, the largest of these.
     """
     settings = robot.settings
     payload = settings.payload
@@ -284,10 +284,15 @@ def _without_acceleration_limit(robot: Robot, qddot: np.ndarray | None) -> str:
     text = f"none{of_some} (robot.limits.acceleration)"
     if qddot is None:
         return text
-    largest = np.where(is_free, np.abs(qddot[:, : len(names)]).max(axis=0), 0.0)
-    joint = int(np.argmax(largest))
-    unit = UNITS["acceleration"][robot.position_units[joint]]
-    return f"{text}; the largest is {largest[joint]:.4g} {unit}, of {names[joint]}"
+    largest = np.where(is_free, np.abs(qddot[:, : len(names)]).max(axis=0), -1.0)
+    found = []
+    for unit, shown in UNITS["acceleration"].items():
+        has_unit = np.equal(robot.position_units[: len(names)], unit)
+        own = np.where(has_unit, largest, -1.0)
+        joint = int(np.argmax(own))
+        if own[joint] >= 0.0:
+            found.append(f"{own[joint]:.4g} {shown}, of {names[joint]}")
+    return f"{text}; the largest is {', and '.join(found)}"
 
 
 def _by_joint(robot: Robot, kind: str) -> str:

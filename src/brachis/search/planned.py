@@ -109,7 +109,7 @@ class PlannedMotion(Summary):
             "end_posture": trajectory.position(self.t_end).tolist(),
             "position_units": list(trajectory.robot.position_units),
             "family": self.family,
-            "in_use": in_use(trajectory.robot, trajectory.qddot),
+            "in_use": in_use(trajectory.robot, trajectory.node_accelerations),
             "status": report.status.name.lower(),
             "advice": report.status.value,
             "solver": report.solver,

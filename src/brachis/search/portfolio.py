@@ -43,6 +43,7 @@ from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.same_motion import is_same_motion
 from brachis.search.schedule import Batch, batches
+from brachis.timing import find_timing_gap
 from brachis.trajectory import Trajectory
 
 NOT_TRIED = "not tried: the search ended"
@@ -51,6 +52,8 @@ SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""
 _GAINS_MORE = 0.998
 """Factor by which another candidate may gain more by better knots than those so far."""
+_FAR = 0.2
+"""Timing gap of the best motion from which on another solver is tried: few knots alone cost up to 0.15."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 
@@ -162,6 +165,7 @@ class Search:
             for decomposition, dead_end in batch.lattices:
                 self._add_lattice(decomposition, dead_end)
             if batch.fallback and self.is_satisfied:
+                yield from self._second_opinion(batch)
                 return
             if self._deadline.passed:
                 self.interrupted = True
@@ -171,6 +175,13 @@ class Search:
             if batch.fallback and is_first_fallback:
                 is_first_fallback = False
                 self._refuse_what_is_out_of_reach()
+            yield batch
+
+    def _second_opinion(self, batch: Batch) -> Iterator[Batch]:
+        """Yield a fallback if the best motion is far slower than the fastest timing of its own joint path."""
+        assert self.best is not None and self.best.trajectory is not None
+        found = find_timing_gap(self.best.trajectory, self._problem.limits)
+        if found is not None and not found.left_out and found.gap > _FAR:
             yield batch
 
     def _start_from(self, motion: Trajectory, origin: str) -> Iterator[Batch]:

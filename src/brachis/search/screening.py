@@ -17,7 +17,7 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
-from brachis.optimise.backends import SolverOptions, solver_of_large, solvers_for
+from brachis.optimise.backends import SolverOptions, solver_for_large, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
@@ -37,7 +37,7 @@ _SLOW = 1.03
 def screen(
     starts: Sequence[InitialGuess], most: int, deadline: Deadline, listener: Listener
 ) -> list[InitialGuess]:
-    """Choose the most promising of guesses in charts.
+    """Choose the most promising of guesses.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def _improve(
     problem = start.problem
     (backend,) = solvers_for(solvers_of(problem)[0])
     options = SolverOptions(time_limit=np.inf)
-    large = solver_of_large(problem.task.solver.name)
-    session = SolverSession(backend, options, deadline, large=large)
+    for_large = solver_for_large(problem.task.solver.name)
+    session = SolverSession(backend, options, deadline, for_large=for_large)
     try:
         maps = start.maps_by_leg()
         program = program_of(problem, maps, [breaks_of(problem)] * len(maps))

@@ -117,7 +117,7 @@ def lattice_starts(
 ) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
 
-    Where several joints are redundant they are the most promising ones of more joint paths.
+    If several joints are redundant, more joint paths are found, and the most promising ones are kept.
 
     Parameters
     ----------
@@ -136,9 +136,10 @@ def lattice_starts(
     if r < 2 or most == 1:
         return _joint_paths(decomposition, level, most, deadline)
     found = _joint_paths(decomposition, level, _LOOKED_AT * most, deadline)
-    if isinstance(found, DeadEnd) or len(found) <= most:
+    kept = most * len(decomposition.branches)
+    if isinstance(found, DeadEnd) or len(found) <= kept:
         return found
-    return screen(found, most * len(decomposition.branches), deadline, listener)
+    return screen(found, kept, deadline, listener)
 
 
 def _joint_paths(
@@ -457,7 +458,7 @@ def first_maps(
     found = (
         chart_starts(problem, decompositions, level)
         if first is None
-        else lattice_starts(first, level)
+        else _joint_paths(first, level, 1, NEVER)
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)

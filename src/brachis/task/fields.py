@@ -185,8 +185,6 @@ def _from_percent(value: object) -> object:
     return float(percent[1]) / 100.0
 
 
-# Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
-# are accepted as real ones.
 def _check_version(version: object) -> object:
     # Python holds true == 1, so that a literal alone would accept `brachis: true`.
     if type(version) is not int:
@@ -199,6 +197,8 @@ def _check_version(version: object) -> object:
 
 
 Version = Annotated[Literal[1], BeforeValidator(_check_version)]
+# Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
+# are accepted as real ones.
 Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
@@ -333,7 +333,7 @@ class ByForm:
             choose,
             custom_error_type=WRONG_FORM,
             custom_error_message="must be {allowed}",
-            custom_error_context={"allowed": self.allowed},
+            custom_error_context={"allowed": self.allowed, "words": " ".join(words)},
         )
         return _tagged_union(members, by_tag, handler)
 

@@ -248,12 +248,12 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
             allowed += f" with keys out of {', '.join(keys)}"
         return "wrong type", found, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
-    allowed = form.format(**detail.get("ctx", {}))
-    word = detail["input"]
-    hint = (
-        _meant([word], re.findall(r"\w+", allowed)) if isinstance(word, str) else None
-    )
-    return problem, found, allowed or None, hint
+    facts = detail.get("ctx", {})
+    words = re.findall(r"'(\w+)'", facts.get("expected", ""))
+    words += facts.get("words", "").split()
+    given = detail["input"]
+    hint = _meant([given], words) if isinstance(given, str) else None
+    return problem, found, form.format(**facts) or None, hint
 
 
 _MAPPING = "a mapping"

@@ -58,12 +58,14 @@ class Pieces:
         values = self.c[:, piece]
         while len(values) > 1:
             values = (1.0 - u) * values[:-1] + u * values[1:]
-        return np.asarray(values[0]).reshape(*t.shape, -1)
+        return values[0].reshape(t.shape + self.c.shape[2:])
 
     @cached_property
     def derivative(self) -> Pieces:
         """The derivatives of the polynomials by time."""
         degree = len(self.c) - 1
+        if degree == 0:
+            return Pieces(np.zeros_like(self.c), self.x)
         return Pieces(
             degree * np.diff(self.c, axis=0) / np.diff(self.x)[:, None], self.x
         )

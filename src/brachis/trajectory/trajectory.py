@@ -116,6 +116,11 @@ class Trajectory(Summary):
         return float(self.times[-1])
 
     @property
+    def node_accelerations(self) -> np.ndarray:
+        """Accelerations on both sides of all nodes, (2 L + 2, n), rad/s^2 or m/s^2."""
+        return np.concatenate([self.qddot_before, self.qddot])
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Joints in chain order."""
         return self.robot.joint_names

@@ -50,10 +50,10 @@ def _path_speeds(
     knots = curves.knots * curves.t_end
     spline = Spline(knots, curves.control_points[0], curves.degree)
     bend = spline.derivative.derivative
-    begins = np.unique(knots)
-    piece, u = roots(_bernstein_coefficients(bend, begins))
-    turning = begins[piece] + u * np.diff(begins)[piece]
-    times = np.concatenate([times, begins, turning]).clip(0.0, curves.t_end)
+    breaks = np.unique(knots)
+    piece, u = roots(_bernstein_coefficients(bend, breaks))
+    turning = breaks[piece] + u * np.diff(breaks)[piece]
+    times = np.concatenate([times, breaks, turning]).clip(0.0, curves.t_end)
     return times, spline(times, nu=1)
 
 

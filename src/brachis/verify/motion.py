@@ -43,7 +43,7 @@ def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
 
 
 def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the places in (0, 1) at which polynomials change their sign.
+    """Find the places in (0, 1) at which polynomials change their sign; perhaps some at which they only touch zero.
 
     Parameters
     ----------

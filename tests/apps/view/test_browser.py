@@ -74,7 +74,7 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
     with Viewer(
         rail_result.trajectory, candidates, verified=rail_result.verified, port=0
     ) as viewer:
-        page = browser.new_page(viewport={"width": 1300, "height": 700})
+        page = browser.new_page(viewport={"width": 1300, "height": 560})
         page.set_default_timeout(PATIENCE)
         page.on("request", lambda request: foreign.append(request.url))
         page.on("pageerror", lambda error: faults.append(str(error)))

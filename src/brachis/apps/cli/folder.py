@@ -9,6 +9,7 @@ import shutil
 import signal
 import stat
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -196,7 +197,10 @@ def write_text(text: str, path: Path) -> None:
 
 @contextmanager
 def end_cleanly() -> Iterator[None]:
-    """Let SIGTERM leave the block as an exception does, so that temporary files are removed."""
+    """Let SIGTERM leave the block as an exception does, so that temporary files are removed; not in other threads."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
     before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         yield

@@ -120,7 +120,7 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
         "payload": "none",
         "tool offset": "none",
         "mounting": "at the world's origin, upright",
-        **in_use(trajectory.robot, trajectory.qddot),
+        **in_use(trajectory.robot, trajectory.node_accelerations),
         "report of": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         **{
             f"SHA-256 of the {what}": hashlib.sha256(text.encode()).hexdigest()

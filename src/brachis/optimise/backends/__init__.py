@@ -24,7 +24,7 @@ __all__ = [
     "SolverOptions",
     "SolverReport",
     "residual",
-    "solver_of_large",
+    "solver_for_large",
     "solvers_for",
 ]
 TABLE = {
@@ -58,7 +58,7 @@ def solvers_for(name: str, *, curved: bool = False) -> tuple[Solver, ...]:
     return (TABLE[name],)
 
 
-def solver_of_large(name: str) -> Solver | None:
+def solver_for_large(name: str) -> Solver | None:
     """Return what ``auto`` tries first for large, sparse programs; None for the name of a single solver.
 
     The effort of an interior-point method grows with the entries of the Jacobian, that of an active-set method with the

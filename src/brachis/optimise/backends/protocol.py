@@ -21,9 +21,7 @@ class SolveStatus(enum.Enum):
     OPTIMAL = "optimal: first-order conditions hold"
     ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
     STAGNATED = "stagnated: feasible, and the last iterations made it no faster; other motions take as long"
-    FOLLOWED = (
-        "feasible, along the fastest timing of the best joint path that was found"
-    )
+    FOLLOWED = "followed: feasible, along the fastest timing of the best joint path that was found"
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
     STALLED = "the solver made no progress; another start or solver may do better"
     TIME_LIMIT = "time limit reached"
