@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 import brachis
+from brachis import robots
 from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_for, robot_from_settings
@@ -141,8 +142,9 @@ def test_files_that_are_none(tmp_path, loaded):
     (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
     with pytest.raises(TaskError, match="the limits file is not a mapping of keys"):
         read_limits(tmp_path / "list.yaml")
+    urdf = str(robots.path_of("scara3"))
     with pytest.raises(TaskError, match="the limits file was not read"):
-        robot_from_settings(RobotSettings(urdf="x.urdf", limits_file="limits.yaml"))
+        robot_from_settings(RobotSettings(urdf=urdf, limits_file="limits.yaml"))
 
 
 def test_joints_that_the_robot_does_not_have_are_named(loaded):
