@@ -64,6 +64,11 @@ def test_collocation():
         np.testing.assert_allclose(matrix @ points, Spline(KNOTS, points, 3)(X, nu))
 
 
+def test_few_places_are_joined_by_straight_lines():
+    own = Spline.through(np.array([1.0, 1.5, 3.0]), np.array([0.0, 1.0, 4.0]))
+    np.testing.assert_allclose(own([1.25, 2.0, 3.0]), [0.5, 2.0, 4.0])
+
+
 @pytest.mark.parametrize("count", [7, 9])
 def test_as_many_values_as_places(count):
     with pytest.raises(ValueError, match=f"{count} values for 8 places"):
@@ -95,7 +100,7 @@ def test_numbers_that_do_not_exist():
 
 
 @pytest.mark.parametrize(
-    "places", [[0.0, 1.0, 2.0], [0.0, 1.0, 1.0, 2.0], [3.0, 2.0, 1.0, 0.0], [0.0] * 5]
+    "places", [[0.0], [0.0, 1.0, 1.0, 2.0], [3.0, 2.0, 1.0, 0.0], [0.0] * 5]
 )
 def test_places_that_cannot_be_interpolated(places):
     with pytest.raises(ValueError, match="places of an interpolation"):

@@ -36,16 +36,19 @@ class Spline:
 
     @classmethod
     def through(cls, places: np.ndarray, values: np.ndarray, degree: int = 3) -> Spline:
-        """Interpolate values, (P, ...), at ascending places, (P,), P > d; d is odd.
+        """Interpolate values, (P, ...), at ascending places, (P,); d is odd.
 
-        The first and the last (d + 1) / 2 intervals are one polynomial each ("not a knot").
+        The first and the last (d + 1) / 2 intervals are one polynomial each ("not a knot"). Between d places or fewer,
+        lines are straight.
 
         Raises
         ------
         ValueError
             The places are too few, or do not ascend, or there are more or fewer values.
         """
-        if not (len(places) > degree and (np.diff(places) > 0.0).all()):
+        if len(places) <= degree:
+            degree = 1
+        if len(places) < 2 or not (np.diff(places) > 0.0).all():
             raise ValueError("the places of an interpolation are few, or do not ascend")
         if len(values) != len(places):
             raise ValueError(f"{len(values)} values for {len(places)} places")
