@@ -173,8 +173,8 @@ class Task(Model):
     """Configuration at the end of the path: free or {joints: ...}. Its tool must be at the path's end, to 1e-6 m or
     rad; the nearest posture on the path is then used."""
     task_space: TaskSpace
-    """What the path prescribes: a list of coordinates out of x, y, z, yaw (yaw last, with two others); position (x, y
-    and z); pose; pose_free_roll (the tool may roll about its z axis); or joints. A path of joints gives all joint
+    """What the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z axis),
+    joints, or a list of coordinates out of x, y, z, yaw (yaw last, with two others). A path of joints gives all joint
     positions (rad, m) in chain order, and only its timing is planned."""
     path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)] = Field(
         json_schema_extra=_add_forms_of_paths

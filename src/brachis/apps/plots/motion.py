@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.gridspec import GridSpecBase, SubplotSpec
 
+_MOST_TICKS = 100
+"""Knots that are drawn as ticks, no more: hundreds are a grey bar, and take seconds."""
+
 
 @of_motion
 def plot_motion(trajectory: Trajectory) -> Figure:
@@ -242,10 +245,12 @@ def lines_of(axes: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
 
 
 def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
-    """Set the labels, with time to the right and the knots of the splines as faint ticks."""
+    """Set the labels, with time to the right; and the knots of the splines as faint ticks, unless they would merge."""
     style.dress(ax, r"$t$ (s)", ylabel)
     ax.set_xlim(0.0, trajectory.t_end)
-    ax.set_xticks(knot_times(trajectory)[1:-1], minor=True)
+    knots = knot_times(trajectory)[1:-1]
+    if len(knots) <= _MOST_TICKS:
+        ax.set_xticks(knots, minor=True)
     ax.tick_params(axis="x", which="minor", length=2.0, color="#A0A0A0", width=0.5)
 
 
