@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.kernel import Spline, library
 from brachis.kernel import compile as compiling
-from brachis.kernel import library
 
 
 def test_a_missing_library(tmp_path):
@@ -35,9 +35,13 @@ def test_all_variants_give_the_same_digits(monkeypatch):
     states = np.random.default_rng(0).normal(size=(3, 50, chain.n))
     found = []
     for own in made:
-        monkeypatch.setattr("brachis.kernel.chain.load", lambda own=own: own)
+        for module in ("chain", "splines"):
+            path = f"brachis.kernel.{module}.load"
+            monkeypatch.setattr(path, lambda own=own: own)
         parts = [*chain.torque_derivatives(*states), chain.torques(*states)]
         parts += chain.tool(states[0], in_tool_axes=True)
+        spline = Spline.through(np.linspace(0.0, 1.0, 50), states[0])
+        parts += [spline.control_points, spline(np.linspace(0.0, 1.0, 99))]
         found.append(np.concatenate([part.ravel() for part in parts]))
     assert np.array_equal(found[0], found[-1])
 

@@ -11,6 +11,7 @@ from brachis.kernel import (
     MotionSlopes,
     PathMotion,
     Prescribed,
+    Spline,
     apply_chain_rule,
     find_entries,
     find_least_singular,
@@ -20,6 +21,7 @@ from brachis.kernel import (
     library,
     pick_nearest,
     set_turns,
+    sum_basis,
 )
 
 POINTS, N = 61, 7
@@ -77,6 +79,9 @@ def work() -> None:
         largest_step=0.5,
         beside=False,
     )
+    spline = Spline.through(np.linspace(0.0, 1.0, POINTS), q)
+    spline(np.linspace(0.0, 1.0, POINTS), nu=1)
+    sum_basis(rng.normal(size=(4, POINTS, 4)), places % 10, rng.normal(size=(2, 14)))
     Formula.of(lambda a: formula.sqrt(a * a + 1.0) / formula.cos(a), N)(q)
 
 

@@ -210,6 +210,7 @@ def _make_recordable(function: np.ufunc) -> Callable[..., Any]:
     """Return a function of NumPy that takes arrays of numbers of a formula too, and plain ones among them."""
 
     def apply_to_one(*values: Any) -> Any:
+        """Record the step if one of the values belongs to a formula, else compute it."""
         known = [own.record for own in values if isinstance(own, Number)]
         if not known:
             return function(*values)

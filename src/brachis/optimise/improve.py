@@ -174,6 +174,7 @@ def attempt_once(solve: Solve, *, accept_early_end: bool = False) -> Attempt:
     """
 
     def attempt(program: Program, x: np.ndarray) -> SolvedProgram:
+        """Solve once."""
         report = solve(program, x)
         if accept_early_end:
             report = judge_early_end(report, program.end_time(x))

@@ -70,7 +70,10 @@ def solve_by_levels(
     """
 
     def change_to(level: Program) -> Change:
+        """Return the change to the knots of a level."""
+
         def change(solved: SolvedProgram) -> tuple[Program, np.ndarray]:
+            """Write a motion over these knots."""
             pairs = zip(solved.program.phases, level.phases, strict=True)
             # The solved program may have another branch margin.
             phases = [own.with_knots(fine.knots, fine.t_norm) for own, fine in pairs]
@@ -161,6 +164,7 @@ def refine_mesh(
     shortest = max(0.5 * spline.tolerance, _SHORTEST)
 
     def halve(solved: SolvedProgram) -> tuple[Program, np.ndarray] | str | None:
+        """Halve the intervals that matter, unless that no longer pays."""
         program = solved.program
         times = np.array([report.objective for report in solved.reports])
         gains = 1.0 - times[1:] / times[:-1]
@@ -265,10 +269,12 @@ def optimise_knots(
     shortest = max(shortest, _SHORTEST * most)
 
     def free_knots(solved: SolvedProgram) -> tuple[Program, np.ndarray]:
+        """Make the interval lengths variables."""
         free = solved.program.with_free_knots(shortest)
         return free, free.variables_from(solved.program.motions(solved.x))
 
     def move_fix_and_refine(free: Program, x: np.ndarray) -> SolvedProgram:
+        """Move the knots, fix them where they end, and refine."""
         moved = solve(free, x)
         fixed, start = free.fix_knots(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
@@ -277,6 +283,7 @@ def optimise_knots(
         return replace(refined, reports=(moved, *refined.reports))
 
     def judge(candidate: SolvedProgram) -> float:
+        """Time of a motion within the limits, s; a bad mark for another."""
         if not np.isfinite(candidate.violation):
             return np.inf
         if refinement.max_rounds and candidate.violation > refinement.tolerance:

@@ -125,6 +125,7 @@ class PhaseTiming:
         def lay(
             s: np.ndarray, estimate: tuple[np.ndarray, np.ndarray] | None = None
         ) -> tuple[TimedCourse, tuple[float, float]]:
+            """Lay the course over path coordinates, (S,), and find its rates at both ends."""
             coarse = course_at(s)
             derivatives = (coarse.y, coarse.y_dp, coarse.y_ddp, np.zeros_like(coarse.y))
             state = phase.joint_map.state(*derivatives, t=s - begin)

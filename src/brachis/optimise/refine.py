@@ -79,6 +79,7 @@ def _root(c: np.ndarray) -> np.ndarray:
     """Find where polynomials in Bernstein form on [0, 1], (m + 1, F), whose ends differ in sign are zero, (F,)."""
 
     def is_before(u: np.ndarray) -> np.ndarray:
+        """Tell at which places, (F,), polynomials have the sign of their beginning."""
         value = c
         while len(value) > 1:  # de Casteljau
             value = value[:-1] * (1.0 - u) + value[1:] * u

@@ -280,6 +280,7 @@ def solve_by_margin_continuation(
     """
 
     def use(smaller: Program, kept: SolvedProgram) -> tuple[Program, np.ndarray] | None:
+        """Go on with a smaller margin, from the answer so far; None if that is free of its margin."""
         if not kept.reports:
             return smaller, x
         report = kept.report

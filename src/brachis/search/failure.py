@@ -112,6 +112,7 @@ def explain_reach(
     def fail(
         possible: np.ndarray, cause: str, hint: str, remedies: Sequence[Remedy] = ()
     ) -> Failure | None:
+        """Say where along the path something is not possible, (S,) bool; None if it is everywhere."""
         if possible.all():
             return None
         first, last = (float(end) for end in s[np.flatnonzero(~possible)[[0, -1]]])

@@ -56,6 +56,7 @@ def try_remedies(
         def is_enough(
             value: float, most: int | None, key: str = remedy.key, own: Deadline = own
         ) -> bool | None:
+            """Tell whether a value of the key gives a plan; None if the time was up."""
             limit = own.part(0.4) if most else own
             found: bool | None = False
             try:

@@ -54,6 +54,7 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
     signature = inspect.Signature(parameters)
 
     def make(*args: Any, **keys: Any) -> _S:
+        """Make the segment from positional and named values."""
         bound = signature.bind(*args, **keys).arguments
         given = {key: value for key, value in bound.items() if value is not None}
         beside = {key: given.pop(key) for key in model.model_fields if key in given}

@@ -296,6 +296,7 @@ def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
     """Return what adds a form of a field's value to its JSON schema, and of a list one item; for json_schema_extra."""
 
     def add(schema: dict[str, Any]) -> None:
+        """Add the form to a schema."""
         kept = {
             key: schema.pop(key)
             for key in ("$ref", "type", "items", "minItems")
@@ -326,6 +327,7 @@ class ByForm:
         words = get_args(members.get("<word>"))
 
         def choose(value: object) -> str | None:
+            """Return the tag of the member for a value; None if there is none."""
             form = _form_of(value)
             return None if form == "<word>" and value not in words else form
 
@@ -358,6 +360,7 @@ class ByKey:
         required = {tag: required_keys(model) for tag, model in members.items()}
 
         def choose(value: object) -> str | None:
+            """Return the tag of the member for a value; None if there is none."""
             if isinstance(value, BaseModel):
                 return f"<{type(value).__name__}>"
             if not isinstance(value, Mapping):

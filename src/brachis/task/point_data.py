@@ -36,6 +36,7 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
     """Read numbers with units; bare numbers are in SI units."""
 
     def read(value: object) -> object:
+        """Read one number."""
         if not isinstance(value, str):
             return value
         match = _NUMBER_AND_UNIT.match(value)

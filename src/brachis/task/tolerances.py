@@ -30,6 +30,7 @@ def _range_within(largest: float) -> AfterValidator:
     """Return what reads a number a as [-a, a], and refuses ranges that are empty or end farther from zero."""
 
     def read(given: _Given) -> _Given:
+        """Read one range."""
         if given is None or given == "free":
             return given
         low, high = given if isinstance(given, tuple) else (-given, given)

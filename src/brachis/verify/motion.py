@@ -112,7 +112,7 @@ SAME_PLACE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class MotionPieces:
     """Joint motion as polynomials in Bernstein form over L pieces; u in [0, 1] is the place in a piece.
 
     Attributes
@@ -144,7 +144,7 @@ class Pieces:
     robot: Robot
 
     @classmethod
-    def of(cls, trajectory: Trajectory, robot: Robot) -> Pieces:
+    def of(cls, trajectory: Trajectory, robot: Robot) -> MotionPieces:
         """Take the pieces of a trajectory of a robot."""
         position = trajectory.pieces.c
         lengths = np.diff(trajectory.times)
@@ -209,7 +209,7 @@ class MotionStates:
     tau: np.ndarray
 
     @classmethod
-    def at(cls, pieces: Pieces, piece: np.ndarray, u: np.ndarray) -> MotionStates:
+    def at(cls, pieces: MotionPieces, piece: np.ndarray, u: np.ndarray) -> MotionStates:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
         piece = piece[order]
@@ -227,7 +227,7 @@ class MotionStates:
 
     @classmethod
     def _evaluate(
-        cls, pieces: Pieces, piece: np.ndarray, u: np.ndarray
+        cls, pieces: MotionPieces, piece: np.ndarray, u: np.ndarray
     ) -> MotionStates:
         """Evaluate pieces at places, ascending."""
         t = pieces.time(piece, u)
@@ -266,7 +266,7 @@ class Given:
     robot : Robot
     task_map : TaskMap
     path : Path
-    pieces : Pieces
+    pieces : MotionPieces
     states : MotionStates
         The motion at all times at which it is checked.
     options : VerifyOptions
@@ -276,7 +276,7 @@ class Given:
     robot: Robot
     task_map: TaskMap
     path: Path
-    pieces: Pieces
+    pieces: MotionPieces
     states: MotionStates
     options: VerifyOptions
 
@@ -328,7 +328,7 @@ Places = tuple[np.ndarray, np.ndarray]
 
 
 def all_places(
-    trajectory: Trajectory, pieces: Pieces, path: Path, options: VerifyOptions
+    trajectory: Trajectory, pieces: MotionPieces, path: Path, options: VerifyOptions
 ) -> Places:
     """List all places at which a motion is checked, in any order.
 
@@ -348,7 +348,9 @@ def all_places(
     return piece, u
 
 
-def _spread(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> Places:
+def _spread(
+    trajectory: Trajectory, pieces: MotionPieces, options: VerifyOptions
+) -> Places:
     """Both ends of every piece and places between, no two of them further apart than a knot interval allows."""
     knots = np.unique(trajectory.knots) * trajectory.t_end
     edges = np.union1d(pieces.times, knots[(knots > 0.0) & (knots < pieces.times[-1])])
@@ -386,7 +388,7 @@ def _check_count(count: int) -> None:
 
 
 def _within_path_pieces(
-    pieces: Pieces, breaks: np.ndarray, options: VerifyOptions
+    pieces: MotionPieces, breaks: np.ndarray, options: VerifyOptions
 ) -> Places:
     """Spread places over every piece of the path, however short: no small blend is stepped over."""
     parts = np.linspace(0.0, 1.0, options.points_per_interval)
@@ -395,7 +397,7 @@ def _within_path_pieces(
     return pieces.place(pieces.times_of(s))
 
 
-def _peaks(pieces: Pieces) -> Places:
+def _peaks(pieces: MotionPieces) -> Places:
     """Find where the acceleration of a joint turns within a piece, beyond its values at the ends of the piece."""
     ends = pieces.acceleration[[0, -1]]
     beyond = np.maximum(
@@ -408,7 +410,7 @@ def _peaks(pieces: Pieces) -> Places:
     return piece[turning], u
 
 
-def _reversals(pieces: Pieces) -> Places:
+def _reversals(pieces: MotionPieces) -> Places:
     """Find where joints with Coulomb friction cross multiples of its width, or turn near zero velocity."""
     # Between these speeds, in widths, friction rises from 29 % to all but 2e-6 of its torque.
     speeds = np.array([0.3, 1.0, 2.0, 3.0, 4.5, 7.0])

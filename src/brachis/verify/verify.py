@@ -27,7 +27,7 @@ from brachis.verify.checks import (
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Given, MotionStates, Pieces, all_places
+from brachis.verify.motion import Given, MotionPieces, MotionStates, all_places
 from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions
 
@@ -86,7 +86,7 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    pieces = Pieces.of(trajectory, robot)
+    pieces = MotionPieces.of(trajectory, robot)
     path = path_of(task_map, trajectory.task)
     places = all_places(trajectory, pieces, path, options)
     states = MotionStates.at(pieces, *places)

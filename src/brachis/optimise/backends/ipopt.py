@@ -37,7 +37,10 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     options = monitor.options
 
     def or_nan(function: Function) -> Callable[[np.ndarray, np.ndarray], None]:
+        """Write what a function gives, or NaN where it has no value."""
+
         def write(point: np.ndarray, out: np.ndarray) -> None:
+            """Write the values at a point."""
             try:
                 out[:] = function(point)
             except UnreachableError:
@@ -54,12 +57,14 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         barrier: float,
         *_: float,
     ) -> bool:
+        """Tell whether to go on after an iteration."""
         stop = monitor.between_iterations(objective)
         # With a large barrier the motion is slower than its start: no sign that the solve has settled.
         own = infeasibility if barrier <= _SMALL_BARRIER else np.inf
         return not (monitor.has_settled(objective, own) or stop)
 
     def clip(bounds: np.ndarray) -> np.ndarray:
+        """Write infinite bounds as IPOPT has them."""
         return np.clip(bounds, -2e19, 2e19)  # IPOPT takes 1e19 for infinity
 
     nothing = np.array([], dtype=int)

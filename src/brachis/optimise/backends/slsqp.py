@@ -32,6 +32,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     last = x.copy()
 
     def rows(point: np.ndarray) -> np.ndarray:
+        """Values of the rows; far beyond their bounds where there are none."""
         try:
             values = monitor.rows(point)
         except UnreachableError:

@@ -180,6 +180,8 @@ def _run(
     )
 
     def scale(function: Function, factors: np.ndarray | float) -> Callable[..., None]:
+        """Write what a function of scaled variables gives, times factors."""
+
         def write(point: np.ndarray, out: np.ndarray) -> None:
             out[:] = factors * function(units * point)
 

@@ -369,6 +369,7 @@ def read_points(
     units = settings.units
 
     def read(names: Sequence[str], kind: str) -> Array:
+        """Read columns of one kind of quantity in SI units."""
         chosen = [columns.places[name] for name in names]
         factors = [UNITS[kind][_unit_of(name, kind, columns, units)] for name in names]
         stated = dict.fromkeys(unit for _, unit in chosen if unit is not None)
