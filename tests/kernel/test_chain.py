@@ -95,6 +95,47 @@ def test_tool(case, in_tool_axes):
         assert agrees(twists[:, k], columns.reshape(6, -1))
 
 
+QUANTITIES = {
+    "speed": lambda model, data, *at: pin.getFrameVelocity(model, data, *at).linear,
+    "angular speed": lambda model, data, *at: (
+        pin.getFrameVelocity(model, data, *at).angular
+    ),
+    "acceleration": lambda model, data, *at: (
+        pin.getFrameClassicalAcceleration(model, data, *at).linear
+    ),
+}
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_tool_sizes(case, quantity):
+    """Sizes by Pinocchio's frame motion, slopes by its differences; a joint that does not count stands still."""
+    model, frame, chain, states = case
+    moving = max(1, chain.n - 1) if quantity == "angular speed" else chain.n
+    data = model.createData()
+
+    def size(q, qdot, qddot):
+        still = np.arange(chain.n) >= moving
+        rates = [np.where(still, 0.0, own) for own in (qdot, qddot)]
+        pin.forwardKinematics(model, data, q, *rates)
+        at = (frame, pin.LOCAL_WORLD_ALIGNED)
+        return np.linalg.norm(QUANTITIES[quantity](model, data, *at))
+
+    sizes, slopes = chain.tool_sizes(quantity, moving, *states)
+    h = 1e-6
+    for k in range(STATES):
+        here = [own[k] for own in states]
+        assert agrees(sizes[k], size(*here))
+        if sizes[k] < 1e-9:  # only prismatic joints
+            continue
+        for number, own in enumerate(slopes):
+            for joint, step in enumerate(h * np.eye(chain.n)):
+                ahead, behind = list(here), list(here)
+                ahead[number] = here[number] + step
+                behind[number] = here[number] - step
+                known = (size(*ahead) - size(*behind)) / (2.0 * h)
+                assert own[k, joint] == pytest.approx(known, abs=1e-6 * (1 + sizes[k]))
+
+
 def test_no_states(case):
     chain = case[2]
     none = np.empty((0, chain.n))

@@ -15,7 +15,7 @@ from kernel.work import TIMES
 WORK = Path(__file__).with_name("work.py")
 MARK = "getsid"
 """A function of the system, which `work.py` alone calls: before and after what is counted."""
-COUNTED = {"gcc 12, Python 3.11": 10_475_900}
+COUNTED = {"gcc 12, Python 3.11": 11_916_400}
 """Instructions by compiler and interpreter: others make other code. Write the new number down where it falls, or where
 a growth is meant."""
 GROWTH = 1.1

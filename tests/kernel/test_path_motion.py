@@ -135,6 +135,26 @@ def test_derivatives(case):
         np.testing.assert_allclose(found / scale, own / scale, atol=1e-11)
 
 
+def test_singular_slopes(case):
+    """The left singular vector, by the change of J_aug, by the right one."""
+    _, asked, q, _, conditions, _, motion = case
+    values, vectors = find_least_singular(motion.inverse)
+    found, found_s = motion.singular_slopes(values, vectors)
+    left = values[:, None] * np.einsum("kji,kj->ki", motion.inverse, vectors)
+    rest = np.zeros_like(q)
+    slopes, _, _ = tool_derivatives(
+        motion.twists, vectors, rest, in_tool_axes=not asked.axes
+    )
+    m = asked.count
+    known = np.einsum("ki,kij->kj", left[:, :m], rates_of(asked, slopes))
+    np.testing.assert_allclose(found, known, atol=1e-11 * max(1.0, np.abs(known).max()))
+    known = np.zeros(POINTS)
+    if conditions.turning is not None:
+        turned = np.einsum("kij,kj->ki", conditions.turning[0], vectors)
+        known = np.sum(left[:, m:] * turned, axis=1)
+    np.testing.assert_allclose(found_s, known, atol=1e-11)
+
+
 def test_a_singular_matrix_has_determinant_zero():
     chain = chain_of(*random_model(3, 1))
     rows = np.zeros((1, 1, 3))

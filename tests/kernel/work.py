@@ -56,7 +56,9 @@ def work() -> None:
     curves = tuple(rng.normal(size=(2, POINTS, 2)))
     motion = PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
     slopes = motion.derivatives()
-    find_least_singular(motion.inverse)
+    motion.singular_slopes(*find_least_singular(motion.inverse))
+    for quantity in ("speed", "angular speed", "acceleration"):
+        chain.tool_sizes(quantity, N, q, qdot, qddot)
     whole = MotionSlopes(motion.gradient, *slopes)
     table = apply_chain_rule([((*partials, None), None)], [N], whole)
     every = np.ones((2, 3, POINTS, 2))

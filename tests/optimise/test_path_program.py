@@ -25,9 +25,9 @@ def programs():
     found = []
     find = PathProgram.timings
 
-    def keep(self, x, places):
+    def keep(self, x, places, **how):
         found.append((self, x))
-        return find(self, x, places)
+        return find(self, x, places, **how)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(PathProgram, "timings", keep)
@@ -67,7 +67,7 @@ def test_answers_are_as_fast_as_their_timings(programs):
     # It ends with the level that gains less than the tolerance.
     assert {16, 32, 64} <= set(intervals) <= {16, 32, 64, 128, 256}
     for (program, x), count in zip(found, intervals, strict=True):
-        timing = retiming.least_time(program.timings(x, 4000))
+        timing = retiming.least_time(program.timings(x, 4000, is_rough=False))
         nearly = 1e-2 if count == 16 else 2e-3
         assert timing == pytest.approx(program.objective(x), rel=nearly)
     # Splines may be slower by the tolerance.

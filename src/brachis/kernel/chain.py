@@ -10,6 +10,9 @@ import numpy as np
 
 from brachis.kernel.library import address, as_doubles, load
 
+_QUANTITIES = ("speed", "angular speed", "acceleration")
+"""In the order of tool.c."""
+
 
 class _Chain(ctypes.Structure):
     """`chain` of chain.h."""
@@ -150,6 +153,37 @@ class Chain:
         found = (positions, rotations, twists)
         self._call("brachis_tool", (q,), int(in_tool_axes), *found)
         return found
+
+    def tool_sizes(
+        self, quantity: str, moving: int, *states: np.ndarray
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Size of a motion of the tool, and its slopes: zero where the motion is.
+
+        Parameters
+        ----------
+        quantity : {"speed", "angular speed", "acceleration"}
+            Of the tool's origin, in the world frame.
+        moving : int
+            So many of the joints, the first ones, count.
+        *states : (K, n) ndarray
+            q, qdot and qddot.
+
+        Returns
+        -------
+        sizes : (K,) ndarray
+            m/s, rad/s or m/s^2.
+        slopes : tuple of (K, n) ndarray
+            By q, qdot and qddot.
+        """
+        count = len(states[0])
+        sizes = np.empty(count)
+        slopes = np.empty((3, count, self.n))
+        code = _QUANTITIES.index(quantity)
+        kept = [as_doubles(own, (count, self.n)) for own in states]
+        load().brachis_tool_sizes(
+            self.address, count, code, moving, *map(address, (*kept, sizes, *slopes))
+        )
+        return sizes, (slopes[0], slopes[1], slopes[2])
 
     def _call(
         self,

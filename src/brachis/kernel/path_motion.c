@@ -347,3 +347,48 @@ void brachis_least_singular(long count, long n, const double *inverses, double *
         write_block(v, vectors, count, n, k);
     }
 }
+
+/* Slopes of these values by the joints, (K, n), and by s, (K), where the matrices are J_aug of what `brachis_path_motion`
+found: with the left singular vector u = value J_aug^-T v, a value changes by u^T dJ_aug v. */
+void brachis_singular_slopes(
+    long n, const prescribed *asked, const course *along, long count, const double *twists, const double *inverses,
+    const double *values, const double *vectors, double *by_q, double *by_s
+)
+{
+    long used[6];
+    double signs[6];
+    long m = rows_of(asked, used, signs);
+    for (long k = 0; k < count; k += LANES) {
+        twist columns[n], slopes[n], unused[n], unused_too[n];
+        pack inverse[n * n], v[n], still[n], u[n], found[n], turned[n * n];
+        read_block(inverses, count, n * n, k, inverse);
+        read_block(vectors, count, n, k, v);
+        pack value = gather(values, count, 1, k, 0);
+        for (long i = 0; i < n; i++) {
+            columns[i] = read_twist(twists, count, n, k, i);
+            still[i] = all(0.0);
+            u[i] = all(0.0);
+            found[i] = all(0.0);
+        }
+        for (long i = 0; i < n; i++) {
+            for (long j = 0; j < n; j++) {
+                u[j] += value * inverse[i * n + j] * v[i];
+            }
+        }
+        differentiate_tool(n, columns, v, still, asked->is_pose != 0, slopes, unused, unused_too);
+        for (long row = 0; row < m; row++) {
+            for (long i = 0; i < n; i++) {
+                found[i] += signs[row] * u[row] * part_of(&slopes[i], used[row]);
+            }
+        }
+        write_block(found, by_q, count, n, k);
+        pack along_path = all(0.0);
+        if (along->turning) {
+            read_block(along->turning, count, (n - m) * n, k, turned);
+            for (long i = m; i < n; i++) {
+                along_path += u[i] * inner_product(turned + (i - m) * n, v, n);
+            }
+        }
+        scatter(along_path, by_s, count, 1, k, 0);
+    }
+}

@@ -155,6 +155,22 @@ class PathMotion:
         )
         return qdot_y, qddot_y, qddot_ydot
 
+    def singular_slopes(
+        self, values: np.ndarray, vectors: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Differentiate what `find_least_singular` gives for J_aug, (K,), by q, (K, n), and by s, (K,)."""
+        by_q = np.empty_like(self.qdot)
+        by_s = np.empty(len(by_q))
+        singular = as_doubles(values, by_s.shape), as_doubles(vectors, by_q.shape)
+        load().brachis_singular_slopes(
+            self.chain.n,
+            ctypes.addressof(self.prescribed.structure),
+            ctypes.byref(self.given.structure),
+            len(by_q),
+            *map(address, (self.twists, self.inverse, *singular, by_q, by_s)),
+        )
+        return by_q, by_s
+
 
 def find_least_singular(inverses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the least singular values, (K,), of matrices with these inverses, (K, n, n), and right singular vectors."""

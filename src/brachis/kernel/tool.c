@@ -55,6 +55,56 @@ void brachis_tool_derivatives(
     }
 }
 
+/* Sizes, (K), of the tool's velocity (`quantity` 0), angular velocity (1) or acceleration (2) at its origin, and their slopes
+by q, qdot and qddot, (K, n) each: those of a vector of length zero are zero. Only the first joints, `moving`, count. */
+void brachis_tool_sizes(
+    const chain *arm, long count, int quantity, long moving, const double *q, const double *qdot, const double *qddot,
+    double *sizes, double *slopes_q, double *slopes_qdot, double *slopes_qddot
+)
+{
+    long n = arm->joints;
+    for (long k = 0; k < count; k += LANES) {
+        pack posture[n], rates[n], more[n];
+        twist columns[n], by_q[n], by_qdot[n], slopes[n];
+        twist V = {0};
+        vec tangential = {0};
+        for (long i = 0; i < n; i++) {
+            pack counts = all(i < moving ? 1.0 : 0.0);
+            posture[i] = gather(q, count, n, k, i);
+            rates[i] = counts * gather(qdot, count, n, k, i);
+            more[i] = counts * gather(qddot, count, n, k, i);
+        }
+        place_tool(arm, posture, 0, columns);
+        for (long i = 0; i < n; i++) {
+            V = add_twists(V, scale_twist(columns[i], rates[i]));
+            tangential = add(tangential, scale(columns[i].v, more[i]));
+        }
+        vec motions[3] = {V.v, V.w, add(tangential, bias_of(n, columns, rates, 0).v)};
+        vec direction = motions[quantity];
+        pack size = dot(direction, direction);
+        pack inverse;
+        for (int lane = 0; lane < LANES; lane++) {
+            size[lane] = sqrt(size[lane]);
+            inverse[lane] = size[lane] > 0.0 ? 1.0 / size[lane] : 0.0;
+        }
+        scatter(size, sizes, count, 1, k, 0);
+        direction = scale(direction, inverse);
+        differentiate_tool(n, columns, rates, more, 0, slopes, by_q, by_qdot);
+        for (long i = 0; i < n; i++) {
+            pack counts = all(i < moving ? 1.0 : 0.0);
+            vec found[3][3] = {
+                {slopes[i].v, columns[i].v, {0}},
+                {slopes[i].w, columns[i].w, {0}},
+                {by_q[i].v, by_qdot[i].v, columns[i].v},
+            };
+            const vec *own = found[quantity];
+            scatter(dot(direction, own[0]), slopes_q, count, n, k, i);
+            scatter(counts * dot(direction, own[1]), slopes_qdot, count, n, k, i);
+            scatter(counts * dot(direction, own[2]), slopes_qddot, count, n, k, i);
+        }
+    }
+}
+
 /* Rotation vectors, (K, 3), of rotation matrices, (K, 3, 3). */
 void brachis_logarithms(long count, const double *rotations, double *vectors)
 {

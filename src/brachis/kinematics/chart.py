@@ -244,16 +244,8 @@ class ChartMap(PathMap):
         return state.least_singular[0][:, None] / self._typical
 
     def margin_gradient(self, state: PathState) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate by singular vectors u and v of the least singular value: it changes by u^T dJ_aug v."""
-        least, v = state.least_singular
-        u = least[:, None] * np.einsum("kji,kj->ki", state.motion.inverse, v)
-        m = self.task_map.m
-        moved = self.task_map.velocity_slopes(state.motion.twists, v)
-        by_q = np.einsum("ki,kij->kj", u[:, :m], moved)
-        by_s = np.zeros(len(v))
-        turning = state.conditions.turning
-        if turning is not None:
-            by_s = np.einsum("ki,kij,kj->k", u[:, m:], turning[0], v)
+        """Differentiate the margins by q, (K, 1, n), and by s, (K, 1)."""
+        by_q, by_s = state.motion.singular_slopes(*state.least_singular)
         return by_q[:, None] / self._typical, by_s[:, None] / self._typical
 
 

@@ -16,7 +16,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.common.arrays import apply_each
 from brachis.limits.protocol import (
     Bound,
     JointStates,
@@ -25,61 +24,32 @@ from brachis.limits.protocol import (
     Partials,
     Role,
 )
-from brachis.robot import Robot, task_map_of
+from brachis.robot import Robot
 from brachis.task import SpeedTable as SpeedTableModel
 from brachis.task import Task
 
 
-def _along(direction: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Differentiate sizes, (K, n): from directions, (K, 3), and the derivatives of the vectors, (K, 3, n)."""
-    return np.einsum("ki,kij->kj", direction, slopes)
-
-
-def _direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes, (K,), of vectors (K, 3), and their directions, (K, 3); zero for a zero vector."""
-    size = np.linalg.norm(vectors, axis=1)
-    zero = np.zeros_like(vectors)
-    column = size[:, None]
-    return size, np.divide(vectors, column, out=zero, where=column > 0.0)
-
-
-class ToolSpeed:
-    """Speed of the tool frame's origin, m/s, or angular speed of the tool, rad/s.
+class ToolMotion:
+    """Size of a motion of the tool: speed, m/s, or acceleration, m/s^2, of its frame's origin, or angular speed, rad/s.
 
     Virtual joints do not turn the tool.
 
     Parameters
     ----------
     robot : Robot
-    angular : bool, optional
+    quantity : {"speed", "angular speed", "acceleration"}
     """
 
-    def __init__(self, robot: Robot, *, angular: bool = False) -> None:
-        self._tool = task_map_of(robot, "pose" if angular else "position")
-        self._rows = slice(3, None) if angular else slice(None)
-        self._moves = np.ones(robot.n)
-        if angular:
-            self._moves[len(robot.urdf_joints) :] = 0.0
+    def __init__(self, robot: Robot, quantity: str) -> None:
+        self._chain = robot.chain
+        self._quantity = quantity
+        turning = quantity == "angular speed"
+        self._moving = len(robot.urdf_joints) if turning else robot.n
 
-    def speed(self, motion: JointStates) -> np.ndarray:
-        """Speeds at K moments, (K,)."""
-        jacobian = self._jacobian(self._tool.twists(motion.q))
-        velocity = apply_each(jacobian, motion.qdot)
-        return np.linalg.norm(velocity, axis=1)
-
-    def _jacobian(self, twists: np.ndarray) -> np.ndarray:
-        return self._tool.jacobian(twists)[:, self._rows] * self._moves
-
-    def derivatives(
-        self, motion: JointStates
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Speeds, (K,), and their derivatives by q and by qdot, (K, n)."""
-        twists = self._tool.twists(motion.q)
-        jacobian = self._jacobian(twists)
-        speed, direction = _direction(apply_each(jacobian, motion.qdot))
-        qdot = motion.qdot * self._moves
-        by_q = self._tool.velocity_slopes(twists, qdot)[:, self._rows]
-        return speed, _along(direction, by_q), _along(direction, jacobian)
+    def sizes(self, motion: JointStates) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Sizes at K moments, (K,), and their slopes by q, qdot and qddot, (K, n) each; see `Chain.tool_sizes`."""
+        states = (motion.q, motion.qdot, motion.qddot)
+        return self._chain.tool_sizes(self._quantity, self._moving, *states)
 
 
 class ToolRatios(Limit):
@@ -126,31 +96,15 @@ class ToolAccelerationLimit(ToolRatios):
             share="tool acceleration / limit",
         )
         super().__init__([label], [figure])
-        self._tool = task_map_of(robot, "position")
+        self._tool = ToolMotion(robot, "acceleration")
         self._figure = figure
 
-    def _acceleration(
-        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-    ) -> np.ndarray:
-        """Accelerations over the limit, (K, 3), world frame."""
-        tangential = apply_each(self._tool.jacobian(twists), qddot)
-        return (tangential + self._tool.bias(twists, qdot)) / self._figure
-
     def values(self, motion: JointStates) -> np.ndarray:
-        twists = self._tool.twists(motion.q)
-        vectors = self._acceleration(twists, motion.qdot, motion.qddot)
-        return np.linalg.norm(vectors, axis=1)[:, None]
+        return self._tool.sizes(motion)[0][:, None] / self._figure
 
     def partials(self, motion: JointStates) -> Partials:
-        twists = self._tool.twists(motion.q)
-        vectors = self._acceleration(twists, motion.qdot, motion.qddot)
-        _, direction = _direction(vectors)
-        exact = self._tool.derivatives(twists, motion.qdot, motion.qddot)
-        jacobian = self._tool.jacobian(twists)
-        parts = (exact.acceleration_q, exact.acceleration_qdot, jacobian)
-        return Partials(
-            *(_along(direction, part)[:, None] / self._figure for part in parts)
-        )
+        _, slopes = self._tool.sizes(motion)
+        return Partials(*(part[:, None] / self._figure for part in slopes))
 
 
 def build_tool_acceleration(robot: Robot, task: Task) -> ToolAccelerationLimit | None:
@@ -229,7 +183,7 @@ class ToolSpeedLimit(ToolRatios):
 
     Parameters
     ----------
-    tool : ToolSpeed
+    tool : ToolMotion
     tables : (c,) sequence of SpeedTable
         Largest speeds.
     labels : (c,) sequence of Label
@@ -239,7 +193,7 @@ class ToolSpeedLimit(ToolRatios):
     longer_time = "relieves"
 
     def __init__(
-        self, tool: ToolSpeed, tables: Sequence[SpeedTable], labels: Sequence[Label]
+        self, tool: ToolMotion, tables: Sequence[SpeedTable], labels: Sequence[Label]
     ) -> None:
         # The largest figure of a table stands for all of them.
         super().__init__(labels, [table.largest for table in tables])
@@ -254,11 +208,11 @@ class ToolSpeedLimit(ToolRatios):
         return np.column_stack(largest), np.column_stack(slopes)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._tool.speed(motion)[:, None] / self.largest_at(motion.s)[0]
+        return self._tool.sizes(motion)[0][:, None] / self.largest_at(motion.s)[0]
 
     def partials(self, motion: JointStates) -> Partials:
         largest, slope = self.largest_at(motion.s)
-        speed, by_q, by_qdot = self._tool.derivatives(motion)
+        speed, (by_q, by_qdot, _) = self._tool.sizes(motion)
         q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))
         return Partials(q=q, qdot=qdot, s=-speed[:, None] * slope / largest**2)
 
@@ -289,7 +243,9 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolSpeedLimit | None:
         tables.append(SpeedTable(part.s, part.speed, whole=False))
         where = f"tool, s = {part.s[0]:g} to {part.s[-1]:g},"
         labels.append(Label(where, "feed rate", "m/s", "tool_limits.feed"))
-    return ToolSpeedLimit(ToolSpeed(robot), tables, labels) if tables else None
+    return (
+        ToolSpeedLimit(ToolMotion(robot, "speed"), tables, labels) if tables else None
+    )
 
 
 def build_tool_angular_speed(robot: Robot, task: Task) -> ToolAngularSpeedLimit | None:
@@ -305,5 +261,5 @@ def build_tool_angular_speed(robot: Robot, task: Task) -> ToolAngularSpeedLimit 
         share="tool angular speed / limit",
     )
     return ToolAngularSpeedLimit(
-        ToolSpeed(robot, angular=True), [SpeedTable([0.0], [figure])], [label]
+        ToolMotion(robot, "angular speed"), [SpeedTable([0.0], [figure])], [label]
     )

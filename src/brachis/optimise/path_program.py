@@ -159,6 +159,7 @@ class PathPhase:
         for values, limit in self._posture_limits():
             self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(self._basis.columns)
+        self._set_slopes()
         self._last: tuple[bytes, Evaluation] | None = None
 
     def _set_pattern(self, columns: np.ndarray) -> None:
@@ -176,6 +177,15 @@ class PathPhase:
         self.jacobian_columns = np.repeat(variable, values)
         point = np.concatenate([every, every, self._points])
         self.jacobian_rows = rows[point].ravel()
+
+    def _set_slopes(self) -> None:
+        """Set s, s' and s'' at the places, and the slopes of X and u by the variables at both stations beside them."""
+        every = np.ones((len(self._places), 1))
+        self._of_s = np.array([self._places[:, None], every, 0.0 * every])
+        units = self._units[np.array([self._number, self._number + 1])][:, :, None]
+        self._by_square = units * np.array([self._ahead, 1.0 - self._ahead])
+        steps = 2.0 * self._steps[self._number, None]
+        self._by_step = units * np.array([-1.0 / steps, 1.0 / steps])
 
     def _set_variables(self, squares: np.ndarray, points: np.ndarray) -> None:
         """Set the variables at the beginning, and their bounds: X at the ends stays, and values that are given."""
@@ -236,27 +246,22 @@ class PathPhase:
         points = x[count:].reshape(self.curves_count, self._count)
         return x[:count] * self._units, points
 
-    def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Y' and y'', (L, c), and X and u, (L, 1), at the L places where limits hold; y in front."""
+    def _motion(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Y, y' and y'', (3, L, c), and X and u, (L, 1), at the L places where limits hold."""
         squares, points = self._split(x)
-        y, y_ds, y_dds, _ = self._basis.curves(points)
+        own = self._basis.curves(points)[:3]
+        curves = np.concatenate([self._of_s, own], axis=2)
         number = self._number
         square = squares[number + 1, None]
         square = square + self._ahead * (squares[number, None] - square)
         u = (np.diff(squares) / (2.0 * self._steps))[number]
-        return (
-            np.column_stack([self._places, y]),
-            np.column_stack([np.ones(len(y)), y_ds]),
-            np.column_stack([np.zeros(len(y)), y_dds]),
-            square,
-            u[:, None],
-        )
+        return curves, square, u[:, None]
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         """Joint motion and limits where these hold; raises UnreachableError where there is none."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
-            y, y_ds, y_dds, square, u = self._motion(x)
+            (y, y_ds, y_dds), square, u = self._motion(x)
             orders = (y, y_ds * np.sqrt(square), y_dds * square + y_ds * u, 0.0 * y)
             t = self._places - self._begin
             self._last = (key, self._evaluator.evaluate(*orders, t=t))
@@ -329,27 +334,19 @@ class PathPhase:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,)."""
-        _, y_ds, y_dds, square, u = self._motion(x)
+        (_, y_ds, y_dds), square, u = self._motion(x)
         rate = np.sqrt(square)
         # X is given where it vanishes.
         half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
-        number = self._number
-        of_step = y_ds / (2.0 * self._steps[number, None])
-        share = np.array([self._ahead, 1.0 - self._ahead])
-        units = self._units[np.array([number, number + 1])][:, :, None]
-        sign = np.array([-1.0, 1.0])[:, None, None]
         by_squares = np.zeros((2, 3, *y_ds.shape))
-        by_squares[:, 1] = units * share * half * y_ds
-        by_squares[:, 2] = units * (share * y_dds + sign * of_step)
+        by_squares[:, 1] = self._by_square * (half * y_ds)
+        by_squares[:, 2] = self._by_square * y_dds + self._by_step * y_ds
         value, first, second, _ = self._basis.values
         basis = np.array([value, first * rate, second * square + first * u])
         slopes = self.evaluate(x).slopes[:3]
+        of_each_curve = np.repeat(basis[:, None], self.curves_count, axis=1)
         return find_entries(
-            slopes,
-            by_squares,
-            self._points,
-            self._curves,
-            np.tile(basis.reshape(3, -1), self.curves_count),
+            slopes, by_squares, self._points, self._curves, of_each_curve.reshape(3, -1)
         ).ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:
@@ -481,9 +478,17 @@ class PathProgram:
         """Take s and the redundant curves of all phases at many places, (S, c) each."""
         return [own.curves(part) for own, part in self._split(x)]
 
-    def timings(self, x: np.ndarray, places: int) -> list[PhaseTiming]:
-        """Time the joint paths of all phases anew; raises UnreachableError where one leaves its map."""
+    def timings(
+        self, x: np.ndarray, places: int, *, is_rough: bool
+    ) -> list[PhaseTiming]:
+        """Time the joint paths of all phases anew, as `PhaseTiming.along` does."""
         return [
-            PhaseTiming.along(own.phase, partial(own.course, part), own.ends, places)
+            PhaseTiming.along(
+                own.phase,
+                partial(own.course, part),
+                own.ends,
+                places,
+                is_rough=is_rough,
+            )
             for own, part in self._split(x)
         ]

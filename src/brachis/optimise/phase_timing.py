@@ -97,6 +97,8 @@ class PhaseTiming:
         course_at: Callable[[np.ndarray], Course],
         ends: tuple[float, float],
         places: int = PLACES,
+        *,
+        is_rough: bool = False,
     ) -> PhaseTiming:
         """Time a joint path; raise UnreachableError if it leaves the map.
 
@@ -110,6 +112,8 @@ class PhaseTiming:
             Path coordinates.
         places : int, optional
             Where it is timed, no fewer.
+        is_rough : bool, optional
+            A third of the places is enough, spread along the path and not over the time: that is right within 1 %.
         """
         path = phase.joint_map.path
         assert path is not None
@@ -136,8 +140,10 @@ class PhaseTiming:
 
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
         timing = course.solve(by_length, agreement=_ROUGHLY)
-        if timing is None:
-            return cls(course, by_length, None)
+        law = phase.time_law
+        given = None if law is None else law.duration
+        if timing is None or is_rough:
+            return cls(course, by_length, timing, given)
         # Stations where the motion takes its time.
         t = np.linspace(0.0, timing.t_end, count)
         y, ydot = course.curves(timing, t)
@@ -146,19 +152,22 @@ class PhaseTiming:
         s = s[np.append(np.diff(s) > tolerances.PATH, True)]
         s[0] = begin
         course, by_length = lay(s, (passed, ydot[:, 0]))
-        law = phase.time_law
-        given = None if law is None else law.duration
         return cls(course, by_length, course.solve(by_length), given)
 
     @classmethod
     def through(
-        cls, phase: Phase, curves: np.ndarray, places: int = PLACES
+        cls,
+        phase: Phase,
+        curves: np.ndarray,
+        places: int = PLACES,
+        *,
+        is_rough: bool = False,
     ) -> PhaseTiming:
         """Time a joint path through curves, (S, c), the first of them s; see `along`."""
         curves = curves[np.append(True, np.diff(curves[:, 0]) > tolerances.PATH)]
         begin, end = curves[[0, -1], 0]
         course_at = partial(Course.through, curves)
-        return cls.along(phase, course_at, (begin, end), places)
+        return cls.along(phase, course_at, (begin, end), places, is_rough=is_rough)
 
 
 def largest_acceleration(timing: Timing) -> float:

@@ -33,8 +33,6 @@ _ROUGHLY = 0.05
 """Part of the time that first knots may lose."""
 _CREDIBLE = 0.01
 """Part of the time by which an answer over the path may differ from its timing."""
-_SWINGS = 0.03
-"""Part of the time by which an answer that is faster than its timing is worth more places."""
 _WORTH = 3.0
 """Tolerances by which a timing of the splines' own joint path is faster if it is worth to be followed."""
 _MOST_INTERVALS = 256
@@ -58,7 +56,9 @@ class PathEffort:
     limit_places : int
         Of the path at which limits hold, at least.
     places : int
-        At which answers are timed.
+        At which joint paths are timed.
+    first_is_rough, last_is_rough : bool
+        Whether a rough timing is enough of the joint paths that are given, and of those that are found.
     margin : float
         Least branch margin.
     options : SolverOptions
@@ -70,6 +70,8 @@ class PathEffort:
     intervals: tuple[int, ...]
     limit_places: int
     places: int
+    first_is_rough: bool
+    last_is_rough: bool
     margin: float
     options: SolverOptions
     posture_violation: float = 5e-5
@@ -79,6 +81,8 @@ COARSE = PathEffort(
     intervals=(12,),
     limit_places=42,
     places=200,
+    first_is_rough=True,
+    last_is_rough=True,
     margin=MARGINS[1],
     options=SolverOptions(
         tolerance=1e-3, max_iterations=25, time_limit=np.inf, progress=3e-3, patience=3
@@ -90,6 +94,8 @@ ROUGH = PathEffort(
     intervals=(16,),
     limit_places=56,
     places=800,
+    first_is_rough=True,
+    last_is_rough=False,
     margin=MARGINS[1],
     options=SolverOptions(
         tolerance=3e-4, max_iterations=40, time_limit=np.inf, progress=1e-3, patience=3
@@ -100,6 +106,8 @@ FINE = PathEffort(
     intervals=(32, 64, 128, 256),
     limit_places=120,
     places=PLACES,
+    first_is_rough=False,
+    last_is_rough=False,
     margin=MARGIN,
     options=SolverOptions(
         tolerance=1e-5, max_iterations=100, time_limit=np.inf, progress=2e-4, patience=4
@@ -263,10 +271,10 @@ def improve_joint_paths(
         phase.with_limits([own for own in phase.limits if not is_left_out(own)])
         for phase in program.phases
     )
-    pairs = zip(program.phases, curves, strict=True)
-    timings = [PhaseTiming.through(*pair, effort.places) for pair in pairs]
+    time_paths = partial(_time_paths, program, curves, effort.places)
     beyond = max(map(violation_of_postures, program.phases, curves))
-    best = BetterPaths(tuple(curves), tuple(timings), (), beyond)
+    timings = time_paths(is_rough=effort.first_is_rough)
+    best = BetterPaths(tuple(curves), timings, (), beyond)
     r = program.phases[0].joint_map.r
     if not r:
         return best
@@ -279,12 +287,25 @@ def improve_joint_paths(
             break
         solve_level = partial(_better, apart, solve, effort, count)
         best = solve_level(best, ahead)
-        if best.swings and ahead == HALF_WAY and not solve.deadline.passed:
+        wants_more = best.swings and ahead == HALF_WAY and not effort.last_is_rough
+        if wants_more and not solve.deadline.passed:
             ahead = POINTS_OF_GAUSS
             best = solve_level(best, ahead)
         if not best.is_credible or best.t_end > before * (1.0 - tolerance):
             break
+    if best.timings is timings and effort.first_is_rough and not effort.last_is_rough:
+        best = replace(best, timings=time_paths(is_rough=False))
     return best
+
+
+def _time_paths(
+    program: Program, curves: Sequence[np.ndarray], places: int, *, is_rough: bool
+) -> tuple[PhaseTiming, ...]:
+    """Time joint paths through curves; raises UnreachableError where they leave the joint map."""
+    return tuple(
+        PhaseTiming.through(*pair, places, is_rough=is_rough)
+        for pair in zip(program.phases, curves, strict=True)
+    )
 
 
 def _better(
@@ -313,7 +334,9 @@ def _better(
             report = solve(over_path, report.x)
             reports = (*reports, report)
             violation = over_path.narrow(report.x)
-        timings = tuple(over_path.timings(report.x, effort.places))
+        timings = tuple(
+            over_path.timings(report.x, effort.places, is_rough=effort.last_is_rough)
+        )
         slack = over_path.safeguard_slack(report.x)
     except UnreachableError:
         return replace(best, reports=reports, is_credible=False)
@@ -329,7 +352,7 @@ def _better(
     return replace(
         found,
         is_credible=abs(missed) < _CREDIBLE,
-        swings=report.violation < _CREDIBLE and _SWINGS < missed < 1.0,
+        swings=report.violation < _CREDIBLE < missed < 1.0,
         is_held_back=slack <= HELD_BACK,
     )
 

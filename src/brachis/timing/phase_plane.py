@@ -42,6 +42,8 @@ _STOPPED = 1e-6
 """Part of the median rate below which no station but the ends is passed."""
 _ROUNDS = 20
 """Linearisations, no more."""
+_ROUNDED = 1e-9
+"""Difference of rows from values, as a part of the limit, that is rounding."""
 _LOOKS_AT_END = 4
 """Linearisations for the largest rate at an end."""
 _CREDIBLE = 1e-2
@@ -56,7 +58,7 @@ Narrower = np.ndarray | float
 """By how much the bounds of a limit are nearer, (P, c); or its lower and its upper ones, (2, P, c)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Rows:
     """A limit as rows lower <= a u + b x <= upper at every station, or as largest x where it has no acceleration.
 
@@ -172,18 +174,30 @@ class PhasePlane:
         middle = _not_too_slow(0.5 * (rate[1:] + rate[:-1]))
         self._linearise(Passage(self._middles, middle, np.zeros_like(middle)))
 
-    def _linearise(self, motion: Passage) -> None:
-        """Write the limits at a motion half-way between the stations, and the bounds that follow."""
+    def _linearise(self, motion: Passage, exact: Sequence[_Rows] = ()) -> None:
+        """Write the limits at a motion half-way between the stations, and the bounds that follow.
+
+        Parameters
+        ----------
+        motion : Passage
+        exact : sequence of _Rows, optional
+            Of the last linearisation, those that are right at the motion: they stay.
+        """
+        known = {own.limit: own for own in exact}
         found = [
-            _Rows.of(limit, self._middles, motion, self._narrower.get(limit, 0.0))
+            known.get(limit)
+            or _Rows.of(limit, self._middles, motion, self._narrower.get(limit, 0.0))
             for limit in self._limits
         ]
         rows = [own for own in found if own is not None]
         self._motion = motion
-        self._levels = self._levels_at_stations(rows, motion.rate)
+        if not known or any(own.by_u is None for own in rows if own not in exact):
+            self._levels = self._levels_at_stations(rows, motion.rate)
         self._rounds = [rows, *self._rounds[:2]]
         older = [own for rows in self._rounds[1:] for own in rows]
-        earlier = [own for own in older if own.is_tangent_below(motion)]
+        earlier = [
+            own for own in older if own not in rows and own.is_tangent_below(motion)
+        ]
         sloped = [own for own in rows + earlier if own.by_u is not None]
         levels = [own for own in rows if own.by_u is None]
         blank = [np.empty((len(self._steps), 0))]
@@ -311,13 +325,15 @@ class PhasePlane:
             change = np.inf if best is None else abs(timing.t_end / best.t_end - 1.0)
             best = timing
             motion = self._pass(timing)
-            error = max((own.error(motion) for own in self._rounds[0]), default=0.0)
+            errors = [own.error(motion) for own in self._rounds[0]]
+            error = max(errors, default=0.0)
             has_converged = change < AGREEMENT or error < agreement
             is_close_enough = change < agreement and error < _CREDIBLE
             if has_converged or is_close_enough:
                 break
             factor = 1.0
-            self._linearise(motion)
+            pairs = zip(self._rounds[0], errors, strict=True)
+            self._linearise(motion, [own for own, off in pairs if off < _ROUNDED])
         return best if error < _CREDIBLE else None
 
     def _pass(self, timing: Timing) -> Passage:

@@ -164,10 +164,6 @@ class TaskMap(Summary, ABC):
         """Task Jacobian J (K, m, n) from the `twists` at K postures."""
         return np.moveaxis(self.rates(twists), 0, 1)
 
-    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """Velocity-dependent task acceleration Jdot qdot = V_q qdot, (K, m), from the `twists` at K postures."""
-        return np.einsum("kmn,kn->km", self.velocity_slopes(twists, qdot), qdot)
-
     def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
         """V_q, (K, m, n), of K states from the `twists` at their postures."""
         return self.derivatives(twists, qdot, np.zeros_like(qdot)).velocity_q
