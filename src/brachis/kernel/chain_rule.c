@@ -20,9 +20,20 @@ typedef struct {
     const double *gradient, *qdot_y, *qddot_y, *qddot_ydot, *qdddot_y;
 } motion_slopes;
 
+/* Call a function with the width as a constant where it is a usual one: its loops over the curves are unrolled then. */
+#define WITH_WIDTH(function, ...) \
+    switch (width) { \
+    case 2: function(2, __VA_ARGS__); break; \
+    case 3: function(3, __VA_ARGS__); break; \
+    case 4: function(4, __VA_ARGS__); break; \
+    case 5: function(5, __VA_ARGS__); break; \
+    default: function(width, __VA_ARGS__); \
+    }
+#define UNROLLED static inline __attribute__((always_inline)) void
+
 /* found += factor * partial (values, n) times slopes (n, width); most partials are of one joint each. */
-static void add_product(
-    const partial *by, long k, long values, long n, long width, double factor, const double *slopes, double *found
+UNROLLED add_product(
+    long width, const partial *by, long k, long values, long n, double factor, const double *slopes, double *found
 )
 {
     const double *numbers = by->numbers + k * by->step;
@@ -39,9 +50,8 @@ static void add_product(
     }
 }
 
-/* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width). */
-void brachis_chain_rule(
-    long count, long n, long width, long groups, const group *of, const motion_slopes *motion, long orders, long columns,
+UNROLLED chain_rule(
+    long width, long count, long n, long groups, const group *of, const motion_slopes *motion, long orders, long columns,
     double *table
 )
 {
@@ -61,22 +71,22 @@ void brachis_chain_rule(
                 found[0][i * width] = own->by_s[k * values + i];
             }
             if (by[0].numbers) {
-                add_product(&by[0], k, values, n, width, 1.0, motion->gradient + at, found[0]);
+                add_product(width, &by[0], k, values, n, 1.0, motion->gradient + at, found[0]);
             }
             if (by[1].numbers) {
-                add_product(&by[1], k, values, n, width, 1.0, motion->qdot_y + at, found[0]);
-                add_product(&by[1], k, values, n, width, 1.0, motion->gradient + at, found[1]);
+                add_product(width, &by[1], k, values, n, 1.0, motion->qdot_y + at, found[0]);
+                add_product(width, &by[1], k, values, n, 1.0, motion->gradient + at, found[1]);
             }
             if (by[2].numbers) {
-                add_product(&by[2], k, values, n, width, 1.0, motion->qddot_y + at, found[0]);
-                add_product(&by[2], k, values, n, width, 1.0, motion->qddot_ydot + at, found[1]);
-                add_product(&by[2], k, values, n, width, 1.0, motion->gradient + at, found[2]);
+                add_product(width, &by[2], k, values, n, 1.0, motion->qddot_y + at, found[0]);
+                add_product(width, &by[2], k, values, n, 1.0, motion->qddot_ydot + at, found[1]);
+                add_product(width, &by[2], k, values, n, 1.0, motion->gradient + at, found[2]);
             }
             if (by[3].numbers) {
-                add_product(&by[3], k, values, n, width, 1.0, motion->qdddot_y + at, found[0]);
-                add_product(&by[3], k, values, n, width, 3.0, motion->qddot_y + at, found[1]);
-                add_product(&by[3], k, values, n, width, 3.0, motion->qdot_y + at, found[2]);
-                add_product(&by[3], k, values, n, width, 1.0, motion->gradient + at, found[3]);
+                add_product(width, &by[3], k, values, n, 1.0, motion->qdddot_y + at, found[0]);
+                add_product(width, &by[3], k, values, n, 3.0, motion->qddot_y + at, found[1]);
+                add_product(width, &by[3], k, values, n, 3.0, motion->qdot_y + at, found[2]);
+                add_product(width, &by[3], k, values, n, 1.0, motion->gradient + at, found[3]);
             }
             for (long order = 0; order < orders; order++) {
                 found[order] += values * width;
@@ -85,11 +95,17 @@ void brachis_chain_rule(
     }
 }
 
-/* Entries of a Jacobian, (broad K + z, columns). First those of variables that move all curves, at each of the K points:
-`shared`, (broad, orders, K, width), are slopes of the curves and their time derivatives by them. Each of the others moves one
-curve at one point, by `basis`, (orders, z). */
-void brachis_entries(
-    long orders, long count, long columns, long width, const double *table, long broad, const double *shared,
+/* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width). */
+void brachis_chain_rule(
+    long count, long n, long width, long groups, const group *of, const motion_slopes *motion, long orders, long columns,
+    double *table
+)
+{
+    WITH_WIDTH(chain_rule, count, n, groups, of, motion, orders, columns, table)
+}
+
+UNROLLED entries_of(
+    long width, long orders, long count, long columns, const double *table, long broad, const double *shared,
     long entries, const long *points, const long *curves, const double *basis, double *found
 )
 {
@@ -115,4 +131,15 @@ void brachis_entries(
             }
         }
     }
+}
+
+/* Entries of a Jacobian, (broad K + z, columns). First those of variables that move all curves, at each of the K points:
+`shared`, (broad, orders, K, width), are slopes of the curves and their time derivatives by them. Each of the others moves one
+curve at one point, by `basis`, (orders, z). */
+void brachis_entries(
+    long orders, long count, long columns, long width, const double *table, long broad, const double *shared,
+    long entries, const long *points, const long *curves, const double *basis, double *found
+)
+{
+    WITH_WIDTH(entries_of, orders, count, columns, table, broad, shared, entries, points, curves, basis, found)
 }
