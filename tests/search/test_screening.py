@@ -155,7 +155,7 @@ def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms(
     (level,) = module.SEARCH_LEVELS["fast"]
     found = module.lattice_starts(decomposition, level)
     assert isinstance(found, list)
-    assert len(found) == level.joint_paths // 2
+    assert 1 <= len(found) <= level.joint_paths // 2
     assert all(start.is_improved for start in found)
     estimates = [start.estimate for start in found]
     assert estimates == sorted(estimates)

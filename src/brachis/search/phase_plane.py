@@ -3,9 +3,8 @@
 A joint path has kinks where the tool stops, so every leg of the path is timed by itself (`timing`). A leg with a given
 speed has no fastest motion, but one motion, which the limits allow or do not allow.
 
-The usual first guess of a leg follows its joint path smoothly from rest to rest, and its time is scaled until nothing
-is too fast. Between moving ends the first guess lies half-way between a constant acceleration and the phase plane. The
-former alone may need no force at all, so that no limit's change with the end time tells a solver where to go.
+The first guess of a leg is the fastest timing of its joint path, smoothed by splines and slowed down until nothing is
+too fast: the limits that hold the fastest motion are near then, and a solver sees where to go.
 """
 
 from __future__ import annotations
@@ -15,8 +14,11 @@ import math
 import numpy as np
 
 from brachis.common.arrays import interpolate_columns
+from brachis.errors import UnreachableError
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point
+from brachis.optimise.phase import Phase
+from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import breaks_of
 from brachis.path.legs import Leg
@@ -132,15 +134,14 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     -------
     (v,) ndarray or None
     """
-    parts = start.legs
-    legs = range(len(parts))
-    guesses: list[list[_LegGuess]]
+    legs = start.legs
+    plain: list[_LegGuess] = [(curves, None) for curves in legs]
+    guesses = [plain]
     if start.durations is not None:
-        guesses = [list(zip(parts, start.durations, strict=True))]
+        guesses = [list(zip(legs, start.durations, strict=True))]
     else:
-        plain = [_given_guess(start, leg) or (parts[leg], None) for leg in legs]
-        moving = [_moving_ends_guess(start, leg) or plain[leg] for leg in legs]
-        guesses = [moving, plain]
+        pairs = zip(program.phases, plain, strict=True)
+        guesses.insert(0, [_time_guess(phase, own) for phase, own in pairs])
     for guess in guesses:
         curves, durations = zip(*guess, strict=True)
         x = starting_point(program, curves, durations)
@@ -207,39 +208,19 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
     return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
 
 
-def _given_guess(start: InitialGuess, leg: int) -> _LegGuess | None:
-    """Curves, (S, c), at even times, and the duration, s, on a leg whose speed is given; else None."""
-    law = start.problem.time_laws[leg]
-    if law is None:
-        return None
-    s = law.at(np.linspace(0.0, law.duration, _STATIONS))[0]
-    return _curves_along(start, s), law.duration
-
-
-def _moving_ends_guess(start: InitialGuess, leg: int) -> _LegGuess | None:
-    """Curves, (S, c), at even times, and the duration, s, on a leg with a free speed between moving ends; else None."""
-    problem = start.problem
-    first, last = problem.leg_rates[leg]
-    if problem.time_laws[leg] is not None or first == last == 0.0:
-        return None
-    begin = problem.legs[leg].begin
-    end = problem.legs[leg].end
-    s = np.linspace(begin, end, _STATIONS)
-    q = postures_along(start, s)
-    times = None
-    if q is not None:
-        plane = PhasePlane(problem.limits, JointPath.through(s, q))
-        times = plane.times((first, last))
-    if times is None or not np.isfinite(times[-1]):
-        return None
-    part = (s - begin) / (end - begin)
-    rate = np.sqrt(first**2 * (1.0 - part) + last**2 * part)
-    with np.errstate(invalid="ignore"):  # 0 / 0 for a motion that starts from rest
-        even = np.nan_to_num(2.0 * (s - begin) / (first + rate))
-    # To and from a slow speed a constant acceleration would take very long.
-    times = 0.5 * (times + np.minimum(even, 2.0 * times))
-    t = np.linspace(0.0, times[-1], 8 * _STATIONS)
-    return _curves_along(start, np.interp(t, times, s)), float(times[-1])
+def _time_guess(phase: Phase, plain: _LegGuess) -> _LegGuess:
+    """Time the joint path of a leg as fast as its limits allow; leave it where its speed is given, or none is."""
+    curves, _ = plain
+    if phase.time_law is not None or phase.joint_map.path is None:
+        return plain
+    try:
+        own = PhaseTiming.through(phase, curves, _STATIONS, is_rough=True)
+    except UnreachableError:
+        return plain
+    if own.timing is None:
+        return plain
+    t = np.linspace(0.0, own.t_end, _STATIONS)
+    return own.course.curves(own.timing, t)[0], own.t_end
 
 
 def _curves_along(start: InitialGuess, s: np.ndarray) -> np.ndarray:
