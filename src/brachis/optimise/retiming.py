@@ -287,7 +287,7 @@ def improve_joint_paths(
             break
         solve_level = partial(_better, apart, solve, effort, count)
         best = solve_level(best, ahead)
-        wants_more = best.swings and ahead == HALF_WAY and not effort.last_is_rough
+        wants_more = best.swings and ahead == HALF_WAY and not effort.first_is_rough
         if wants_more and not solve.deadline.passed:
             ahead = POINTS_OF_GAUSS
             best = solve_level(best, ahead)
