@@ -41,6 +41,10 @@ _PLACES_AN_INTERVAL = 3.5
 """Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
+_COARSE_INTERVALS = (12, 8)
+"""Intervals of a redundant curve in a coarse search, no more and no fewer,"""
+_COARSE_CURVES = 32
+"""and in between so many of all curves together."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -53,8 +57,6 @@ class PathEffort:
     ----------
     intervals : tuple of int
         Of the redundant curves over the path, one after the other.
-    limit_places : int
-        Of the path at which limits hold, at least.
     places : int
         At which joint paths are timed.
     first_is_rough, last_is_rough : bool
@@ -68,7 +70,6 @@ class PathEffort:
     """
 
     intervals: tuple[int, ...]
-    limit_places: int
     places: int
     first_is_rough: bool
     last_is_rough: bool
@@ -78,8 +79,7 @@ class PathEffort:
 
 
 COARSE = PathEffort(
-    intervals=(12,),
-    limit_places=42,
+    intervals=_COARSE_INTERVALS[:1],
     places=200,
     first_is_rough=True,
     last_is_rough=True,
@@ -92,7 +92,6 @@ COARSE = PathEffort(
 """For choosing which joint paths get a rough search."""
 ROUGH = PathEffort(
     intervals=(16,),
-    limit_places=56,
     places=800,
     first_is_rough=True,
     last_is_rough=False,
@@ -104,7 +103,6 @@ ROUGH = PathEffort(
 """To rank joint paths, clear of branch boundaries."""
 FINE = PathEffort(
     intervals=(32, 64, 128, 256),
-    limit_places=120,
     places=PLACES,
     first_is_rough=False,
     last_is_rough=False,
@@ -114,6 +112,12 @@ FINE = PathEffort(
     ),
 )
 """For a plan, from the answer of a rough search."""
+
+
+def coarse_for(r: int) -> PathEffort:
+    """Return the coarse search for so many redundant joints: the more they are, the fewer intervals each one gets."""
+    first, last = _COARSE_INTERVALS
+    return replace(COARSE, intervals=(min(first, max(last, _COARSE_CURVES // r)),))
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:
@@ -317,7 +321,7 @@ def _better(
     ahead: tuple[float, ...],
 ) -> BetterPaths:
     """Solve over the path from the best joint paths, and keep what is faster."""
-    places = max(effort.limit_places, int(_PLACES_AN_INTERVAL * intervals))
+    places = int(_PLACES_AN_INTERVAL * intervals)
     stations = places // len(ahead)
     phases = [
         PathPhase(phase, own, intervals, stations, ahead)

@@ -20,7 +20,7 @@ from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverOptions, solver_for_large, solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
+from brachis.optimise.retiming import ROUGH, PathEffort, coarse_for
 from brachis.optimise.transcription import breaks_of, program_of
 from brachis.search.over_path import CHARTS, improve_guess
 from brachis.search.processes import run_in_processes
@@ -57,7 +57,7 @@ def screen(
     improve = partial(_improve_most, most=most, deadline=deadline, listener=listener)
     if len(starts) > most:
         # The half that looks worse after a coarse search is left out.
-        coarse = improve(starts, COARSE, 1)
+        coarse = improve(starts, coarse_for(starts[0].joint_map.r), 1)
         count = max(most, (len(coarse) + 1) // 2)
         starts = sorted(coarse, key=lambda start: start.estimate)[:count]
     solved = improve(starts, ROUGH, CHARTS)
