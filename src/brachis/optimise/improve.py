@@ -27,7 +27,7 @@ from brachis.optimise.backends import (
     SolveStatus,
     solver_for_large,
 )
-from brachis.optimise.near_rows import solve_near_rows
+from brachis.optimise.near_rows import NearRows, solve_near_rows
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
 from brachis.task import SolverSettings
@@ -256,6 +256,9 @@ _ITERATIONS = 100
 
 _LARGE_PROGRAM = 250
 """Variables of a program over the path above which an interior-point method is as fast as others, or faster."""
+_NEAR_STEP = 0.1
+"""Largest change of a variable in the first step from a motion that is nearly as fast as possible: its subproblem, with
+very many rows near their bounds, then takes half as long."""
 _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
 
@@ -345,8 +348,12 @@ class SolverSession:
             backend: Solver, problem: Problem, x: np.ndarray
         ) -> SolverReport:
             """Solve in the time that is left."""
+            is_near = isinstance(problem, NearRows)
             options = dataclasses.replace(
-                self.options, time_limit=until.left, progress=progress
+                self.options,
+                time_limit=until.left,
+                progress=progress,
+                first_step=_NEAR_STEP if is_near else self.options.first_step,
             )
             return backend.solve(problem, x, options, self.progress)
 

@@ -91,6 +91,8 @@ class SolverOptions:
         counts with its objective times 1 + violation, if it violates rows by no more than 1e-3.
     patience : int
         How many iterates the last ones are.
+    first_step : float
+        Largest change of a variable in the first step of a solver with a trust region.
     anywhere : bool
         Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
         asks; IPOPT counts all iterates in any case.
@@ -101,6 +103,7 @@ class SolverOptions:
     time_limit: float = 20.0
     progress: float = 1e-6
     patience: int = 15
+    first_step: float = 1.0
     anywhere: bool = False
 
 
