@@ -56,6 +56,7 @@ from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import (
     FINE,
     improve_joint_paths,
+    is_timing_all,
     least_time,
 )
 from brachis.optimise.transcription import (
@@ -67,6 +68,8 @@ from brachis.problem.problem import Problem
 from brachis.search.phase_plane import initial_breaks, initial_guess
 from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
+_FEW_VARIABLES = 60
+"""Up to so many variables a solve begins over all knots that are given."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 SELECTABLE = 0.05
@@ -111,8 +114,10 @@ def _solve_over_time(
     )
     begun = begin_with_timing(start, target)
     if begun is None:
-        # With more variables a cold solve takes seconds: it is first solved over some of its knots.
-        program = coarsest(target) if target.variables > 150 else target
+        # Near the timing of its joint path, over however many knots; else a cold solve over many takes seconds.
+        is_near = start.joint_map.r <= 1 and is_timing_all(target)
+        is_small = target.variables <= _FEW_VARIABLES
+        program = target if is_near or is_small else coarsest(target)
         first = initial_guess(program, start)
         if first is None:
             return Candidate.of(
