@@ -240,3 +240,13 @@ def test_results_that_are_too_large_for_the_disk_leave_the_folder_as_it_was(tmp_
         "result.json": "old",
         "overview.png": "old",
     }
+
+
+def test_ctrl_c_while_a_figure_is_drawn_says_what_is_written(tmp_path):
+    def interrupt(_path):
+        raise KeyboardInterrupt
+
+    results = {"result.json": lambda path: write_text("{}", path)}
+    with pytest.raises(KeyboardInterrupt, match=r"written before: .*result\.json"):
+        write_files(tmp_path, results, {"overview.png": interrupt})
+    assert (tmp_path / "result.json").read_text() == "{}"

@@ -131,6 +131,8 @@ def write_files(
     ------
     InputError
         A result cannot be written.
+    KeyboardInterrupt
+        Ctrl-C while figures were drawn; its text says what was written before.
     """
     for name in (*results, *figures):
         if is_folder(out / name):
@@ -149,6 +151,9 @@ def write_files(
                 written.append(str(out / name))
             except InputError as error:
                 failures.append(error)
+            except KeyboardInterrupt as press:
+                done = ", ".join(written) or "nothing"
+                raise KeyboardInterrupt(f"written before: {done}") from press
     return written, failures
 
 
