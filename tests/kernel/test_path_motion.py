@@ -196,10 +196,11 @@ def test_least_singular_values():
     np.testing.assert_allclose(along, 1.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 5, 6])
 @pytest.mark.parametrize("with_jerk", [False, True])
-def test_the_chain_rule(with_jerk):
+def test_the_chain_rule(with_jerk, width):
     rng = np.random.default_rng(8)
-    n, width = 5, 3
+    n = 5
     parts = [rng.normal(size=(POINTS, n, width)) for _ in range(5)]
     gradient, qdot_y, qddot_y, qddot_ydot, qdddot_y = parts
     motion = MotionSlopes(*parts[:4], qdddot_y if with_jerk else None)
@@ -230,7 +231,7 @@ def test_the_chain_rule(with_jerk):
 
     points = np.array([0, 0, 4, POINTS - 1])
     basis = rng.normal(size=(len(found), 4))
-    curves = np.array([1, 0, 2, 1])
+    curves = np.array([1, 0, 2, 1]) % width
     every = rng.normal(size=(2, len(found), POINTS, width))
     entries = find_entries(found, every, points, curves, basis)
     known = np.einsum("bokw,okcw->bkc", every, found).reshape(2 * POINTS, -1)
@@ -240,7 +241,7 @@ def test_the_chain_rule(with_jerk):
     with pytest.raises(ValueError, match="point"):
         find_entries(found, every, points + 1, curves, basis)
     with pytest.raises(ValueError, match="curve"):
-        find_entries(found, every, points, curves + 1, basis)
+        find_entries(found, every, points, curves + width, basis)
     with pytest.raises(ValueError, match="as many"):
         find_entries(found, every, points, curves[:-1], basis)
     with pytest.raises(TypeError, match="cast"):

@@ -290,14 +290,14 @@ def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):
         **task["robot"]["limits"],
         "rms_torque": {"j1": figures[0], "j2": figures[1]},
     }
-    result = brachis.plan({**task, "robot": {**task["robot"], "limits": joints}})
+    # The end time is flat around the optimum: only a close solve finds the multipliers.
+    own = {"robot": {**task["robot"], "limits": joints}, "solver": {"tolerance": 1e-7}}
+    result = brachis.plan({**task, **own})
     assert result.verified, result.verification
     assert result.t_end > free.t_end * 1.001
     assert 0.999 < peaks(result.trajectory)["rms_torque"][0] / figures[0] < 1.0 + 1e-4
     residual = brachis.apps.bottleneck.sensitivities(result.candidate.refined).residual
-    assert residual < 1e-4, (
-        "the gradient is balanced, flat though the end time is around the optimum"
-    )
+    assert residual < 1e-4
     unaware = dataclasses.replace(free.trajectory, task=result.task)
     verification = verify_trajectory(unaware, robot=result.trajectory.robot)
     assert [each.name for each in verification.checks if not each.passed] == [

@@ -294,13 +294,23 @@ def test_no_level_is_begun_after_the_deadline(solved):
     assert refine(program, report, never, over).reports == (report,)
 
 
-def test_many_intervals_are_planned_from_few():
+def test_many_intervals_are_planned_at_once_from_the_timing():
     result = brachis.plan(robot(), task(intervals=100))
     assert result.verified
     assert result.t_end == pytest.approx(2.1421, abs=5e-4)
     assert len(np.unique(result.trajectory.knots)) == 101
     reports = result.candidate.reports
-    assert len(reports[0].x) < 0.4 * len(reports[-1].x)
+    assert {len(report.x) for report in reports} == {196}
+    assert sum(report.iterations for report in reports) < 60
+
+
+def test_many_intervals_are_planned_from_few_where_the_timing_leaves_a_limit_out():
+    jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
+    arm = brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=jerks)
+    result = brachis.plan(arm, task(intervals=50, degree=4))
+    assert result.verified
+    reports = result.candidate.reports
+    assert len(reports[0].x) < 0.6 * len(reports[-1].x)
 
 
 def test_settings_choose_what_is_done(solved):

@@ -507,7 +507,7 @@ def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
     not sys.platform.startswith("linux"),
     reason="what is patched here is only forked there",
 )
-def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeypatch):
+def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(monkeypatch):
     honest = uno._run
 
     def hanging(watch: Any, x: np.ndarray, *rest: Any) -> Any:
@@ -515,11 +515,15 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeyp
 
     monkeypatch.setattr(uno, "_run", hanging)
     monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)
+    jerks = brachis.LimitSpec(torque=10.0, velocity=None, jerk=2000.0)
+    arm = brachis.Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=jerks
+    )
     result = brachis.plan(
-        robot,
+        arm,
         task(
             redundant_joints=["j1"],
-            spline={"intervals": 100},
+            spline={"intervals": 100, "degree": 4},
             search={"time_limit": 5.0},
         ),
     )

@@ -20,7 +20,7 @@ typedef struct {
     const double *gradient, *qdot_y, *qddot_y, *qddot_ydot, *qdddot_y;
 } motion_slopes;
 
-/* Call a function with the width as a constant where it is a usual one: its loops over the curves are unrolled then. */
+/* Call a function with the width as a constant for widths of 2 to 5: the compiler unrolls the loops over the curves. */
 #define WITH_WIDTH(function, ...) \
     switch (width) { \
     case 2: function(2, __VA_ARGS__); break; \

@@ -348,8 +348,8 @@ void brachis_least_singular(long count, long n, const double *inverses, double *
     }
 }
 
-/* Slopes of these values by the joints, (K, n), and by s, (K), where the matrices are J_aug of what `brachis_path_motion`
-found: with the left singular vector u = value J_aug^-T v, a value changes by u^T dJ_aug v. */
+/* Slopes of the least singular values by the joints, (K, n), and by s, (K), where the matrices are J_aug of what
+`brachis_path_motion` found: with the left singular vector u = value J_aug^-T v, a value changes by u^T dJ_aug v. */
 void brachis_singular_slopes(
     long n, const prescribed *asked, const course *along, long count, const double *twists, const double *inverses,
     const double *values, const double *vectors, double *by_q, double *by_s
@@ -359,7 +359,7 @@ void brachis_singular_slopes(
     double signs[6];
     long m = rows_of(asked, used, signs);
     for (long k = 0; k < count; k += LANES) {
-        twist columns[n], slopes[n], unused[n], unused_too[n];
+        twist columns[n], slopes[n], unused_q[n], unused_qdot[n];
         pack inverse[n * n], v[n], still[n], u[n], found[n], turned[n * n];
         read_block(inverses, count, n * n, k, inverse);
         read_block(vectors, count, n, k, v);
@@ -375,7 +375,7 @@ void brachis_singular_slopes(
                 u[j] += value * inverse[i * n + j] * v[i];
             }
         }
-        differentiate_tool(n, columns, v, still, asked->is_pose != 0, slopes, unused, unused_too);
+        differentiate_tool(n, columns, v, still, asked->is_pose != 0, slopes, unused_q, unused_qdot);
         for (long row = 0; row < m; row++) {
             for (long i = 0; i < n; i++) {
                 found[i] += signs[row] * u[row] * part_of(&slopes[i], used[row]);

@@ -56,7 +56,7 @@ void brachis_tool_derivatives(
 }
 
 /* Sizes, (K), of the tool's velocity (`quantity` 0), angular velocity (1) or acceleration (2) at its origin, and their slopes
-by q, qdot and qddot, (K, n) each: those of a vector of length zero are zero. Only the first joints, `moving`, count. */
+by q, qdot and qddot, (K, n) each: those of a vector of length zero are zero. Only the first `moving` joints move. */
 void brachis_tool_sizes(
     const chain *arm, long count, int quantity, long moving, const double *q, const double *qdot, const double *qddot,
     double *sizes, double *slopes_q, double *slopes_qdot, double *slopes_qddot

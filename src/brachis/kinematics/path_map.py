@@ -49,12 +49,10 @@ class PathState(JointState):
     Attributes
     ----------
     path : PathSample
-    conditions : Conditions
     motion : PathMotion
     """
 
     path: PathSample
-    conditions: Conditions
     motion: PathMotion
 
     @cached_property
@@ -177,7 +175,7 @@ class PathMap(JointMap):
         found = (motion.qdot, motion.qddot)
         q = self.choose_turns(q, *found, t, near)
         moved = (y, ydot, yddot, ydddot, q, *found, motion.gradient)
-        return PathState(self, *moved, sample, conditions, motion)
+        return PathState(self, *moved, sample, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

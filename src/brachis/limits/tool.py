@@ -43,8 +43,8 @@ class ToolMotion:
     def __init__(self, robot: Robot, quantity: str) -> None:
         self._chain = robot.chain
         self._quantity = quantity
-        turning = quantity == "angular speed"
-        self._moving = len(robot.urdf_joints) if turning else robot.n
+        is_angular = quantity == "angular speed"
+        self._moving = len(robot.urdf_joints) if is_angular else robot.n
 
     def sizes(self, motion: JointStates) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         """Sizes at K moments, (K,), and their slopes by q, qdot and qddot, (K, n) each; see `Chain.tool_sizes`."""

@@ -257,8 +257,8 @@ _ITERATIONS = 100
 _LARGE_PROGRAM = 250
 """Variables of a program over the path above which an interior-point method is as fast as others, or faster."""
 _NEAR_STEP = 0.1
-"""Largest change of a variable in the first step from a motion that is nearly as fast as possible: its subproblem, with
-very many rows near their bounds, then takes half as long."""
+"""Factor on the first step from a motion that is nearly as fast as possible. Very many rows are near their bounds
+there, and a small subproblem takes half as long."""
 _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
 

@@ -159,7 +159,7 @@ class PathPhase:
         for values, limit in self._posture_limits():
             self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(self._basis.columns)
-        self._set_slopes()
+        self._set_constants()
         self._last: tuple[bytes, Evaluation] | None = None
 
     def _set_pattern(self, columns: np.ndarray) -> None:
@@ -178,7 +178,7 @@ class PathPhase:
         point = np.concatenate([every, every, self._points])
         self.jacobian_rows = rows[point].ravel()
 
-    def _set_slopes(self) -> None:
+    def _set_constants(self) -> None:
         """Set s, s' and s'' at the places, and the slopes of X and u by the variables at both stations beside them."""
         every = np.ones((len(self._places), 1))
         self._of_s = np.array([self._places[:, None], every, 0.0 * every])
@@ -247,7 +247,7 @@ class PathPhase:
         return x[:count] * self._units, points
 
     def _motion(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Y, y' and y'', (3, L, c), and X and u, (L, 1), at the L places where limits hold."""
+        """Curves and two derivatives by s, (3, L, c), and X and u, (L, 1), at the L places where limits hold."""
         squares, points = self._split(x)
         own = self._basis.curves(points)[:3]
         curves = np.concatenate([self._of_s, own], axis=2)

@@ -22,7 +22,7 @@ _PLACES_A_PIECE = 24
 _MOST_PLACES = 40_000
 """Places in all pieces together, about."""
 _ROUGHLY = 1e-3
-"""Change of the time, as a part of it, with which a first timing ends: it only tells where stations are needed."""
+"""Change of the time, as a part of it, with which a rough timing ends."""
 _LEAST_PLACES = 12
 """Places in every knot interval, no fewer."""
 _MOVES = 1e-3
@@ -111,9 +111,9 @@ class PhaseTiming:
         ends : tuple of float
             Path coordinates.
         places : int, optional
-            Where it is timed, no fewer.
+            Where it is timed, no fewer; a third of them if `is_rough`.
         is_rough : bool, optional
-            A third of the places is enough, spread along the path and not over the time: that is right within 1 %.
+            Whether it is timed once, at places spread evenly along the path. That is right within 1 %.
         """
         path = phase.joint_map.path
         assert path is not None

@@ -41,10 +41,10 @@ _PLACES_AN_INTERVAL = 3.5
 """Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
 """Times that limits on postures are narrowed, no more."""
-_COARSE_INTERVALS = (12, 8)
-"""Intervals of a redundant curve in a coarse search, no more and no fewer,"""
+_COARSE_INTERVALS = (8, 12)
+"""Least and largest number of intervals of a redundant curve in a coarse search."""
 _COARSE_CURVES = 32
-"""and in between so many of all curves together."""
+"""Intervals of all curves together in a coarse search, if these bounds allow it."""
 _FIRST_INTERVALS = 16
 """Intervals over which a search over time begins, about."""
 
@@ -59,8 +59,11 @@ class PathEffort:
         Of the redundant curves over the path, one after the other.
     places : int
         At which joint paths are timed.
-    first_is_rough, last_is_rough : bool
-        Whether a rough timing is enough of the joint paths that are given, and of those that are found.
+    is_rough_before, is_rough_after : bool
+        Whether joint paths are timed roughly before they are improved, and afterwards. Of a joint path that is not
+        improved the latter counts. A gain or a loss of less than 1 % over a rough timing is not noticed.
+    may_add_places : bool
+        Whether limits hold at two places between stations where one is not enough.
     margin : float
         Least branch margin.
     options : SolverOptions
@@ -71,18 +74,20 @@ class PathEffort:
 
     intervals: tuple[int, ...]
     places: int
-    first_is_rough: bool
-    last_is_rough: bool
+    is_rough_before: bool
+    is_rough_after: bool
+    may_add_places: bool
     margin: float
     options: SolverOptions
     posture_violation: float = 5e-5
 
 
 COARSE = PathEffort(
-    intervals=_COARSE_INTERVALS[:1],
+    intervals=_COARSE_INTERVALS[1:],
     places=200,
-    first_is_rough=True,
-    last_is_rough=True,
+    is_rough_before=True,
+    is_rough_after=True,
+    may_add_places=False,
     margin=MARGINS[1],
     options=SolverOptions(
         tolerance=1e-3, max_iterations=25, time_limit=np.inf, progress=3e-3, patience=3
@@ -93,8 +98,9 @@ COARSE = PathEffort(
 ROUGH = PathEffort(
     intervals=(16,),
     places=800,
-    first_is_rough=True,
-    last_is_rough=False,
+    is_rough_before=True,
+    is_rough_after=False,
+    may_add_places=False,
     margin=MARGINS[1],
     options=SolverOptions(
         tolerance=3e-4, max_iterations=40, time_limit=np.inf, progress=1e-3, patience=3
@@ -104,8 +110,9 @@ ROUGH = PathEffort(
 FINE = PathEffort(
     intervals=(32, 64, 128, 256),
     places=PLACES,
-    first_is_rough=False,
-    last_is_rough=False,
+    is_rough_before=False,
+    is_rough_after=False,
+    may_add_places=True,
     margin=MARGIN,
     options=SolverOptions(
         tolerance=1e-5, max_iterations=100, time_limit=np.inf, progress=2e-4, patience=4
@@ -115,9 +122,9 @@ FINE = PathEffort(
 
 
 def coarse_for(r: int) -> PathEffort:
-    """Return the coarse search for so many redundant joints: the more they are, the fewer intervals each one gets."""
-    first, last = _COARSE_INTERVALS
-    return replace(COARSE, intervals=(min(first, max(last, _COARSE_CURVES // r)),))
+    """Return the coarse search for r redundant joints, at least one: with more joints each has fewer intervals."""
+    least, most = _COARSE_INTERVALS
+    return replace(COARSE, intervals=(min(most, max(least, _COARSE_CURVES // r)),))
 
 
 def keep(program: Program, x: np.ndarray) -> SolverReport:
@@ -277,9 +284,10 @@ def improve_joint_paths(
     )
     time_paths = partial(_time_paths, program, curves, effort.places)
     beyond = max(map(violation_of_postures, program.phases, curves))
-    timings = time_paths(is_rough=effort.first_is_rough)
-    best = BetterPaths(tuple(curves), timings, (), beyond)
     r = program.phases[0].joint_map.r
+    is_first_rough = effort.is_rough_before if r else effort.is_rough_after
+    timings = time_paths(is_rough=is_first_rough)
+    best = BetterPaths(tuple(curves), timings, (), beyond)
     if not r:
         return best
     apart = program.with_margin(effort.margin)
@@ -291,13 +299,13 @@ def improve_joint_paths(
             break
         solve_level = partial(_better, apart, solve, effort, count)
         best = solve_level(best, ahead)
-        wants_more = best.swings and ahead == HALF_WAY and not effort.first_is_rough
+        wants_more = best.swings and ahead == HALF_WAY and effort.may_add_places
         if wants_more and not solve.deadline.passed:
             ahead = POINTS_OF_GAUSS
             best = solve_level(best, ahead)
         if not best.is_credible or best.t_end > before * (1.0 - tolerance):
             break
-    if best.timings is timings and effort.first_is_rough and not effort.last_is_rough:
+    if best.timings is timings and is_first_rough and not effort.is_rough_after:
         best = replace(best, timings=time_paths(is_rough=False))
     return best
 
@@ -339,7 +347,7 @@ def _better(
             reports = (*reports, report)
             violation = over_path.narrow(report.x)
         timings = tuple(
-            over_path.timings(report.x, effort.places, is_rough=effort.last_is_rough)
+            over_path.timings(report.x, effort.places, is_rough=effort.is_rough_after)
         )
         slack = over_path.safeguard_slack(report.x)
     except UnreachableError:
@@ -348,7 +356,8 @@ def _better(
     found = BetterPaths(curves, timings, reports, violation)
     missed = 1.0 - report.objective / found.t_end
     # The phase plane does not tell whether the limits allow a speed that is given.
-    is_given = any(own.given is not None for own in timings)
+    has_laws = any(own.given is not None for own in timings)
+    is_given = has_laws and np.isfinite(found.t_end)
     is_beyond = is_given and report.violation > _CREDIBLE
     is_better = found.is_better_than(best, effort.posture_violation)
     if is_beyond or not (is_better or is_given):

@@ -107,14 +107,14 @@ def solve_candidate(
 def _solve_over_time(
     start: InitialGuess, target: Program, session: SolverSession
 ) -> Candidate:
-    """Solve over time: with the coarsest knots of those given, or with knots that the fastest timing needs."""
+    """Solve over time, with knots that the fastest timing needs, all that are given, or the coarsest of them."""
     target = target.with_phases(
         phase.restrict_to(curves)
         for phase, curves in zip(target.phases, start.legs, strict=True)
     )
     begun = begin_with_timing(start, target)
     if begun is None:
-        # Near the timing of its joint path, over however many knots; else a cold solve over many takes seconds.
+        # From the timing of a joint path a solve takes few iterations over any number of knots; else many take seconds.
         is_near = start.joint_map.r <= 1 and is_timing_all(target)
         is_small = target.variables <= _FEW_VARIABLES
         program = target if is_near or is_small else coarsest(target)

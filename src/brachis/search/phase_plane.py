@@ -136,12 +136,11 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     """
     legs = start.legs
     plain: list[_LegGuess] = [(curves, None) for curves in legs]
-    guesses = [plain]
+    pairs = zip(program.phases, plain, strict=True)
     if start.durations is not None:
-        guesses = [list(zip(legs, start.durations, strict=True))]
+        guesses: list[list[_LegGuess]] = [list(zip(legs, start.durations, strict=True))]
     else:
-        pairs = zip(program.phases, plain, strict=True)
-        guesses.insert(0, [_time_guess(phase, own) for phase, own in pairs])
+        guesses = [[_time_guess(phase, own) for phase, own in pairs], plain]
     for guess in guesses:
         curves, durations = zip(*guess, strict=True)
         x = starting_point(program, curves, durations)
@@ -209,7 +208,7 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
 
 
 def _time_guess(phase: Phase, plain: _LegGuess) -> _LegGuess:
-    """Time the joint path of a leg as fast as its limits allow; leave it where its speed is given, or none is."""
+    """Time the joint path of a leg; return the plain guess where the speed is given, and where no timing exists."""
     curves, _ = plain
     if phase.time_law is not None or phase.joint_map.path is None:
         return plain

@@ -42,8 +42,8 @@ _STOPPED = 1e-6
 """Part of the median rate below which no station but the ends is passed."""
 _ROUNDS = 20
 """Linearisations, no more."""
-_ROUNDED = 1e-9
-"""Difference of rows from values, as a part of the limit, that is rounding."""
+_EXACT = 1e-9
+"""Largest difference of rows from values, as a part of the limit, with which rows stay: it is rounding."""
 _LOOKS_AT_END = 4
 """Linearisations for the largest rate at an end."""
 _CREDIBLE = 1e-2
@@ -174,16 +174,17 @@ class PhasePlane:
         middle = _not_too_slow(0.5 * (rate[1:] + rate[:-1]))
         self._linearise(Passage(self._middles, middle, np.zeros_like(middle)))
 
-    def _linearise(self, motion: Passage, exact: Sequence[_Rows] = ()) -> None:
+    def _linearise(self, motion: Passage, kept: Sequence[_Rows] = ()) -> None:
         """Write the limits at a motion half-way between the stations, and the bounds that follow.
 
         Parameters
         ----------
         motion : Passage
-        exact : sequence of _Rows, optional
-            Of the last linearisation, those that are right at the motion: they stay.
+            Half-way between the stations.
+        kept : sequence of _Rows, optional
+            Those of the last linearisation that agree with the limits at the motion.
         """
-        known = {own.limit: own for own in exact}
+        known = {own.limit: own for own in kept}
         found = [
             known.get(limit)
             or _Rows.of(limit, self._middles, motion, self._narrower.get(limit, 0.0))
@@ -191,10 +192,11 @@ class PhasePlane:
         ]
         rows = [own for own in found if own is not None]
         self._motion = motion
-        if not known or any(own.by_u is None for own in rows if own not in exact):
+        has_new_levels = any(own.by_u is None for own in rows if own not in kept)
+        if has_new_levels or not kept:
             self._levels = self._levels_at_stations(rows, motion.rate)
         self._rounds = [rows, *self._rounds[:2]]
-        older = [own for rows in self._rounds[1:] for own in rows]
+        older = dict.fromkeys(own for last in self._rounds[1:] for own in last)
         earlier = [
             own for own in older if own not in rows and own.is_tangent_below(motion)
         ]
@@ -333,7 +335,7 @@ class PhasePlane:
                 break
             factor = 1.0
             pairs = zip(self._rounds[0], errors, strict=True)
-            self._linearise(motion, [own for own, off in pairs if off < _ROUNDED])
+            self._linearise(motion, [own for own, off in pairs if off < _EXACT])
         return best if error < _CREDIBLE else None
 
     def _pass(self, timing: Timing) -> Passage:

@@ -92,7 +92,7 @@ class SolverOptions:
     patience : int
         How many iterates the last ones are.
     first_step : float
-        Largest change of a variable in the first step of a solver with a trust region.
+        Factor on the first radius of a trust region, for starts that are near the answer. Uno asks.
     anywhere : bool
         Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
         asks; IPOPT counts all iterates in any case.

@@ -206,7 +206,7 @@ def _run(
     settings = {
         "primal_tolerance": options.tolerance,
         "dual_tolerance": options.tolerance,
-        "TR_radius": min(radius, options.first_step),
+        "TR_radius": radius * options.first_step,
         "max_iterations": options.max_iterations,
         "time_limit": float(options.time_limit),
     }
