@@ -65,11 +65,9 @@ from brachis.optimise.transcription import (
     program_over,
 )
 from brachis.problem.problem import Problem
-from brachis.search.phase_plane import initial_breaks, initial_guess
+from brachis.search.phase_plane import FEW_VARIABLES, initial_breaks, initial_guess
 from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
-_FEW_VARIABLES = 60
-"""Up to so many variables a solve begins over all knots that are given."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 SELECTABLE = 0.05
@@ -116,7 +114,7 @@ def _solve_over_time(
     if begun is None:
         # From the timing of a joint path a solve takes few iterations over any number of knots; else many take seconds.
         is_near = start.joint_map.r <= 1 and is_timing_all(target)
-        is_small = target.variables <= _FEW_VARIABLES
+        is_small = target.variables <= FEW_VARIABLES
         program = target if is_near or is_small else coarsest(target)
         first = initial_guess(program, start)
         if first is None:

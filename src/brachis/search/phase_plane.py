@@ -4,7 +4,8 @@ A joint path has kinks where the tool stops, so every leg of the path is timed b
 speed has no fastest motion, but one motion, which the limits allow or do not allow.
 
 The first guess of a leg is the fastest timing of its joint path, smoothed by splines and slowed down until nothing is
-too fast: the limits that hold the fastest motion are near then, and a solver sees where to go.
+too fast: the limits that hold the fastest motion are near then, and a solver sees where to go. A joint path that is far
+from the best one is followed smoothly from rest to rest instead, if knots are few: its timing leads to other optima.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ _LegGuess = tuple[np.ndarray, float | None]
 """Guess for a leg: curves, (S, c), and duration, s, if these are a motion's at even times."""
 _STATIONS = 401
 """Stations along a joint path of a guess."""
+FEW_VARIABLES = 60
+"""Up to so many variables a solve over time begins over all knots that are given."""
 _LEAST_STATIONS = 41
 """Fewest stations along a leg."""
 _NEAR = 1e-4
@@ -140,7 +143,14 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     if start.durations is not None:
         guesses: list[list[_LegGuess]] = [list(zip(legs, start.durations, strict=True))]
     else:
-        guesses = [[_time_guess(phase, own) for phase, own in pairs], plain]
+        is_near = start.is_improved or program.variables > FEW_VARIABLES
+        guesses = [
+            [
+                _time_guess(phase, own) if is_near or _is_moving(phase) else own
+                for phase, own in pairs
+            ],
+            plain,
+        ]
     for guess in guesses:
         curves, durations = zip(*guess, strict=True)
         x = starting_point(program, curves, durations)
@@ -205,6 +215,12 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
         )
     before, behind = sides
     return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
+
+
+def _is_moving(phase: Phase) -> bool:
+    """Tell whether the tool moves at an end of a leg."""
+    sides = phase.boundary.start[0], phase.boundary.end[0]
+    return any(side.derivatives[:1].any() for side in sides)
 
 
 def _time_guess(phase: Phase, plain: _LegGuess) -> _LegGuess:
