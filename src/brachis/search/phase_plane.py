@@ -4,20 +4,22 @@ A joint path has kinks where the tool stops, so every leg of the path is timed b
 speed has no fastest motion, but one motion, which the limits allow or do not allow.
 
 The first guess of a leg is the fastest timing of its joint path, smoothed by splines and slowed down until nothing is
-too fast: the limits that hold the fastest motion are near then, and a solver sees where to go. A joint path that is far
-from the best one is followed smoothly from rest to rest instead, if knots are few: its timing leads to other optima.
+too fast: the limits that hold the fastest motion are near then, and a solver sees where to go. Where a smooth motion
+from rest to rest is faster, or splines cannot follow the timing within the limits, it is that one. So it is, if knots
+are few, for a joint path that may be far from the best one: its timing leads to other optima.
 """
 
 from __future__ import annotations
 
 import math
+from operator import itemgetter
 
 import numpy as np
 
 from brachis.common.arrays import interpolate_columns
 from brachis.errors import UnreachableError
 from brachis.optimise.candidate import InitialGuess
-from brachis.optimise.guess import starting_point
+from brachis.optimise.guess import starting_point, worst_time_scaling_ratio
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
@@ -151,12 +153,15 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
             ],
             plain,
         ]
+    found = []
     for guess in guesses:
         curves, durations = zip(*guess, strict=True)
         x = starting_point(program, curves, durations)
         if x is not None:
-            return x
-    return None
+            beyond = max(worst_time_scaling_ratio(program, x), 1.0)
+            found.append((beyond, program.end_time(x), x))
+    # The fastest one within the limits.
+    return min(found, key=itemgetter(0, 1))[-1] if found else None
 
 
 def initial_breaks(start: InitialGuess) -> list[np.ndarray]:
