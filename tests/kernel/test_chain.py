@@ -121,9 +121,10 @@ def test_tool_sizes(case, quantity):
         return np.linalg.norm(QUANTITIES[quantity](model, data, *at))
 
     rest = [states[0], 0.0 * states[1], 0.0 * states[2]]
-    at_rest, at_rest_slopes = chain.tool_sizes(quantity, moving, *rest)
+    at_rest, at_rest_slopes = chain.tool_size_slopes(quantity, moving, *rest)
     assert not at_rest.any() and not np.any(at_rest_slopes)
-    sizes, slopes = chain.tool_sizes(quantity, moving, *states)
+    sizes, slopes = chain.tool_size_slopes(quantity, moving, *states)
+    assert np.array_equal(sizes, chain.tool_sizes(quantity, moving, *states))
     h = 1e-6
     for k in range(STATES):
         here = [own[k] for own in states]
@@ -144,7 +145,7 @@ def test_no_states(case):
     none = np.empty((0, chain.n))
     assert chain.torques(none, none, none).shape == (0, chain.n)
     assert chain.tool(none, in_tool_axes=True)[2].shape == (6, 0, chain.n)
-    assert chain.tool_sizes("speed", chain.n, none, none, none)[0].shape == (0,)
+    assert chain.tool_sizes("speed", chain.n, none, none, none).shape == (0,)
 
 
 def test_odd_arrays_are_read_as_they_are(case):

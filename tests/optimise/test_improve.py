@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+import brachis
 from brachis.common.deadline import NEVER, Deadline
+from brachis.optimise import improve as module
 from brachis.optimise.backends import (
     Solver,
     SolverOptions,
@@ -21,6 +23,7 @@ from brachis.optimise.improve import (
     attempt_once,
     improve,
 )
+from brachis.optimise.near_rows import NearRows
 from brachis.optimise.program import Program
 from support.phases import phase_of
 from support.starts import starting_points
@@ -171,6 +174,26 @@ def begin(program, x):
 
     SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)
     return begun[0]
+
+
+@pytest.mark.parametrize("rows", [[0, 1], None])
+def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
+    program, _ = brachis.transcribe(
+        brachis.examples.scara_line, redundant_joints=["j1"], intervals=10
+    )
+    x = next(starting_points(program))
+    steps = []
+
+    def run(monitor, x):
+        steps.append(monitor.options.first_step)
+        return monitor.report("fake", SolveStatus.OPTIMAL, x, None, "")
+
+    def solve_some(problem, x, solve):
+        return solve(problem if rows is None else NearRows(problem, np.array(rows)), x)
+
+    monkeypatch.setattr(module, "solve_near_rows", solve_some)
+    SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)
+    assert steps == [1.0 if rows is None else 0.1]
 
 
 def worst(program, x):

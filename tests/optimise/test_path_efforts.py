@@ -42,8 +42,18 @@ def test_rows_that_are_kept_change_nothing(monkeypatch):
     program, _ = brachis.transcribe(task)
     (own,) = program.phases
     joint_path = next(differential_ik_paths(own.joint_map))
+    written = []
+    write = phase_plane._Rows.of
+
+    def count(limit, *rest):
+        written.append(limit.kind)
+        return write(limit, *rest)
+
+    monkeypatch.setattr(phase_plane._Rows, "of", count)
     kept = PhaseTiming.through(own, joint_path, 400)
+    with_kept = len(written)
     monkeypatch.setattr(phase_plane, "_EXACT", -1.0)
     anew = PhaseTiming.through(own, joint_path, 400)
+    assert len(written) - with_kept > with_kept
     assert np.isfinite(anew.t_end)
     assert kept.t_end == pytest.approx(anew.t_end, rel=1e-9)

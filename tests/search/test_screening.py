@@ -148,14 +148,18 @@ def test_the_better_half_of_a_coarse_search_is_searched_again(starts, monkeypatc
     assert searched[ROUGH] == origins[::-1][: (len(starts) + 1) // 2]
 
 
-def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms():
+def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms(
+    monkeypatch,
+):
+    # The second class of joint paths is 4 % slower, and would be left out.
+    monkeypatch.setattr(screening, "_SLOW", 1.1)
     task = load_task(examples.free_roll)
     problem = Problem.of(robot_from_settings(task.robot), task)
     (decomposition,) = decompositions_of(problem)
     (level,) = module.SEARCH_LEVELS["fast"]
     found = module.lattice_starts(decomposition, level)
     assert isinstance(found, list)
-    assert 1 <= len(found) <= level.joint_paths // 2
+    assert len(found) == level.joint_paths // 2
     assert all(start.is_improved for start in found)
     estimates = [start.estimate for start in found]
     assert estimates == sorted(estimates)

@@ -155,50 +155,70 @@ class Chain:
         return found
 
     def tool_sizes(
-        self, quantity: str, moving: int, *states: np.ndarray
-    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Size of a motion of the tool, and its slopes: zero where the motion is.
+        self,
+        quantity: str,
+        moving: int,
+        q: np.ndarray,
+        qdot: np.ndarray,
+        qddot: np.ndarray,
+    ) -> np.ndarray:
+        """Compute the size of a motion of the tool in K states.
 
         Parameters
         ----------
         quantity : {"speed", "angular speed", "acceleration"}
             Of the tool's origin, in the world frame.
         moving : int
-            So many of the joints, the first ones, count.
-        *states : (K, n) ndarray
-            q, qdot and qddot.
+            The first so many joints move the tool; the others do not count.
+        q, qdot, qddot : (K, n) ndarray
 
         Returns
         -------
-        sizes : (K,) ndarray
+        (K,) ndarray
             m/s, rad/s or m/s^2.
-        slopes : tuple of (K, n) ndarray
-            By q, qdot and qddot.
         """
-        count = len(states[0])
-        sizes = np.empty(count)
-        slopes = np.empty((3, count, self.n))
+        sizes = np.empty(len(q))
         code = _QUANTITIES.index(quantity)
-        kept = [as_doubles(own, (count, self.n)) for own in states]
-        load().brachis_tool_sizes(
-            self.address, count, code, moving, *map(address, (*kept, sizes, *slopes))
-        )
-        return sizes, (slopes[0], slopes[1], slopes[2])
+        states = (q, qdot, qddot)
+        none = (0, 0, 0)
+        self._call("brachis_tool_sizes", states, sizes, *none, before=(code, moving))
+        return sizes
+
+    def tool_size_slopes(
+        self,
+        quantity: str,
+        moving: int,
+        q: np.ndarray,
+        qdot: np.ndarray,
+        qddot: np.ndarray,
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Compute `tool_sizes`, (K,), and their slopes by q, qdot and qddot, (K, n) each: 0 where the size is 0."""
+        sizes = np.empty(len(q))
+        by_q, by_qdot, by_qddot = np.empty((3, len(q), self.n))
+        code = _QUANTITIES.index(quantity)
+        states = (q, qdot, qddot)
+        found = (sizes, by_q, by_qdot, by_qddot)
+        self._call("brachis_tool_sizes", states, *found, before=(code, moving))
+        return sizes, (by_q, by_qdot, by_qddot)
 
     def _call(
         self,
         name: str,
         states: tuple[np.ndarray, ...],
         *others: np.ndarray | int,
+        before: tuple[int, ...] = (),
     ) -> None:
-        """Call a function of the library with postures, rates or accelerations, (K, n) each, and where it writes."""
+        """Call a function of the library with postures, rates or accelerations, (K, n) each, and where it writes.
+
+        Numbers `before` stand in front of the postures.
+        """
         count = len(states[0])
         kept = [as_doubles(own, (count, self.n)) for own in states]
         given = [
             address(own) if isinstance(own, np.ndarray) else own
             for own in (*kept, *others)
         ]
-        getattr(load(), name)(self.address, count, *given)
+        getattr(load(), name)(self.address, count, *before, *given)
 
 
 def _as_doubles_or_zero(

@@ -56,7 +56,8 @@ void brachis_tool_derivatives(
 }
 
 /* Sizes, (K), of the tool's velocity (`quantity` 0), angular velocity (1) or acceleration (2) at its origin, and their slopes
-by q, qdot and qddot, (K, n) each: those of a vector of length zero are zero. Only the first `moving` joints move. */
+by q, qdot and qddot, (K, n) each, if they are asked for: those of a vector of length zero are zero. Only the first `moving`
+joints move. */
 void brachis_tool_sizes(
     const chain *arm, long count, int quantity, long moving, const double *q, const double *qdot, const double *qddot,
     double *sizes, double *slopes_q, double *slopes_qdot, double *slopes_qddot
@@ -88,6 +89,9 @@ void brachis_tool_sizes(
             inverse[lane] = size[lane] > 0.0 ? 1.0 / size[lane] : 0.0;
         }
         scatter(size, sizes, count, 1, k, 0);
+        if (!slopes_q) {
+            continue;
+        }
         direction = scale(direction, inverse);
         differentiate_tool(n, columns, rates, more, 0, slopes, by_q, by_qdot);
         for (long i = 0; i < n; i++) {

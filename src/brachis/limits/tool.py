@@ -46,10 +46,15 @@ class ToolMotion:
         is_angular = quantity == "angular speed"
         self._moving = len(robot.urdf_joints) if is_angular else robot.n
 
-    def sizes(self, motion: JointStates) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-        """Sizes at K moments, (K,), and their slopes by q, qdot and qddot, (K, n) each; see `Chain.tool_sizes`."""
+    def sizes(self, motion: JointStates) -> np.ndarray:
+        """Sizes at K moments, (K,)."""
         states = (motion.q, motion.qdot, motion.qddot)
         return self._chain.tool_sizes(self._quantity, self._moving, *states)
+
+    def slopes(self, motion: JointStates) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Sizes at K moments, (K,), and their slopes by q, qdot and qddot, (K, n) each."""
+        states = (motion.q, motion.qdot, motion.qddot)
+        return self._chain.tool_size_slopes(self._quantity, self._moving, *states)
 
 
 class ToolRatios(Limit):
@@ -100,10 +105,10 @@ class ToolAccelerationLimit(ToolRatios):
         self._figure = figure
 
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._tool.sizes(motion)[0][:, None] / self._figure
+        return self._tool.sizes(motion)[:, None] / self._figure
 
     def partials(self, motion: JointStates) -> Partials:
-        _, slopes = self._tool.sizes(motion)
+        _, slopes = self._tool.slopes(motion)
         return Partials(*(part[:, None] / self._figure for part in slopes))
 
 
@@ -208,11 +213,11 @@ class ToolSpeedLimit(ToolRatios):
         return np.column_stack(largest), np.column_stack(slopes)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._tool.sizes(motion)[0][:, None] / self.largest_at(motion.s)[0]
+        return self._tool.sizes(motion)[:, None] / self.largest_at(motion.s)[0]
 
     def partials(self, motion: JointStates) -> Partials:
         largest, slope = self.largest_at(motion.s)
-        speed, (by_q, by_qdot, _) = self._tool.sizes(motion)
+        speed, (by_q, by_qdot, _) = self._tool.slopes(motion)
         q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))
         return Partials(q=q, qdot=qdot, s=-speed[:, None] * slope / largest**2)
 

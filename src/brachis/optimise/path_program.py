@@ -160,7 +160,9 @@ class PathPhase:
             self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(self._basis.columns)
         self._set_constants()
-        self._last: tuple[bytes, Evaluation] | None = None
+        self._last: tuple[bytes, tuple[tuple[np.ndarray, ...], Evaluation]] | None = (
+            None
+        )
 
     def _set_pattern(self, columns: np.ndarray) -> None:
         """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
@@ -180,8 +182,8 @@ class PathPhase:
 
     def _set_constants(self) -> None:
         """Set s, s' and s'' at the places, and the slopes of X and u by the variables at both stations beside them."""
-        every = np.ones((len(self._places), 1))
-        self._of_s = np.array([self._places[:, None], every, 0.0 * every])
+        s = self._places[:, None]
+        self._of_s = np.array([s, np.ones_like(s), np.zeros_like(s)])
         units = self._units[np.array([self._number, self._number + 1])][:, :, None]
         self._by_square = units * np.array([self._ahead, 1.0 - self._ahead])
         steps = 2.0 * self._steps[self._number, None]
@@ -246,7 +248,7 @@ class PathPhase:
         points = x[count:].reshape(self.curves_count, self._count)
         return x[:count] * self._units, points
 
-    def _motion(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _motion(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Curves and two derivatives by s, (3, L, c), and X and u, (L, 1), at the L places where limits hold."""
         squares, points = self._split(x)
         own = self._basis.curves(points)[:3]
@@ -259,12 +261,17 @@ class PathPhase:
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         """Joint motion and limits where these hold; raises UnreachableError where there is none."""
+        return self._evaluate(x)[1]
+
+    def _evaluate(self, x: np.ndarray) -> tuple[tuple[np.ndarray, ...], Evaluation]:
+        """Return `_motion` and `evaluate`, kept until x changes."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
-            (y, y_ds, y_dds), square, u = self._motion(x)
+            motion = self._motion(x)
+            (y, y_ds, y_dds), square, u = motion
             orders = (y, y_ds * np.sqrt(square), y_dds * square + y_ds * u, 0.0 * y)
             t = self._places - self._begin
-            self._last = (key, self._evaluator.evaluate(*orders, t=t))
+            self._last = (key, (motion, self._evaluator.evaluate(*orders, t=t)))
         return self._last[1]
 
     def narrow(self, x: np.ndarray) -> float:
@@ -334,7 +341,7 @@ class PathPhase:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,)."""
-        (_, y_ds, y_dds), square, u = self._motion(x)
+        ((_, y_ds, y_dds), square, u), evaluation = self._evaluate(x)
         rate = np.sqrt(square)
         # X is given where it vanishes.
         half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
@@ -343,11 +350,10 @@ class PathPhase:
         by_squares[:, 2] = self._by_square * y_dds + self._by_step * y_ds
         value, first, second, _ = self._basis.values
         basis = np.array([value, first * rate, second * square + first * u])
-        slopes = self.evaluate(x).slopes[:3]
-        of_each_curve = np.repeat(basis[:, None], self.curves_count, axis=1)
-        return find_entries(
-            slopes, by_squares, self._points, self._curves, of_each_curve.reshape(3, -1)
-        ).ravel()
+        slopes = evaluation.slopes[:3]
+        every = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
+        where = (self._points, self._curves)
+        return find_entries(slopes, by_squares, *where, every).ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:
         """Take s and the redundant curves at many places, (S, c)."""

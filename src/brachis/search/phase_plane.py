@@ -139,20 +139,13 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     -------
     (v,) ndarray or None
     """
-    legs = start.legs
-    plain: list[_LegGuess] = [(curves, None) for curves in legs]
-    pairs = zip(program.phases, plain, strict=True)
-    if start.durations is not None:
-        guesses: list[list[_LegGuess]] = [list(zip(legs, start.durations, strict=True))]
-    else:
-        is_near = start.is_improved or program.variables > FEW_VARIABLES
-        guesses = [
-            [
-                _time_guess(phase, own) if is_near or _is_moving(phase) else own
-                for phase, own in pairs
-            ],
-            plain,
-        ]
+    durations = start.durations or (None,) * len(start.legs)
+    given: list[_LegGuess] = list(zip(start.legs, durations, strict=True))
+    guesses = [given]
+    if start.durations is None:
+        timed = _time_guesses(program, start, given)
+        if any(duration is not None for _, duration in timed):
+            guesses.append(timed)
     found = []
     for guess in guesses:
         curves, durations = zip(*guess, strict=True)
@@ -226,6 +219,17 @@ def _is_moving(phase: Phase) -> bool:
     """Tell whether the tool moves at an end of a leg."""
     sides = phase.boundary.start[0], phase.boundary.end[0]
     return any(side.derivatives[:1].any() for side in sides)
+
+
+def _time_guesses(
+    program: Program, start: InitialGuess, plain: list[_LegGuess]
+) -> list[_LegGuess]:
+    """Time the joint paths of the legs that are near the best ones, have many knots, or moving ends."""
+    is_near = start.is_improved or program.variables > FEW_VARIABLES
+    return [
+        _time_guess(phase, own) if is_near or _is_moving(phase) else own
+        for phase, own in zip(program.phases, plain, strict=True)
+    ]
 
 
 def _time_guess(phase: Phase, plain: _LegGuess) -> _LegGuess:
