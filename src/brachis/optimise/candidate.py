@@ -148,6 +148,10 @@ class Candidate(Summary):
         Of all solves: with ever smaller branch margins, on ever finer meshes, then of the refinement rounds.
     coarse : float
         End time at the first collocation points, s; infinite without a motion.
+    adapted : float
+        End time over all its knots, before refinement, s; infinite while they are not all used.
+    to_beat : float
+        An `adapted` end time, s, from which on it is not refined: another motion is as fast.
     refined : SolvedProgram or None
         The last program, its answer and its multipliers; None while it is not finished.
     trajectory : Trajectory or None
@@ -177,6 +181,8 @@ class Candidate(Summary):
     is_over_path: bool = False
     reports: tuple[SolverReport, ...] = ()
     coarse: float = np.inf
+    adapted: float = np.inf
+    to_beat: float = np.inf
     refined: SolvedProgram | None = None
     trajectory: Trajectory | None = None
     verification: Verification | None = None

@@ -70,6 +70,8 @@ from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
+SLOW = "not refined: no faster than another over all knots"
+"""Status of a candidate that refinement would have made slower than another."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
@@ -213,8 +215,8 @@ def _finish_over_path(
         done = plan_timing(other, whole, timings, adapted.reports, options)
     if done is not None and (done.is_settled or not other.usable):
         return done
-    session = dataclasses.replace(session, deadline=options.deadline)
-    return refine_and_verify(other, adapted.program, adapted.reports, session, options)
+    other = dataclasses.replace(other, to_beat=candidate.to_beat)
+    return _refine_if_fast(other, adapted, session, options)
 
 
 def _finish_over_time(
@@ -234,8 +236,32 @@ def _finish_over_time(
     soon = dataclasses.replace(options, deadline=session.deadline)
     adapted = adapt_mesh(solved, session, spline, soon, target=target)
     named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
+    return _refine_if_fast(named, adapted, session, options)
+
+
+def _refine_if_fast(
+    candidate: Candidate,
+    adapted: SolvedProgram,
+    session: SolverSession,
+    options: RefinementOptions,
+) -> Candidate:
+    """Refine and verify a motion over all knots, unless another one is as fast: refinement slows all of them down."""
+    if adapted.usable:
+        candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
+    kept = drop_if_slow(candidate, candidate.to_beat)
+    if kept.status == SLOW:
+        return kept
     session = dataclasses.replace(session, deadline=options.deadline)
-    return refine_and_verify(named, adapted.program, adapted.reports, session, options)
+    return refine_and_verify(kept, adapted.program, adapted.reports, session, options)
+
+
+def drop_if_slow(candidate: Candidate, to_beat: float) -> Candidate:
+    """Drop what was made of a candidate if its end time over all knots is known and not below `to_beat`, s."""
+    if not to_beat <= candidate.adapted < np.inf:
+        return candidate
+    return dataclasses.replace(
+        candidate, refined=None, trajectory=None, verification=None, status=SLOW
+    )
 
 
 def _is_free_chart(start: InitialGuess) -> bool:

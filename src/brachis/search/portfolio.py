@@ -2,10 +2,8 @@
 
 1. Lattices give initial guesses, batch by batch (see `schedule`).
 2. They are solved at the first collocation points. Candidates that agree are merged.
-3. The others are refined and verified in the order of their end times as long as they may beat the best
-   verified one: refinement adds rows, so that over the same knots and in the same coordinates the coarse end time of an
-   optimum bounds its refined one from below. In charts, where the coordinates may still be changed, coarse end times
-   are compared with each other.
+3. The others are refined and verified in the order of their end times as long as they may beat the best verified one.
+   Refinement adds rows: an end time over all knots bounds the refined one from below.
 4. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
 The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
@@ -52,6 +50,8 @@ SAME_MOTION = "same motion as another"
 """Status of a candidate that agrees with one that ranks before it."""
 _GAINS_MORE = 0.998
 """Factor by which another candidate may gain more by better knots than those so far."""
+_REFINED = 5e-3
+"""Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
 _FAR = 0.2
 """Timing gap of the best motion from which on another solver is tried: few knots alone cost up to 0.15."""
 _COARSE_SHARE = 0.6
@@ -233,21 +233,24 @@ class Search:
         left = batch.refined
         while self._waiting and self._goes_on(left):
             numbers = self._waiting[:jobs]
+            waiting = [self._solved[number] for number in numbers]
             work = run_in_processes(
                 candidates.finish_candidate,
-                [self._solved[number] for number in numbers],
+                [dataclasses.replace(each, to_beat=self._to_beat) for each in waiting],
                 self._latest,
                 jobs=jobs,
                 listener=self._listener,
             )
             with closing(work) as outcomes:
-                for number, candidate in zip(numbers, outcomes, strict=True):
+                for number, outcome in zip(numbers, outcomes, strict=True):
                     if number != numbers[0] and not self._goes_on(left):
                         return
                     left -= 1
+                    candidate = candidates.drop_if_slow(outcome, self._to_beat)
                     self._finish(number, candidate)
+                    time = min(candidate.t_end, candidate.adapted)
                     self._listener(
-                        f"{candidate.solver}: t_E = {candidate.t_end:.4f} s, {candidate.status}"
+                        f"{candidate.solver}: t_E = {time:.4f} s, {candidate.status}"
                     )
 
     @contextlib.contextmanager
@@ -399,11 +402,20 @@ class Search:
             return True
         if self._has_same_time(candidate, best):
             return False
-        both = candidate, best
-        if all(each.keeps_knots and each.in_chart for each in both):
-            # What else they gain, both gain.
-            return candidate.coarse < (1.0 - tolerances.GAIN) * best.coarse
+        if all(each.keeps_knots and each.in_chart for each in (candidate, best)):
+            # What one gains by other coordinates, both gain.
+            gain = min(best.adapted / best.coarse, 1.0)
+            return candidate.coarse * gain < self._to_beat
         return candidate.coarse * self._gain < (1.0 - tolerances.GAIN) * best.t_end
+
+    @property
+    def _to_beat(self) -> float:
+        """End time over all knots, s, above which a candidate is not refined; infinite while nothing is verified."""
+        if self.best is None or not self.is_satisfied:
+            return np.inf
+        usual = (1.0 - _REFINED) * self.best.t_end
+        least = min(max(self.best.adapted, usual), self.best.t_end)
+        return (1.0 - tolerances.GAIN) * least
 
     def _has_same_time(self, first: Candidate, second: Candidate) -> bool:
         """Tell whether candidates in the same joints have the same coarse end time; so have mirror images."""

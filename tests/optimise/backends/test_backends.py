@@ -68,6 +68,40 @@ def test_known_optima(name, make, start, optimum, multipliers):
         np.testing.assert_array_equal(report.multipliers, np.zeros(len(problem.lower)))
 
 
+def test_bounds_are_spread_by_less_than_the_tolerance_and_never_alike():
+    problem = corner()
+    problem.lower = np.array([-np.inf, 2.0, 0.0, 0.0, 0.0])
+    problem.upper = np.array([0.0, 2.0, 1.0, 1.0, 1.0])
+    lower, upper = uno._spread_bounds(problem, 1e-3)
+    widened = upper - problem.upper
+    assert lower[1] == upper[1] == 2.0, "what is given stays"
+    assert np.all(widened <= 1e-6)
+    assert np.all(np.diff(np.sort(np.delete(widened, 1))) > 1e-8)
+    np.testing.assert_allclose(problem.lower[2:] - lower[2:], widened[2:], atol=1e-12)
+    strict = uno._spread_bounds(problem, 1e-9)[1] - problem.upper
+    assert strict.max() <= 1e-9
+
+
+@pytest.mark.parametrize("count", [50, 1000])
+def test_many_rows_that_meet_at_the_optimum(name, count):
+    angle = np.linspace(0.1, 1.4, count)
+    normals = np.column_stack([np.cos(angle), np.sin(angle)])
+    problem = dataclasses.replace(
+        corner(),
+        costs=-np.ones(2),
+        row_values=lambda x: normals @ x,
+        row_slopes=lambda _x: normals,
+        lower=np.full(count, -np.inf),
+        upper=normals @ np.array([2.0, 1.0]),
+        x_lower=np.zeros(2),
+        x_upper=np.full(2, 5.0),
+    )
+    report = solve(name, problem, [0.1, 0.1])
+    assert report.status.usable
+    assert report.violation <= 1e-5
+    np.testing.assert_allclose(report.x, [2.0, 1.0], atol=1e-4)
+
+
 # SciPy's SLSQP stops at (2, 1), where the objective stood still while the row came true, and calls it optimal.
 def test_optimal_means_that_first_order_conditions_hold(name):
     report = solve(name, bounded(), [1.0, 1.0])
