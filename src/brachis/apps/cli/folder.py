@@ -301,6 +301,8 @@ def finish(
     else:
         show()
         print_lines(*(f"wrote {name}" for name in data.get("files", ())))
+        if out is None and results:
+            print_lines("nothing was saved; --out FOLDER saves the motion")
     if result is not None:
         if result.interrupted:
             print_error("the search was ended early; this is the best motion so far")
