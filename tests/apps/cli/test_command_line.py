@@ -139,6 +139,13 @@ WRONG = {
         ("verify", ROOT / "examples/01_scara_line.yaml"),
         ["found a task file", "brachis plan "],
     ),
+    "a key of a task for a URDF": (
+        ("inspect", SCARA, "--set", "robot.limits.torque=8"),
+        [
+            "--set: this option cannot be used with a URDF",
+            "found ['robot.limits.torque=8']; allowed: this option with a task file",
+        ],
+    ),
     "no assignment": (
         ("plan", ROOT / "examples/01_scara_line.yaml", "--set", "spline"),
         ["key=value", "'spline'"],

@@ -18,6 +18,7 @@ from brachis.apps.cli.app import (
     Json,
     ToolFrame,
     load_changed_task,
+    refuse_task_options,
     task_space_of,
     urdf_of,
 )
@@ -94,11 +95,12 @@ def inspect(
     task = None
     space: str | Sequence[str] | None = task_space_of(task_space)
     if is_task_file(source):
-        _refuse_options(tool_frame, base_frame, lock)
+        _refuse_urdf_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
         robot = robot_from_settings(task.robot)
         space = space or task.task_space
     else:
+        refuse_task_options({"--set": changes}, "a URDF")
         source = urdf_of(source)
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
@@ -130,7 +132,7 @@ def inspect(
         _print_robot(robot, task, data, degrees=degrees)
 
 
-def _refuse_options(
+def _refuse_urdf_options(
     tool_frame: str | None, base_frame: str | None, lock: list[str] | None
 ) -> None:
     """Refuse the options of a URDF that a task sets itself."""

@@ -20,6 +20,7 @@ from brachis.apps.cli.app import (
     Urdf,
     load_changed_task,
     motion_file,
+    refuse_task_options,
     urdf_of,
 )
 from brachis.apps.cli.folder import (
@@ -41,7 +42,7 @@ from brachis.apps.cli.output import (
     show_progress,
 )
 from brachis.common.progress import Listener
-from brachis.errors import InputError, write_count
+from brachis.errors import write_count
 
 _PLANNED = ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png")
 _BOTTLENECK = ("bottleneck.json", "timeline.png")
@@ -223,7 +224,8 @@ def bottleneck(
     result = None
     with show_progress() as listener:
         if source.suffix.lower() == ".npz":
-            _refuse_options({"--urdf": urdf, "--set": changes, "--strict": strict})
+            given = {"--urdf": urdf, "--set": changes, "--strict": strict}
+            refuse_task_options(given, "a saved motion")
             trajectory = brachis.Trajectory.load(source)
             data = _verify_again(trajectory)
         else:
@@ -252,18 +254,6 @@ def bottleneck(
         complaint="its bottlenecks may be wrong",
     )
     raise typer.Exit(code)
-
-
-def _refuse_options(given: dict[str, object]) -> None:
-    """Refuse options of a task where a saved motion is given."""
-    for option, value in given.items():
-        if value is not None:
-            raise InputError(
-                "this option cannot be used with a saved motion",
-                where=option,
-                found=value,
-                allowed="this option with a task file",
-            )
 
 
 def _verify_again(trajectory: brachis.Trajectory) -> dict[str, Any]:
