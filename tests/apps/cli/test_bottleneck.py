@@ -73,8 +73,9 @@ def test_json(run, task, write):
 
 def test_files(run, task, write, tmp_path):
     out = tmp_path / "out"
-    outcome = run("bottleneck", write(task), "--out", out)
+    outcome = run("bottleneck", write(task), "--out", out, "--verbose")
     assert outcome.code == 0, outcome.err
+    assert outcome.err.endswith(" s: drawing timeline.png\n")
     assert sorted(path.name for path in out.iterdir()) == [
         "bottleneck.json",
         "timeline.png",

@@ -302,11 +302,13 @@ def sweep(
         result = brachis.sweep(
             source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
         )
-    verified = result.count(VERIFIED) > 0
-    figures: dict[str, Writer] = {}
-    if result.varied and verified:
-        figures["sweep.png"] = partial(draw, result.plot)
-    drawn, failures = write_files(result.folder, {}, figures, stale=("sweep.png",))
+        verified = result.count(VERIFIED) > 0
+        figures: dict[str, Writer] = {}
+        if result.varied and verified:
+            figures["sweep.png"] = partial(draw, result.plot)
+        drawn, failures = write_files(
+            result.folder, {}, figures, listener=listener, stale=("sweep.png",)
+        )
     files = [*map(str, result.files), *drawn]
     if json:
         print_json({**result.summary(), "keys": list(result.keys), "files": files})
