@@ -115,7 +115,7 @@ def _plan_task(
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
-    from brachis.optimise.candidate import coordinates
+    from brachis.optimise.candidate import describe_coordinates
     from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
@@ -128,7 +128,7 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     least_motion = result.least_motion
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
-        "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
+        "redundant joints": describe_coordinates(trajectory),
         "branch": branch,
         "start posture": _posture(data, "start_posture", degrees=degrees),
         "end posture": _posture(data, "end_posture", degrees=degrees),
@@ -217,7 +217,7 @@ def bottleneck(
     For each limit: how much time it costs, and when it is active. A task is planned first; a saved motion is used as it
     is.
     """
-    from brachis.optimise.candidate import coordinates
+    from brachis.optimise.candidate import describe_coordinates
 
     make_folder(out, _BOTTLENECK, (task, urdf))
     source = motion_file(task)
@@ -236,7 +236,7 @@ def bottleneck(
             result or trajectory, check=check, reference=reference, listener=listener
         )
     data["bottleneck"] = report.to_dict()
-    redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
+    redundant = describe_coordinates(trajectory)
     head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
     drawings: dict[str, Drawing] = {
         "timeline.png": lambda: brachis.plots.plot_timeline(trajectory)

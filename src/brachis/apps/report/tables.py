@@ -17,7 +17,7 @@ import brachis
 from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
 from brachis.apps.plots.panels import Curve, Panel, curves_of, joint_rows_of, panels_of
 from brachis.apps.report.motion import ReportedMotion
-from brachis.optimise.candidate import coordinates
+from brachis.optimise.candidate import describe_coordinates
 from brachis.robot.from_task import in_use
 from brachis.task import Task
 from brachis.trajectory import phase_rows
@@ -79,8 +79,7 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     verification = motion.verification
     boundary = trajectory.task.boundary
     branch = trajectory.branch
-    joints = coordinates(trajectory.redundant_joints, branch)
-    named = {} if branch in {"", joints} else {"branch": branch}
+    named = {"branch": branch} if branch else {}
     fastest = np.argmax(samples.tool_speed)
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
@@ -92,7 +91,7 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
         "largest tool speed": f"{samples.tool_speed[fastest]:.3f} m/s at {samples.t[fastest]:.3f} s",
         "worst ratio to a limit": f"{verification.worst_ratio:.5f} (1 is the limit)",
         "largest distance from the path": f"{verification.path_error:.1e} m or rad",
-        "redundant joints": joints,
+        "redundant joints": describe_coordinates(trajectory),
         **named,
         **motion.planned,
     }
