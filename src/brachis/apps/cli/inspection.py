@@ -418,8 +418,10 @@ def _tool_pose(robot: Robot, q: np.ndarray) -> str:
     """Say where the tool is in a posture, (n,), in the form of ``path_start`` in a task of poses."""
     import pinocchio as pin
 
+    from brachis.common.arrays import clear_rounding
+
     placement = robot.tool_placement(q)
-    x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
+    x, y, z, qx, qy, qz, qw = clear_rounding(pin.SE3ToXYZQUAT(placement))
     position = ", ".join(f"{value:.9g}" for value in (x, y, z))
     turn = ", ".join(f"{value:.9g}" for value in (qw, qx, qy, qz))
     return f"the tool is at {{position: [{position}], quaternion_wxyz: [{turn}]}}, m"

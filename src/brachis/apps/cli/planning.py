@@ -169,7 +169,7 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     columns = (data["joint_names"], data[key], data["position_units"])
     for name, value, si_unit in zip(*columns, strict=True):
         unit, factor = shown_unit(si_unit, degrees=degrees)
-        parts.append(f"{name} {factor * value:.4f} {unit}")
+        parts.append(f"{name} {factor * value:z.4f} {unit}")
     return ", ".join(parts)
 
 

@@ -214,9 +214,9 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
         row = JointRow(
             name=name,
             redundant=name in trajectory.redundant_joints,
-            start=f"{q[0]:.4f} {unit}",
-            end=f"{q[-1]:.4f} {unit}",
-            travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
+            start=f"{q[0]:z.4f} {unit}",
+            end=f"{q[-1]:z.4f} {unit}",
+            travel=f"{q.min():z.4f} to {q.max():z.4f} {unit}",
             peaks=tuple(_peak(*each, tolerance) for each in own),
         )
         found.append(row)
