@@ -90,6 +90,7 @@ def inspect(
     from brachis.limits import describe_guarantees, joint_limits_of, limits_of
     from brachis.robot import bind
     from brachis.robot.from_task import in_use, robot_from_settings
+    from brachis.task import name_task_file
 
     remarks: list[str] = []
     task = None
@@ -97,7 +98,8 @@ def inspect(
     if is_task_file(source):
         _refuse_urdf_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
-        robot = robot_from_settings(task.robot)
+        with name_task_file(source):
+            robot = robot_from_settings(task.robot)
         space = space or task.task_space
     else:
         refuse_task_options({"--set": changes}, "a URDF")
@@ -108,10 +110,11 @@ def inspect(
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
-    robot, task_map = bind(robot, space, None if task is None else task.tolerances)
-    candidates = brachis.ik.find_all(robot, task_map)
+    with name_task_file(source):
+        robot, task_map = bind(robot, space, None if task is None else task.tolerances)
+        candidates = brachis.ik.find_all(robot, task_map)
+        limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     remarks += _remarks(robot, candidates, posture)
-    limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     data = {
         "robot": str(source),
         "tool_frame": robot.tool_frame,

@@ -109,8 +109,12 @@ def _plan_task(
     listener: Listener,
 ) -> brachis.Result:
     """Load a task and plan it."""
+    from brachis.task import name_task_file
+
     changed = load_changed_task(task, changes, strict=strict)
-    return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
+    robot = urdf and urdf_of(urdf)
+    with name_task_file(task):
+        return brachis.plan(robot, changed, listener=listener)
 
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
