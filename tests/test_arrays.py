@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 
-from brachis.common.arrays import LastCall
+from brachis.common.arrays import LastCall, clear_rounding
 
 CALLS = []
 
@@ -31,3 +31,8 @@ def test_what_was_computed_last_is_not_sent_to_other_processes():
     large = np.zeros(10_000)
     remembered(large)
     assert len(pickle.dumps(remembered)) < 1000
+
+
+def test_rounding_errors_are_shown_as_zeros_and_small_values_as_they_are():
+    values = np.array([-7.7e-18, 1e-9, -0.0])
+    assert list(map(str, clear_rounding(values).tolist())) == ["0.0", "1e-09", "0.0"]

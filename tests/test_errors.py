@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 
 import pytest
 
+import brachis
 from brachis import errors
+from brachis.task import name_task_file
 
 ERRORS = [
     errors.InputError("wrong", where="a key", found=3, allowed="2", hint="Try 2"),
@@ -26,6 +29,23 @@ def test_errors_survive_pickling(error):
     assert type(again) is type(error)
     assert str(again) == str(error)
     assert vars(again) == vars(error)
+
+
+def test_what_is_found_after_a_task_file_was_read_names_the_file(tmp_path):
+    task = brachis.load_task(brachis.examples.scara_line).to_dict()
+    wrong = {**task, "redundant_joints": ["j9"]}
+    file = tmp_path / "task.yaml"
+    file.write_text(json.dumps(wrong))
+    problem = "redundant_joints: there is no joint named 'j9'"
+    with pytest.raises(errors.UnknownNameError) as raised, name_task_file(file):
+        brachis.plan(file)
+    assert str(raised.value).startswith(f"{file}: {problem}")
+    assert str(pickle.loads(pickle.dumps(raised.value))) == str(raised.value)  # noqa: S301  (our own)
+    with (
+        pytest.raises(errors.UnknownNameError, match=f"^{problem}"),
+        name_task_file(wrong),
+    ):
+        brachis.plan(wrong)
 
 
 @pytest.mark.parametrize(

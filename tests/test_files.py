@@ -16,6 +16,7 @@ import pytest
 from brachis.apps.cli.folder import write_files, write_text
 from brachis.common import files
 from brachis.common.files import atomic_write, is_file, is_folder, read_file
+from brachis.common.progress import ignore
 from brachis.errors import InputError, ResultFileError
 from brachis.trajectory import Trajectory
 
@@ -150,7 +151,7 @@ def slow(path):
     print("writing", flush=True)
     time.sleep(600)
 
-write_files(Path(sys.argv[1]), {"result.json": slow}, {})
+write_files(Path(sys.argv[1]), {"result.json": slow}, {}, listener=print)
 """
 
 
@@ -172,7 +173,8 @@ def test_a_process_that_is_ended_while_it_writes(number, tmp_path):
     assert (tmp_path / "result.json").read_text() == "old"
     if number == signal.SIGKILL:  # nobody can clean up after that but the next one
         assert len(list(tmp_path.iterdir())) == 2
-        write_files(tmp_path, {"result.json": lambda path: write_text("new", path)}, {})
+        results = {"result.json": lambda path: write_text("new", path)}
+        write_files(tmp_path, results, {}, listener=ignore)
         assert (tmp_path / "result.json").read_text() == "new"
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
 
@@ -187,7 +189,8 @@ def writer(size):
 
 out = Path(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-written = write_files(out, {"result.json": writer(500)}, {"overview.png": writer(5000), "candidates.png": writer(50)})
+figures = {"overview.png": writer(5000), "candidates.png": writer(50)}
+written = write_files(out, {"result.json": writer(500)}, figures, listener=lambda text: None)
 print(*written[0], *written[1], sep="\\n")
 """
 
@@ -235,6 +238,7 @@ def test_results_that_are_too_large_for_the_disk_leave_the_folder_as_it_was(tmp_
             tmp_path,
             {"result.json": full},
             {"overview.png": lambda path: write_text("new", path)},
+            listener=ignore,
         )
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
         "result.json": "old",
@@ -247,6 +251,10 @@ def test_ctrl_c_while_a_figure_is_drawn_says_what_is_written(tmp_path):
         raise KeyboardInterrupt
 
     results = {"result.json": lambda path: write_text("{}", path)}
+    steps = []
     with pytest.raises(KeyboardInterrupt, match=r"written before: .*result\.json"):
-        write_files(tmp_path, results, {"overview.png": interrupt})
+        write_files(
+            tmp_path, results, {"overview.png": interrupt}, listener=steps.append
+        )
+    assert steps == ["drawing overview.png"]
     assert (tmp_path / "result.json").read_text() == "{}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,16 @@ def test_reprs_fit_on_a_screen(name, result):
     assert sum(1 + len(line) // (COLUMNS + 20) for line in lines) <= LINES + 2, (
         "where a terminal breaks them, too"
     )
+
+
+def test_a_posture_is_shown_without_rounding_errors_and_kept_with_them(result):
+    q = result.trajectory.q.copy()
+    q[0, 0] = -7.7e-18
+    trajectory = replace(result.trajectory, q=q)
+    start = replace(result, trajectory=trajectory).to_dict()["start_posture"]
+    assert str(start[0]) == "0.0"
+    assert start[1:] == result.to_dict()["start_posture"][1:]
+    assert trajectory.position(0.0)[0] == -7.7e-18
 
 
 def test_figures_have_units(result):

@@ -158,7 +158,7 @@ class BrachisError(Exception):
         self.allowed = allowed
         self.where = where
         self.hint = hint
-        super().__init__(self._message())
+        super().__init__(problem)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Be sent to other processes with all data, whatever a subclass takes to be made."""
@@ -174,9 +174,9 @@ class BrachisError(Exception):
         if self.hint:
             advice += f", or {self.hint[:1].lower()}{self.hint[1:]}"
         self.hint = advice
-        self.args = (self._message(),)
 
-    def _message(self) -> str:
+    def __str__(self) -> str:
+        """Write the message."""
         text = f"{self.where}: {self.problem}" if self.where else self.problem
         if self.found is not None:
             text += f"; found {self.found}"

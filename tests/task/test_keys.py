@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from brachis.errors import TaskError
@@ -66,10 +67,21 @@ def test_unknown_keys_are_named_with_their_alternatives():
         ("robot.limits.velocity = null", ("robot.limits.velocity", None)),
         ("tool_limits={speed: 1e-1}", ("tool_limits", {"speed": 0.1})),
         ("a=b=c", ("a", "b=c")),
+        ("a=!degrees [180, 90.0]", ("a", [np.pi, 0.5 * np.pi])),
+        ("a={j1: !degrees 180, j2: 1}", ("a", {"j1": np.pi, "j2": 1})),
     ],
 )
 def test_values_are_yaml(text, expected):
     assert read_assignment(text) == expected
+
+
+@pytest.mark.parametrize(
+    "value",
+    ["!degrees [30, !radians 1]", "!degrees [30, a]", "!degrees {j1: 30}"],
+)
+def test_a_unit_is_for_numbers_without_one(value):
+    with pytest.raises(TaskError, match="!degrees needs a number, not"):
+        read_assignment(f"start.joints={value}")
 
 
 @pytest.mark.parametrize("text", ["spline.intervals", "start.joints=[1, 2"])

@@ -46,6 +46,23 @@ def freeze(owner: Any, *names: str) -> None:
         object.__setattr__(owner, name, own)
 
 
+NEGLIGIBLE = 1e-12
+"""Size of positions in rad or m, and of other numbers near 1, below which they are rounding errors; a thousandth of
+what the verification allows."""
+
+
+def clear_rounding(values: np.ndarray) -> np.ndarray:
+    """Put exact zeros in the place of rounding errors, for a reader; all other values stay as they are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> clear_rounding(np.array([-7.7e-18, 0.1])).tolist()
+    [0.0, 0.1]
+    """
+    return np.where(np.abs(values) < NEGLIGIBLE, 0.0, values)
+
+
 def interpolate_columns(
     places: np.ndarray, s: np.ndarray, values: np.ndarray
 ) -> np.ndarray:

@@ -41,6 +41,17 @@ def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
+def describe_coordinates(trajectory: Trajectory) -> str:
+    """Say in which coordinates a motion is planned, s apart, in words that do not need the name of a chart."""
+    joints = trajectory.redundant_joints
+    count = len(trajectory.control_points) - 1
+    if joints or trajectory.branch != CHART:
+        return coordinates(joints, trajectory.branch)
+    if count == 0:
+        return "none"
+    return f"no joint is chosen; a chart measures the self-motion of all joints by {write_count(count, 'coordinate')}"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class InitialGuess(Summary):
     """A joint path from which a plan is begun.

@@ -174,7 +174,7 @@ def _positions(
             abs(value),
             usual,
             "rad",
-            f"; {shown} degrees are {math.radians(value):.6g} rad",
+            f"; {shown} degrees are {math.radians(value):.6g} rad (!degrees {shown})",
             shown,
         )
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from brachis.common.arrays import clear_rounding
 from brachis.common.summary import Summary
 from brachis.optimise.backends import SolverReport
 from brachis.optimise.candidate import Candidate
@@ -100,13 +101,14 @@ class PlannedMotion(Summary):
         report = self.solver_report
         trajectory = self.trajectory
         least_motion = self.least_motion
+        start, end = clear_rounding(trajectory.position([0.0, self.t_end])).tolist()
         return {
             "t_end": self.t_end,
             "redundant_joints": list(trajectory.redundant_joints),
             "branch": trajectory.branch,
             "phases": [phase.to_dict() for phase in trajectory.phases],
-            "start_posture": trajectory.position(0.0).tolist(),
-            "end_posture": trajectory.position(self.t_end).tolist(),
+            "start_posture": start,
+            "end_posture": end,
             "position_units": list(trajectory.robot.position_units),
             "family": self.family,
             "in_use": in_use(trajectory.robot, trajectory.node_accelerations),

@@ -7,12 +7,19 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from brachis.common.files import TASK_SUFFIXES, Kind, check_kind, read_text
-from brachis.errors import TaskError
+from brachis.common.files import (
+    TASK_SUFFIXES,
+    Kind,
+    check_kind,
+    is_task_file,
+    read_text,
+)
+from brachis.errors import InputError, TaskError
 from brachis.task.fields import plain
 from brachis.task.fitted import expand_csv_files
 from brachis.task.limits_file import with_limits_of_file
@@ -214,6 +221,23 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
             hint="Set it to the path of the URDF, relative to the task file",
         )
     return task
+
+
+@contextmanager
+def name_task_file(source: object) -> Iterator[None]:
+    """Name the task file in errors that are found after it was read: in its robot, its path, its postures.
+
+    Parameters
+    ----------
+    source : object
+        What the task was made of. If it is not a task file, errors stay as they are.
+    """
+    try:
+        yield
+    except InputError as error:
+        if isinstance(source, str | os.PathLike) and is_task_file(source):
+            error.where = ": ".join(filter(None, (str(Path(source)), error.where)))
+        raise
 
 
 def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:

@@ -24,6 +24,8 @@ _UNITS = {
     "!inches": 0.0254,
 }
 """Tags of units, as xacro knows them, and the factors to SI units."""
+_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+"""Tags that PyYAML gives numbers without a unit."""
 _BROKEN = (
     yaml.YAMLError,
     ValueError,
@@ -83,14 +85,22 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
     return known[id(node)]
 
 
-def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
-    """Read a number with a unit, such as ``!degrees 90``, in SI units (MarkedYAMLError)."""
-    text = node.value if isinstance(node, yaml.ScalarNode) else "something else"
+def _with_unit(_loader: _Loader, node: yaml.Node) -> float | list[float]:
+    """Read a number with a unit, such as ``!degrees 90``, or a list of them, in SI units (MarkedYAMLError)."""
+    if isinstance(node, yaml.SequenceNode):
+        return [_in_si(each, node.tag) for each in node.value]
+    return _in_si(node, node.tag)
+
+
+def _in_si(node: yaml.Node, unit: str) -> float:
+    """Read a number in SI units; a number with another unit is an error."""
+    is_plain = isinstance(node, yaml.ScalarNode) and node.tag in {unit, *_NUMBERS}
+    text = node.value if is_plain else "something else"
     try:
-        return float(text) * _UNITS[node.tag]
+        return float(text) * _UNITS[unit]
     except ValueError:
         raise yaml.MarkedYAMLError(
-            problem=f"{node.tag} needs a number, not {text!r}",
+            problem=f"{unit} needs a number, not {text!r}",
             problem_mark=node.start_mark,
         ) from None
 

@@ -268,3 +268,12 @@ def test_branch_boundary_is_told_apart(scara):
         "acceleration",
         "position",
     }
+
+
+@pytest.mark.parametrize(("residual", "cost"), [(1e-6, 1e-4), (1e-3, 0.0)])
+def test_what_balances_less_than_the_residual_costs_nothing(residual, cost):
+    active_set = ActiveSet(np.eye(2), np.array([0, 1]), np.ones(2))
+    weights = np.array([1.0, 1e-4])
+    found = Multipliers(active_set, weights, "least squares", residual, unique=True)
+    assert found.change(np.array([1.0, 0.0])) == -1.0
+    assert found.change(np.array([0.0, 1.0])) == -cost

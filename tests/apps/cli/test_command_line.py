@@ -139,6 +139,13 @@ WRONG = {
         ("verify", ROOT / "examples/01_scara_line.yaml"),
         ["found a task file", "brachis plan "],
     ),
+    "a key of a task for a URDF": (
+        ("inspect", SCARA, "--set", "robot.limits.torque=8"),
+        [
+            "--set: this option cannot be used with a URDF",
+            "found ['robot.limits.torque=8']; allowed: this option with a task file",
+        ],
+    ),
     "no assignment": (
         ("plan", ROOT / "examples/01_scara_line.yaml", "--set", "spline"),
         ["key=value", "'spline'"],
@@ -221,17 +228,17 @@ def test_set_names_the_key_and_its_alternatives(command, run, task, write):
 def test_how_much_is_said(run, task, write):
     path = write(task)
     assert run("plan", path, *SMALL, "--quiet") == run("-q", "plan", path, *SMALL)
-    quiet = run("plan", path, *SMALL, "--set", "robot.limits.velocity=1e9", "-q")
+    odd = ("--set", "robot.limits.scale.velocity=80")
+    quiet = run("plan", path, *SMALL, *odd, "-q")
     assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
-    verbose = run("plan", path, *SMALL, "-v")
+    verbose = run("plan", path, *SMALL, *odd, "-v")
     assert "verification: passed" in verbose.out
     steps = verbose.err.splitlines()
     assert len(steps) > 3
-    slow = [line for line in steps if "warning: spline.intervals: " in line]
-    assert len(slow) == 1
-    steps.remove(slow[0])
+    (warning,) = (line for line in steps if line.startswith("brachis: warning: "))
+    steps.remove(warning)
     assert all(" s: " in line and line.startswith("brachis: ") for line in steps)
-    assert run("plan", path, *SMALL).err == f"{slow[0]}\n", (
+    assert run("plan", path, *SMALL, *odd).err == f"{warning}\n", (
         "what one command is told does not hold for the next one"
     )
     assert json.loads(run("plan", path, *SMALL, "--json", "--quiet").out)["verified"]

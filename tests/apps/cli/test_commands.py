@@ -69,9 +69,10 @@ def test_plan_for_people(run, task, write):
         "torque jump",
     ):
         assert part in outcome.out
+    last = outcome.out.splitlines()[-1]
+    assert last == "nothing was saved; --out FOLDER saves the motion"
     # No progress display in a pipe.
-    assert outcome.err.startswith("brachis: warning: spline.intervals: another timing")
-    assert outcome.err.count("\n") == 1
+    assert outcome.err == ""
 
 
 @pytest.mark.usefixtures("too_strict")
@@ -260,6 +261,17 @@ def test_candidates_are_listed(run, task, write, case):
     assert first["verified"]
     assert first["t_end"] == data["t_end"]
     assert f"{first['t_end']:.4f}" in outcome.out
+
+
+def test_coordinates_are_described_without_the_name_of_a_chart_alone(planned):
+    trajectory = Trajectory.load(planned.out / "result.npz")
+    assert candidate.describe_coordinates(trajectory) == "j3"
+    in_chart = replace(trajectory, redundant_joints=(), branch="chart")
+    assert candidate.describe_coordinates(in_chart) == (
+        "no joint is chosen; a chart measures the self-motion of all joints by 1 coordinate"
+    )
+    only_s = replace(in_chart, control_points=trajectory.control_points[:1])
+    assert candidate.describe_coordinates(only_s) == "none"
 
 
 def test_interrupt(run, task, write, tmp_path, monkeypatch):

@@ -188,6 +188,8 @@ def test_where_the_tool_is(run):
         remark
         == "the tool is at {position: [0.05, 0.05, 1.628], quaternion_wxyz: [1, 0, 0, 0]}, m"
     )
+    iiwa = run("inspect", "iiwa14", "--posture", "0 0.3 0 0 0 0 0").out
+    assert "position: [0.279562116, 0, 1.26374832]" in iiwa, "no rounding error"
     assert run("inspect", urdf, "--posture", "0 0").code == 2
     assert "--posture" in run("inspect", urdf, "--posture", "a").err
 

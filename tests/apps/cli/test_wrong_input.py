@@ -100,10 +100,11 @@ def test_wrong_task(case, run, task, write, tmp_path):
     key, value, expected = WRONG_TASKS[case]
     set_key(task, key, value)
     out = tmp_path / "out"
-    outcome = run("plan", write(task), "--out", out)
+    path = write(task)
+    outcome = run("plan", path, "--out", out)
     assert outcome.code == 2, outcome.err
     assert outcome.out == ""
-    assert outcome.err.startswith("brachis: ")
+    assert outcome.err.startswith(f"brachis: {path}: ")
     for part in expected:
         assert part in outcome.err
     assert "Traceback" not in outcome.err

@@ -154,6 +154,8 @@ class Multipliers(Summary):
     def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
         """Directional derivative of t_E if bounds are relaxed.
 
+        Multipliers that balance less of the gradient than the residual leaves cannot be told from zero, and count as 0.
+
         Parameters
         ----------
         relaxation : (c,) ndarray
@@ -171,13 +173,17 @@ class Multipliers(Summary):
         if side is not None:
             of_rows = np.where(self.active_set.signs == side, of_rows, 0.0)
         rates[: len(of_rows)] = of_rows
+        slopes = self.active_set.slopes
+        balanced = np.linalg.norm(self.weights @ slopes)
+        by_these = np.linalg.norm(np.where(rates > 0.0, self.weights, 0.0) @ slopes)
+        if by_these <= self.residual * balanced:
+            return 0.0
         saved = float(rates @ self.weights)
-        if self.unique or not saved:
+        if self.unique:
             return -saved
         from scipy.optimize import linprog
 
         # Of all weights that balance as much, those that promise the least.
-        slopes = self.active_set.slopes
         found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes)
         return -float(rates @ (self.weights if found.x is None else found.x))
 

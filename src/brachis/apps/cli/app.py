@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from enum import IntEnum
 from pathlib import Path
@@ -16,7 +16,13 @@ import brachis
 from brachis.common import interrupts
 from brachis.common.files import is_file, is_folder
 from brachis.common.interrupts import INTERRUPTED
-from brachis.errors import BrachisError, ResultFileError, TaskError, UnknownNameError
+from brachis.errors import (
+    BrachisError,
+    InputError,
+    ResultFileError,
+    TaskError,
+    UnknownNameError,
+)
 
 EXIT_CODES = (
     "0    done; of a plan: planned and verified",
@@ -281,6 +287,30 @@ def load_changed_task(
     if strict is not None:
         keys["strict"] = strict
     return brachis.load_task(path, changes=keys)
+
+
+def refuse_task_options(given: Mapping[str, object], source: str) -> None:
+    """Refuse options of a task if the input is not a task file.
+
+    Parameters
+    ----------
+    given : mapping of str to object
+        The options and their values; None: not given.
+    source : str
+        What the input is, with its article.
+
+    Raises
+    ------
+    InputError
+    """
+    for option, value in given.items():
+        if value is not None:
+            raise InputError(
+                f"this option cannot be used with {source}",
+                where=option,
+                found=value,
+                allowed="this option with a task file",
+            )
 
 
 def urdf_of(given: Path) -> Path:

@@ -17,7 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import brachis
-from brachis.apps.cli.output import json_text, print_error, print_json, print_lines
+from brachis.apps.cli.output import (
+    json_text,
+    print_error,
+    print_json,
+    print_lines,
+    show_progress,
+)
 from brachis.common.files import (
     atomic_write,
     is_folder,
@@ -25,6 +31,7 @@ from brachis.common.files import (
     temporary_in,
     writing_errors,
 )
+from brachis.common.progress import Listener
 from brachis.errors import InputError
 
 Writer = Callable[[Path], object]
@@ -104,6 +111,7 @@ def write_files(
     results: Mapping[str, Writer],
     figures: Mapping[str, Writer],
     *,
+    listener: Listener,
     stale: Iterable[str] = (),
 ) -> tuple[list[str], list[InputError]]:
     """Write results, all or none, and then the figures that can be written.
@@ -117,6 +125,8 @@ def write_files(
         Folder that exists.
     results, figures : mapping of str to callable
         Names, and what writes each.
+    listener : callable
+        Takes which figure is drawn, in plain words.
     stale : iterable of str, optional
         Older files to remove.
 
@@ -147,6 +157,7 @@ def write_files(
         _write_results(out, results, (*stale, *figures))
         for name, write in figures.items():
             try:
+                listener(f"drawing {name}")
                 write(out / name)
                 written.append(str(out / name))
             except InputError as error:
@@ -295,12 +306,17 @@ def finish(
         files[data_file] = partial(write_text, json_text(data))
         drawings = {own[name]: partial(draw, make) for name, make in figures.items()}
         stale = {*names, *map(_unverified, names)} - {*files}
-        data["files"], failures = write_files(out, files, drawings, stale=stale)
+        with show_progress() as listener:
+            data["files"], failures = write_files(
+                out, files, drawings, listener=listener, stale=stale
+            )
     if json:
         print_json(data)
     else:
         show()
         print_lines(*(f"wrote {name}" for name in data.get("files", ())))
+        if out is None and results:
+            print_lines("nothing was saved; --out FOLDER saves the motion")
     if result is not None:
         if result.interrupted:
             print_error("the search was ended early; this is the best motion so far")

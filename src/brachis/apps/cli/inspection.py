@@ -18,6 +18,7 @@ from brachis.apps.cli.app import (
     Json,
     ToolFrame,
     load_changed_task,
+    refuse_task_options,
     task_space_of,
     urdf_of,
 )
@@ -89,16 +90,19 @@ def inspect(
     from brachis.limits import describe_guarantees, joint_limits_of, limits_of
     from brachis.robot import bind
     from brachis.robot.from_task import in_use, robot_from_settings
+    from brachis.task import name_task_file
 
     remarks: list[str] = []
     task = None
     space: str | Sequence[str] | None = task_space_of(task_space)
     if is_task_file(source):
-        _refuse_options(tool_frame, base_frame, lock)
+        _refuse_urdf_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
-        robot = robot_from_settings(task.robot)
+        with name_task_file(source):
+            robot = robot_from_settings(task.robot)
         space = space or task.task_space
     else:
+        refuse_task_options({"--set": changes}, "a URDF")
         source = urdf_of(source)
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
@@ -106,10 +110,11 @@ def inspect(
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
-    robot, task_map = bind(robot, space, None if task is None else task.tolerances)
-    candidates = brachis.ik.find_all(robot, task_map)
+    with name_task_file(source):
+        robot, task_map = bind(robot, space, None if task is None else task.tolerances)
+        candidates = brachis.ik.find_all(robot, task_map)
+        limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     remarks += _remarks(robot, candidates, posture)
-    limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     data = {
         "robot": str(source),
         "tool_frame": robot.tool_frame,
@@ -130,7 +135,7 @@ def inspect(
         _print_robot(robot, task, data, degrees=degrees)
 
 
-def _refuse_options(
+def _refuse_urdf_options(
     tool_frame: str | None, base_frame: str | None, lock: list[str] | None
 ) -> None:
     """Refuse the options of a URDF that a task sets itself."""
@@ -416,8 +421,10 @@ def _tool_pose(robot: Robot, q: np.ndarray) -> str:
     """Say where the tool is in a posture, (n,), in the form of ``path_start`` in a task of poses."""
     import pinocchio as pin
 
+    from brachis.common.arrays import clear_rounding
+
     placement = robot.tool_placement(q)
-    x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
+    x, y, z, qx, qy, qz, qw = clear_rounding(pin.SE3ToXYZQUAT(placement))
     position = ", ".join(f"{value:.9g}" for value in (x, y, z))
     turn = ", ".join(f"{value:.9g}" for value in (qw, qx, qy, qz))
     return f"the tool is at {{position: [{position}], quaternion_wxyz: [{turn}]}}, m"

@@ -23,6 +23,7 @@ from brachis.apps.cli.output import (
     print_json,
     print_lines,
     print_verification,
+    show_progress,
 )
 from brachis.common import interrupts
 from brachis.common.files import read_file
@@ -144,7 +145,9 @@ def plot(
 
     write = partial(draw, partial(plots.PLOTS[kind], trajectory))
     suffixes = [f".{suffix}" for suffix in SUFFIXES]
-    write_one(out, write, suffixes, _inputs(result, trajectory))
+    with show_progress() as listener:
+        listener(f"drawing {out}")
+        write_one(out, write, suffixes, _inputs(result, trajectory))
     print_lines(f"wrote {out}")
 
 
@@ -165,8 +168,10 @@ def report(
     out = out or result.with_suffix(".html")
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
-    page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
-    write_one(out, page.save, (".html",), _inputs(result, trajectory))
+    with show_progress() as listener:
+        listener(f"drawing {out}")
+        page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
+        write_one(out, page.save, (".html",), _inputs(result, trajectory))
     print_lines(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
         print_error(

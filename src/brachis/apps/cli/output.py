@@ -27,6 +27,9 @@ from brachis.errors import BrachisWarning, InputError
 if TYPE_CHECKING:
     from brachis.verify import Verification
 
+_BEGAN = time.perf_counter()
+"""When the program began, s, so that all steps of a command are counted from one instant."""
+
 
 def print_table(
     title: str,
@@ -305,11 +308,10 @@ def show_warnings() -> Iterator[None]:
 def show_progress(*, in_logs: bool = False) -> Iterator[Callable[[str], None]]:
     """Give a listener that shows what is done, and that notices Ctrl-C.
 
-    On a terminal it shows the present step; a verbose command prints every step with its time. Otherwise nothing is
-    shown, or with `in_logs` one line for every 5 % of texts such as ``3 of 40 plans``.
+    On a terminal it shows the present step; a verbose command prints every step with its time since the program began.
+    Otherwise nothing is shown, or with `in_logs` one line for every 5 % of texts such as ``3 of 40 plans``.
     """
     console = Console(stderr=True)
-    began = time.perf_counter()
     verbosity = get_verbosity()
     last_step = -1
     with ExitStack() as stack:
@@ -324,7 +326,7 @@ def show_progress(*, in_logs: bool = False) -> Iterator[Callable[[str], None]]:
             if status is not None:
                 status.update(Text(text))  # a name may hold brackets
             elif verbosity is Verbosity.VERBOSE:
-                print_error(f"{time.perf_counter() - began:.2f} s: {text}")
+                print_error(f"{time.perf_counter() - _BEGAN:.2f} s: {text}")
             elif in_logs and verbosity is Verbosity.NORMAL:
                 done = re.match(r"(\d+) of (\d+)", text)
                 step = int(done[1]) * 20 // max(1, int(done[2])) if done else -1

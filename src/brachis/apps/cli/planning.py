@@ -20,6 +20,7 @@ from brachis.apps.cli.app import (
     Urdf,
     load_changed_task,
     motion_file,
+    refuse_task_options,
     urdf_of,
 )
 from brachis.apps.cli.folder import (
@@ -41,7 +42,7 @@ from brachis.apps.cli.output import (
     show_progress,
 )
 from brachis.common.progress import Listener
-from brachis.errors import InputError, write_count
+from brachis.errors import write_count
 
 _PLANNED = ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png")
 _BOTTLENECK = ("bottleneck.json", "timeline.png")
@@ -108,13 +109,17 @@ def _plan_task(
     listener: Listener,
 ) -> brachis.Result:
     """Load a task and plan it."""
+    from brachis.task import name_task_file
+
     changed = load_changed_task(task, changes, strict=strict)
-    return brachis.plan(urdf and urdf_of(urdf), changed, listener=listener)
+    robot = urdf and urdf_of(urdf)
+    with name_task_file(task):
+        return brachis.plan(robot, changed, listener=listener)
 
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
-    from brachis.optimise.candidate import coordinates
+    from brachis.optimise.candidate import describe_coordinates
     from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
@@ -127,7 +132,7 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     least_motion = result.least_motion
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
-        "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
+        "redundant joints": describe_coordinates(trajectory),
         "branch": branch,
         "start posture": _posture(data, "start_posture", degrees=degrees),
         "end posture": _posture(data, "end_posture", degrees=degrees),
@@ -168,7 +173,7 @@ def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     columns = (data["joint_names"], data[key], data["position_units"])
     for name, value, si_unit in zip(*columns, strict=True):
         unit, factor = shown_unit(si_unit, degrees=degrees)
-        parts.append(f"{name} {factor * value:.4f} {unit}")
+        parts.append(f"{name} {factor * value:z.4f} {unit}")
     return ", ".join(parts)
 
 
@@ -216,14 +221,15 @@ def bottleneck(
     For each limit: how much time it costs, and when it is active. A task is planned first; a saved motion is used as it
     is.
     """
-    from brachis.optimise.candidate import coordinates
+    from brachis.optimise.candidate import describe_coordinates
 
     make_folder(out, _BOTTLENECK, (task, urdf))
     source = motion_file(task)
     result = None
     with show_progress() as listener:
         if source.suffix.lower() == ".npz":
-            _refuse_options({"--urdf": urdf, "--set": changes, "--strict": strict})
+            given = {"--urdf": urdf, "--set": changes, "--strict": strict}
+            refuse_task_options(given, "a saved motion")
             trajectory = brachis.Trajectory.load(source)
             data = _verify_again(trajectory)
         else:
@@ -234,7 +240,7 @@ def bottleneck(
             result or trajectory, check=check, reference=reference, listener=listener
         )
     data["bottleneck"] = report.to_dict()
-    redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
+    redundant = describe_coordinates(trajectory)
     head = f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
     drawings: dict[str, Drawing] = {
         "timeline.png": lambda: brachis.plots.plot_timeline(trajectory)
@@ -252,18 +258,6 @@ def bottleneck(
         complaint="its bottlenecks may be wrong",
     )
     raise typer.Exit(code)
-
-
-def _refuse_options(given: dict[str, object]) -> None:
-    """Refuse options of a task where a saved motion is given."""
-    for option, value in given.items():
-        if value is not None:
-            raise InputError(
-                "this option cannot be used with a saved motion",
-                where=option,
-                found=value,
-                allowed="this option with a task file",
-            )
 
 
 def _verify_again(trajectory: brachis.Trajectory) -> dict[str, Any]:
@@ -312,11 +306,13 @@ def sweep(
         result = brachis.sweep(
             source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
         )
-    verified = result.count(VERIFIED) > 0
-    figures: dict[str, Writer] = {}
-    if result.varied and verified:
-        figures["sweep.png"] = partial(draw, result.plot)
-    drawn, failures = write_files(result.folder, {}, figures, stale=("sweep.png",))
+        verified = result.count(VERIFIED) > 0
+        figures: dict[str, Writer] = {}
+        if result.varied and verified:
+            figures["sweep.png"] = partial(draw, result.plot)
+        drawn, failures = write_files(
+            result.folder, {}, figures, listener=listener, stale=("sweep.png",)
+        )
     files = [*map(str, result.files), *drawn]
     if json:
         print_json({**result.summary(), "keys": list(result.keys), "files": files})

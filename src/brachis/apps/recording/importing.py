@@ -42,6 +42,7 @@ from brachis.task import (
     Source,
     Task,
     load_task,
+    name_task_file,
 )
 from brachis.task.fitted import segments_along
 from brachis.task.points.points import Points
@@ -195,7 +196,8 @@ def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
             where="robot",
             allowed="a URDF file, the name of a robot (brachis.robots), a Robot, or a task file",
         )
-    return robot_for(locate(robot), robot_settings), settings  # type: ignore[arg-type]
+    with name_task_file(task):
+        return robot_for(locate(robot), robot_settings), settings  # type: ignore[arg-type]
 
 
 def _join_coordinate(

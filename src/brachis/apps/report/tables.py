@@ -17,7 +17,7 @@ import brachis
 from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
 from brachis.apps.plots.panels import Curve, Panel, curves_of, joint_rows_of, panels_of
 from brachis.apps.report.motion import ReportedMotion
-from brachis.optimise.candidate import coordinates
+from brachis.optimise.candidate import describe_coordinates
 from brachis.robot.from_task import in_use
 from brachis.task import Task
 from brachis.trajectory import phase_rows
@@ -79,8 +79,7 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     verification = motion.verification
     boundary = trajectory.task.boundary
     branch = trajectory.branch
-    joints = coordinates(trajectory.redundant_joints, branch)
-    named = {} if branch in {"", joints} else {"branch": branch}
+    named = {"branch": branch} if branch else {}
     fastest = np.argmax(samples.tool_speed)
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
@@ -92,7 +91,7 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
         "largest tool speed": f"{samples.tool_speed[fastest]:.3f} m/s at {samples.t[fastest]:.3f} s",
         "worst ratio to a limit": f"{verification.worst_ratio:.5f} (1 is the limit)",
         "largest distance from the path": f"{verification.path_error:.1e} m or rad",
-        "redundant joints": joints,
+        "redundant joints": describe_coordinates(trajectory),
         **named,
         **motion.planned,
     }
@@ -215,9 +214,9 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
         row = JointRow(
             name=name,
             redundant=name in trajectory.redundant_joints,
-            start=f"{q[0]:.4f} {unit}",
-            end=f"{q[-1]:.4f} {unit}",
-            travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
+            start=f"{q[0]:z.4f} {unit}",
+            end=f"{q[-1]:z.4f} {unit}",
+            travel=f"{q.min():z.4f} to {q.max():z.4f} {unit}",
             peaks=tuple(_peak(*each, tolerance) for each in own),
         )
         found.append(row)
