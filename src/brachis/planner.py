@@ -136,7 +136,7 @@ def plan(
     PlausibilityWarning
         A figure is implausible.
     SlowTimingWarning
-        Another timing of the same joint path is much faster, see `TimingGap.issues`.
+        Another timing of the same joint path is more than 2 % faster.
 
     Examples
     --------
@@ -195,8 +195,9 @@ def plan(
             remarks += report_issues(end_time, strict=asked.strict)
             assert best.trajectory is not None
             gap = find_timing_gap(best.trajectory, problem.limits)
+            is_given = asked.spline.intervals != "auto"
             if gap is not None and not end_time:
-                slow = gap.issues(asked.spline.intervals)
+                slow = gap.issues(intervals_are_given=is_given)
                 for issue in slow:
                     warnings.warn(str(issue), SlowTimingWarning, stacklevel=2)
                 remarks += slow

@@ -10,7 +10,7 @@ import numpy as np
 
 from brachis.common.arrays import spread
 from brachis.common.summary import Summary
-from brachis.errors import BrachisWarning, write_count
+from brachis.errors import BrachisWarning
 from brachis.limits import Limit
 from brachis.robot.plausibility import Issue
 from brachis.timing.joint_path import JointPath, divide_turns
@@ -24,9 +24,7 @@ _LEAST_PLACES = 4
 _MOST_PLACES = 40_000
 """Places for all of these, about."""
 WORTH_A_WARNING = 0.02
-"""Gap from which on a plan warns, if it chooses the intervals itself."""
-_INTERVALS_LOST = 2.0
-"""The same if the intervals are given, in intervals: splines over N of them usually lose one, a gap of 1 / N."""
+"""Gap from which on a plan warns."""
 _STILL = 1e-9
 """Part of the largest speed below which a phase begins or ends at rest."""
 _SHARE = 0.8
@@ -43,12 +41,15 @@ class SlowTimingWarning(BrachisWarning):
 
     Examples
     --------
-    >>> from brachis.timing import TimingGap
-    >>> slow = TimingGap(t_end=2.3, least_time=2.0, places=2000, left_out=(), s_interval=(0.0, 1.0))
-    >>> [issue.usual for issue in slow.issues(20)]
-    ['less than 10 % with 20 intervals']
-    >>> slow.issues(10)
-    ()
+    >>> import warnings
+    >>> import brachis
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> [warning.category.__name__ for warning in caught]
+    ['SlowTimingWarning']
+    >>> result.timing_gap.gap > 0.02
+    True
     """
 
 
@@ -93,35 +94,25 @@ class TimingGap(Summary):
             f"(on a grid of {self.places} places)"
         )
 
-    def issues(self, intervals: int | str) -> tuple[Issue, ...]:
-        """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known.
-
-        Parameters
-        ----------
-        intervals : int or str
-            Number of intervals that the task gives each phase, or ``auto``.
-        """
-        usual = WORTH_A_WARNING
-        with_these = ""
-        advice = "raise search.time_limit"
-        if not isinstance(intervals, str):
-            usual = max(usual, _INTERVALS_LOST / intervals)
-            with_these = f" with {write_count(intervals, 'interval')}"
-            advice = "set spline.intervals: auto, or a larger number"
-        if self.gap <= usual or self.left_out:
+    def issues(self, *, intervals_are_given: bool) -> tuple[Issue, ...]:
+        """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known."""
+        if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
         low, high = (round(s, 4) for s in self.s_interval)
         saved = 100.0 * (1.0 - self.least_time / self.t_end)
         where = "all along the path"
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
+        advice = "raise search.time_limit"
+        if intervals_are_given:
+            advice = "set spline.intervals: auto, or a larger number"
         message = (
             f"another timing of the same joint path is {saved:.1f} % faster: {self.least_time:.4g} s; this is lost "
             f"{where}; to come closer, {advice}"
         )
         found = f"a motion of {self.t_end:.4g} s"
-        allowed = f"less than {100.0 * usual:.2g} %{with_these}"
-        return (Issue("spline.intervals", message, found, allowed),)
+        usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
+        return (Issue("spline.intervals", message, found, usual),)
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""

@@ -76,9 +76,8 @@ def test_without_the_limit_on_jerk_the_least_time_is_a_bound():
 
 def test_a_redundant_arm_gains_at_least_that(scara):
     result = scara("j1")
-    report = brachis.bottleneck.report(result.trajectory)
-    found = report.timing
+    found = brachis.bottleneck.report(result.trajectory).timing
     finer = brachis.plan(result.task, intervals=80, start_from=result)
     assert found.gap == pytest.approx(result.t_end / finer.t_end - 1.0, abs=0.012)
     assert found.gap > 0.04
-    assert "the timing costs about" in str(report)
+    assert any("spline.intervals" in str(issue) for issue in result.warnings)

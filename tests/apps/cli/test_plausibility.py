@@ -26,11 +26,13 @@ def test_warned_once_and_in_the_json(command, run, percent, tmp_path):
     outcome = run(command, percent, "--json", "--out", out)
     assert outcome.code == 0, outcome.err
     assert outcome.err.count("warning: robot.limits") == 1
+    assert outcome.err.count("warning: spline.intervals") == 1
     assert outcome.err.startswith(WARNING)
-    (warning,) = json.loads(outcome.out)["warnings"]
+    warning, slow = json.loads(outcome.out)["warnings"]
+    assert slow["where"] == "spline.intervals"
     assert warning["where"] == "robot.limits.scale.velocity"
     (written,) = out.glob("*.json")
-    assert json.loads(written.read_text())["warnings"] == [warning]
+    assert json.loads(written.read_text())["warnings"] == [warning, slow]
 
 
 @pytest.mark.parametrize("command", ["plan", "bottleneck"])
