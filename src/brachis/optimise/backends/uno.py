@@ -38,7 +38,7 @@ _STOPPED = {
 
 
 _MOST_SPREAD = 1e-6
-"""Part of a limit by which bounds are widened at most,"""
+"""Part of themselves by which bounds are widened at most,"""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """times multiples of this, modulo 1: they lie evenly, and neighbours differ."""
 _FAR = 0.5
@@ -122,15 +122,18 @@ def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
 
 
 def _spread_bounds(problem: Problem, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Widen the bounds of the rows, (c,), by up to a millionth of a limit, each row by another amount.
+    """Widen the bounds of the rows, (c,), by up to a millionth of themselves, each row by another part.
 
     At the fastest motion hundreds of neighbouring rows reach their bounds together. Such degenerate subproblems take
-    Uno's solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason.
+    Uno's solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason. Bounds of
+    zero stay, for a sign is strict; so does what is given.
     """
-    widening = np.arange(len(problem.lower)) * _GOLDEN % 1.0
-    widening *= min(tolerance, _MOST_SPREAD)
-    widening[problem.lower == problem.upper] = 0.0
-    return problem.lower - widening, problem.upper + widening
+    part = np.arange(1, len(problem.lower) + 1) * _GOLDEN % 1.0
+    part *= min(tolerance, _MOST_SPREAD)
+    part[problem.lower == problem.upper] = 0.0
+    lower = problem.lower - part * np.abs(problem.lower)
+    upper = problem.upper + part * np.abs(problem.upper)
+    return lower, upper
 
 
 class _Stall:
