@@ -176,7 +176,7 @@ class BrachisError(Exception):
         self.hint = advice
 
     def __str__(self) -> str:
-        """Write the message."""
+        """Return the message."""
         text = f"{self.where}: {self.problem}" if self.where else self.problem
         if self.found is not None:
             text += f"; found {self.found}"
@@ -185,6 +185,10 @@ class BrachisError(Exception):
         if self.hint:
             text += f". {self.hint}"
         return text
+
+    def __repr__(self) -> str:
+        """Return the type and the message."""
+        return f"{type(self).__name__}({str(self)!r})"
 
 
 class BrachisWarning(UserWarning):
@@ -232,9 +236,8 @@ class PlausibilityError(InputError):
 
     def __init__(self, remarks: Sequence[str]) -> None:
         self.remarks = tuple(remarks)
-        super().__init__(
-            "not plausible:\n  " + "\n  ".join(self.remarks), hint=_NOT_STRICT
-        )
+        lines = "\n  ".join(("not plausible:", *self.remarks))
+        super().__init__(lines, hint=_NOT_STRICT)
 
 
 class UnknownNameError(InputError):

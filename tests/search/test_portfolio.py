@@ -578,29 +578,25 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monke
     assert ruled.t_end <= every.t_end * (1.0 + 2e-4)
 
 
+@pytest.mark.usefixtures("wall_clock")
 def test_a_motion_no_faster_over_all_knots_is_not_refined(robot, monkeypatch):
-    honest = candidates.finish_candidate
-    solved = []
-
-    def noted(candidate: Any, *others: Any) -> Any:
-        solved.append(candidate)
-        return honest(candidate, *others)
-
-    monkeypatch.setattr(candidates, "finish_candidate", noted)
-    result = brachis.plan(robot, task(search={"jobs": 1}))
-    best = result.candidates[0]
-    assert best.coarse * 0.9 < best.adapted <= best.t_end
-    never = Deadline.after(60.0)
-    one = next(each for each in solved if each.origin == best.origin)
-    assert one.to_beat == np.inf
-    slow = honest(
-        dataclasses.replace(one, to_beat=best.adapted), never, lambda _event: None
+    monkeypatch.setattr(portfolio.Search, "_may_win", lambda *_: True)
+    said: list[str] = []
+    asked = task(start="free", path_start=HERE)
+    one, two = (
+        brachis.plan(robot, asked | {"search": {"jobs": jobs}}, listener=said.append)
+        for jobs in (1, 2)
     )
-    assert slow.status == candidates.SLOW
-    assert slow.adapted == best.adapted
-    assert slow.trajectory is None
-    fast = dataclasses.replace(one, to_beat=1.01 * best.adapted)
-    assert honest(fast, never, lambda _event: None).verified
+    (first, times), (second, others) = without_times(one), without_times(two)
+    assert first == second
+    np.testing.assert_allclose(others, times, rtol=1e-6)
+    best, *rest = one.candidates
+    slow = [each for each in rest if each.status == candidates.SLOW]
+    assert slow
+    assert all(each.adapted > (1.0 - 2e-4) * best.adapted for each in slow)
+    assert all(each.adapted >= each.coarse * 0.9 for each in slow)
+    assert f"uno: {candidates.SLOW}" in map(str, said)
+    assert f"uno: t_E = {best.t_end:.4f} s, verified" in map(str, said)
 
 
 def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):

@@ -7,6 +7,8 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from brachis.common import tolerances
+
 _Found = TypeVar("_Found")
 
 
@@ -46,11 +48,6 @@ def freeze(owner: Any, *names: str) -> None:
         object.__setattr__(owner, name, own)
 
 
-NEGLIGIBLE = 1e-12
-"""Size of positions in rad or m, and of other numbers near 1, below which they are rounding errors; a thousandth of
-what the verification allows."""
-
-
 def clear_rounding(values: np.ndarray) -> np.ndarray:
     """Put exact zeros in the place of rounding errors, for a reader; all other values stay as they are.
 
@@ -60,7 +57,7 @@ def clear_rounding(values: np.ndarray) -> np.ndarray:
     >>> clear_rounding(np.array([-7.7e-18, 0.1])).tolist()
     [0.0, 0.1]
     """
-    return np.where(np.abs(values) < NEGLIGIBLE, 0.0, values)
+    return np.where(np.abs(values) < tolerances.ROUNDING, 0.0, values)
 
 
 def interpolate_columns(

@@ -28,7 +28,7 @@ TIME = 1e-12
 """Normalised times in [0, 1], such as knots and collocation points: rounding after a few thousand operations."""
 
 ROUNDING = 1e-12
-"""Figures that were computed in two ways, relative to their size: rounding after a few thousand operations."""
+"""Figures that were computed in two ways, relative to their size, or to 1: rounding after a few thousand operations."""
 
 END_TIME = 1e-4
 """End times of two motions, relative: refinement and the solvers' tolerances leave so much open."""

@@ -160,7 +160,7 @@ class Candidate(Summary):
     coarse : float
         End time at the first collocation points, s; infinite without a motion.
     adapted : float
-        End time over all its knots, before refinement, s; infinite while they are not all used.
+        End time over the knots that were reached, before refinement, s; infinite while it is not finished.
     to_beat : float
         An `adapted` end time, s, from which on it is not refined: another motion is as fast.
     refined : SolvedProgram or None
@@ -265,9 +265,16 @@ class Candidate(Summary):
         """Number of collocation points of the last program."""
         return 0 if self.refined is None else self.refined.program.collocation_points
 
+    def describe(self) -> str:
+        """Say in a line what came of it, and how long its motion takes if there is one."""
+        time = "" if self.trajectory is None else f"t_E = {self.t_end:.4f} s, "
+        return f"{self.solver}: {time}{self.status}"
+
     def without_programs(self) -> Candidate:
         """Return the candidate without what only the search needs."""
-        return dataclasses.replace(self, start=None, program=None, target=None)
+        return dataclasses.replace(
+            self, start=None, program=None, target=None, to_beat=np.inf
+        )
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown: what was tried and what came of it."""

@@ -168,13 +168,16 @@ def _positions(
         turns = 5.0 if may_wind else 1.0
         usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
         shown = f"{value:.6g}"
+        aside = f"; {shown} degrees are {math.radians(value):.6g} rad"
+        if key in {"start.joints", "end.joints"}:
+            aside += f"; in a task file: !degrees {shown}"
         yield Check(
             f"{key}.{robot.joint_names[i]}",
             "the position looks like degrees",
             abs(value),
             usual,
             "rad",
-            f"; {shown} degrees are {math.radians(value):.6g} rad (!degrees {shown})",
+            aside,
             shown,
         )
 

@@ -71,7 +71,7 @@ from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 SLOW = "not refined: no faster than another over all knots"
-"""Status of a candidate that refinement would have made slower than another."""
+"""Status of a candidate that is no faster over all its knots than the best one was."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
@@ -248,20 +248,19 @@ def _refine_if_fast(
     """Refine and verify a motion over all knots, unless another one is as fast: refinement slows all of them down."""
     if adapted.usable:
         candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
-    kept = drop_if_slow(candidate, candidate.to_beat)
-    if kept.status == SLOW:
-        return kept
+        if adapted.t_end >= candidate.to_beat:
+            return dataclasses.replace(candidate, status=SLOW)
     session = dataclasses.replace(session, deadline=options.deadline)
-    return refine_and_verify(kept, adapted.program, adapted.reports, session, options)
-
-
-def drop_if_slow(candidate: Candidate, to_beat: float) -> Candidate:
-    """Drop what was made of a candidate if its end time over all knots is known and not below `to_beat`, s."""
-    if not to_beat <= candidate.adapted < np.inf:
-        return candidate
-    return dataclasses.replace(
-        candidate, refined=None, trajectory=None, verification=None, status=SLOW
+    return refine_and_verify(
+        candidate, adapted.program, adapted.reports, session, options
     )
+
+
+def drop_if_slow(candidate: Candidate, done: Candidate, to_beat: float) -> Candidate:
+    """Return what was finished; the candidate before that if it is no faster over all knots than `to_beat`, s."""
+    if not to_beat <= done.adapted < np.inf:
+        return done
+    return dataclasses.replace(candidate, adapted=done.adapted, status=SLOW)
 
 
 def _is_free_chart(start: InitialGuess) -> bool:

@@ -3,7 +3,7 @@
 1. Lattices give initial guesses, batch by batch (see `schedule`).
 2. They are solved at the first collocation points. Candidates that agree are merged.
 3. The others are refined and verified in the order of their end times as long as they may beat the best verified one.
-   Refinement adds rows: an end time over all knots bounds the refined one from below.
+   One that over all knots is no faster than the best one was is not refined: refinement usually slows both alike.
 4. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
 The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
@@ -101,6 +101,7 @@ class Search:
         self._waiting: list[int] = []
         self._known: list[Candidate] = []
         self._gain = 1.0
+        self._to_beat = np.inf
 
     @property
     def is_satisfied(self) -> bool:
@@ -152,7 +153,7 @@ class Search:
             yield from self._start_from(given, GIVEN)
         elif exact is not None:
             self.candidates.append(exact)
-            self.best = exact
+            self._keep(exact)
             assert exact.trajectory is not None
             yield from self._start_from(exact.trajectory, EXACT)
         goes_on = given is None and self._problem.task.search.effort == "exhaustive"
@@ -246,12 +247,11 @@ class Search:
                     if number != numbers[0] and not self._goes_on(left):
                         return
                     left -= 1
-                    candidate = candidates.drop_if_slow(outcome, self._to_beat)
-                    self._finish(number, candidate)
-                    time = min(candidate.t_end, candidate.adapted)
-                    self._listener(
-                        f"{candidate.solver}: t_E = {time:.4f} s, {candidate.status}"
+                    candidate = candidates.drop_if_slow(
+                        self._solved[number], outcome, self._to_beat
                     )
+                    self._finish(number, candidate)
+                    self._listener(candidate.describe())
 
     @contextlib.contextmanager
     def end_early(self) -> Iterator[None]:
@@ -408,14 +408,14 @@ class Search:
             return candidate.coarse * gain < self._to_beat
         return candidate.coarse * self._gain < (1.0 - tolerances.GAIN) * best.t_end
 
-    @property
-    def _to_beat(self) -> float:
-        """End time over all knots, s, above which a candidate is not refined; infinite while nothing is verified."""
-        if self.best is None or not self.is_satisfied:
-            return np.inf
-        usual = (1.0 - _REFINED) * self.best.t_end
-        least = min(max(self.best.adapted, usual), self.best.t_end)
-        return (1.0 - tolerances.GAIN) * least
+    def _keep(self, candidate: Candidate) -> None:
+        """Take a candidate as the best one, which others have to beat over all knots once it is verified."""
+        self.best = candidate
+        if self.is_satisfied:
+            is_patient = self._problem.task.search.effort == "exhaustive"
+            usual = (1.0 - (0.0 if is_patient else _REFINED)) * candidate.t_end
+            least = min(max(candidate.adapted, usual), candidate.t_end)
+            self._to_beat = min(self._to_beat, (1.0 - tolerances.GAIN) * least)
 
     def _has_same_time(self, first: Candidate, second: Candidate) -> bool:
         """Tell whether candidates in the same joints have the same coarse end time; so have mirror images."""
@@ -437,7 +437,7 @@ class Search:
             gain = _GAINS_MORE * candidate.t_end / candidate.coarse
             self._gain = min(self._gain, gain)
         if self.best is None or self._merit(candidate) < self._merit(self.best):
-            self.best = candidate
+            self._keep(candidate)
 
     def _is_cut_short(self) -> bool:
         """Tell whether the time for the search ended every solve, of which each has a time limit of its own."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Collection, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from brachis.common.files import (
     is_task_file,
     read_text,
 )
-from brachis.errors import InputError, TaskError
+from brachis.errors import InputError, NotInstalledError, TaskError, UrdfError
 from brachis.task.fields import plain
 from brachis.task.fitted import expand_csv_files
 from brachis.task.limits_file import with_limits_of_file
@@ -224,20 +224,32 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
 
 
 @contextmanager
-def name_task_file(source: object) -> Iterator[None]:
+def name_task_file(source: object, changes: Collection[str] = ()) -> Iterator[None]:
     """Name the task file in errors that are found after it was read: in its robot, its path, its postures.
+
+    Errors of a URDF file name that file already. A missing library is not an error of the task. Both stay as they are.
 
     Parameters
     ----------
     source : object
         What the task was made of. If it is not a task file, errors stay as they are.
+    changes : collection of str, optional
+        Dotted keys that were set.
     """
     try:
         yield
+    except (UrdfError, NotInstalledError):
+        raise
     except InputError as error:
         if isinstance(source, str | os.PathLike) and is_task_file(source):
-            error.where = ": ".join(filter(None, (str(Path(source)), error.where)))
+            named = _name_source(str(Path(source)), changes)
+            error.where = ": ".join(filter(None, (named, error.where)))
         raise
+
+
+def _name_source(source: str, changes: Collection[str]) -> str:
+    """Name a task in messages, with the dotted keys that were set."""
+    return f"{source} with {', '.join(changes)} set" if changes else source
 
 
 def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
@@ -281,7 +293,7 @@ def task_from(
         )
     if changes:
         content = with_keys(content, changes)
-        source = f"{source} with {', '.join(changes)} set"
+    source = _name_source(source, changes)
     try:
         content = with_limits_of_file(content, source, folder)
         content = with_scene_of_file(content, source, folder)

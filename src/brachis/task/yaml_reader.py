@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import reprlib
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -93,16 +95,29 @@ def _with_unit(_loader: _Loader, node: yaml.Node) -> float | list[float]:
 
 
 def _in_si(node: yaml.Node, unit: str) -> float:
-    """Read a number in SI units; a number with another unit is an error."""
-    is_plain = isinstance(node, yaml.ScalarNode) and node.tag in {unit, *_NUMBERS}
-    text = node.value if is_plain else "something else"
-    try:
-        return float(text) * _UNITS[unit]
-    except ValueError:
-        raise yaml.MarkedYAMLError(
-            problem=f"{unit} needs a number, not {text!r}",
-            problem_mark=node.start_mark,
-        ) from None
+    """Read a number in SI units; text in quotes, a number with another unit and an infinite one are errors."""
+    value = math.nan
+    is_plain = isinstance(node, yaml.ScalarNode) and node.style is None
+    if is_plain and node.tag in {unit, *_NUMBERS}:
+        with suppress(ValueError):
+            value = float(node.value) * _UNITS[unit]
+    if math.isfinite(value):
+        return value
+    raise yaml.MarkedYAMLError(
+        problem=f"{unit} needs a number, or a list of numbers, not {_describe(node, unit)}",
+        problem_mark=node.start_mark,
+    )
+
+
+def _describe(node: yaml.Node, unit: str) -> str:
+    """Say what stands where a number with a unit should."""
+    if isinstance(node, yaml.MappingNode):
+        return "a mapping"
+    if isinstance(node, yaml.SequenceNode):
+        return "a list"
+    if node.tag in _UNITS and node.tag != unit:
+        return "a number with another unit"
+    return reprlib.repr(node.value)
 
 
 for _tag in _UNITS:

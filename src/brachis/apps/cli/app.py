@@ -268,12 +268,7 @@ def task_space_of(text: str | None) -> str | list[str] | None:
 def load_changed_task(
     path: Path, changes: Sequence[str] | None, *, strict: bool | None = None
 ) -> brachis.Task:
-    """Load a task file with keys set as in ``spline.intervals=40``, and with ``strict`` if it is given.
-
-    If a key is set twice, the last value counts.
-    """
-    from brachis.task import read_assignment
-
+    """Load a task file with keys set as in ``spline.intervals=40``, and with ``strict`` if it is given."""
     robots = brachis.robots
     if robots.is_robot(str(path)) and path.suffix == "":
         name = robots.path_of(str(path)).parent.name
@@ -283,10 +278,22 @@ def load_changed_task(
             allowed="a task file",
             hint=f"brachis new {name} writes a first task for it",
         )
+    return brachis.load_task(path, changes=read_changes(changes, strict=strict))
+
+
+def read_changes(
+    changes: Sequence[str] | None, *, strict: bool | None = None
+) -> dict[str, object]:
+    """Read the keys that ``--set`` and ``--strict`` set, and their values.
+
+    If a key is set twice, the last value counts.
+    """
+    from brachis.task import read_assignment
+
     keys = dict(read_assignment(text) for text in changes or ())
     if strict is not None:
         keys["strict"] = strict
-    return brachis.load_task(path, changes=keys)
+    return keys
 
 
 def refuse_task_options(given: Mapping[str, object], source: str) -> None:

@@ -18,6 +18,7 @@ from brachis.apps.cli.app import (
     Json,
     ToolFrame,
     load_changed_task,
+    read_changes,
     refuse_task_options,
     task_space_of,
     urdf_of,
@@ -98,7 +99,7 @@ def inspect(
     if is_task_file(source):
         _refuse_urdf_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
-        with name_task_file(source):
+        with name_task_file(source, read_changes(changes)):
             robot = robot_from_settings(task.robot)
         space = space or task.task_space
     else:
@@ -110,9 +111,11 @@ def inspect(
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
-    with name_task_file(source):
+    keys = read_changes(changes)
+    with name_task_file(None if task_space else source, keys):
         robot, task_map = bind(robot, space, None if task is None else task.tolerances)
         candidates = brachis.ik.find_all(robot, task_map)
+    with name_task_file(source, keys):
         limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
     remarks += _remarks(robot, candidates, posture)
     data = {

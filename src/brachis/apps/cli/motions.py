@@ -18,6 +18,7 @@ import brachis
 from brachis.apps.cli.app import Degrees, Json, Verbosity, get_verbosity, motion_file
 from brachis.apps.cli.folder import draw, write_one, write_text
 from brachis.apps.cli.output import (
+    WRITING,
     json_text,
     print_error,
     print_json,
@@ -145,7 +146,7 @@ def plot(
 
     write = partial(draw, partial(plots.PLOTS[kind], trajectory))
     suffixes = [f".{suffix}" for suffix in SUFFIXES]
-    with show_progress() as listener:
+    with show_progress(WRITING) as listener:
         listener(f"drawing {out}")
         write_one(out, write, suffixes, _inputs(result, trajectory))
     print_lines(f"wrote {out}")
@@ -168,7 +169,7 @@ def report(
     out = out or result.with_suffix(".html")
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
-    with show_progress() as listener:
+    with show_progress(WRITING) as listener:
         listener(f"drawing {out}")
         page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
         write_one(out, page.save, (".html",), _inputs(result, trajectory))

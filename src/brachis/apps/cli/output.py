@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     from brachis.verify import Verification
 
 _BEGAN = time.perf_counter()
-"""When the program began, s, so that all steps of a command are counted from one instant."""
+"""When the command line was loaded, s, so that all steps of a command are counted from one instant."""
+
+WRITING = "writing the results"
+"""First words of the progress while files are written."""
 
 
 def print_table(
@@ -305,11 +308,20 @@ def show_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def show_progress(*, in_logs: bool = False) -> Iterator[Callable[[str], None]]:
+def show_progress(
+    first: str = "reading the task", *, in_logs: bool = False
+) -> Iterator[Callable[[str], None]]:
     """Give a listener that shows what is done, and that notices Ctrl-C.
 
-    On a terminal it shows the present step; a verbose command prints every step with its time since the program began.
-    Otherwise nothing is shown, or with `in_logs` one line for every 5 % of texts such as ``3 of 40 plans``.
+    On a terminal it shows the present step; a verbose command prints every step with its time since the command line
+    was loaded. Otherwise nothing is shown, or with `in_logs` one line for every 5 % of texts such as ``3 of 40 plans``;
+    texts without a count are not shown then.
+
+    Parameters
+    ----------
+    first : str, optional
+        What a terminal shows before the first step.
+    in_logs : bool, optional
     """
     console = Console(stderr=True)
     verbosity = get_verbosity()
@@ -317,7 +329,7 @@ def show_progress(*, in_logs: bool = False) -> Iterator[Callable[[str], None]]:
     with ExitStack() as stack:
         status = None
         if verbosity is Verbosity.NORMAL and console.is_terminal:
-            status = stack.enter_context(console.status("reading the task"))
+            status = stack.enter_context(console.status(first))
 
         def show(text: str) -> None:
             """Show what is done, as the verbosity asks for."""
@@ -329,7 +341,9 @@ def show_progress(*, in_logs: bool = False) -> Iterator[Callable[[str], None]]:
                 print_error(f"{time.perf_counter() - _BEGAN:.2f} s: {text}")
             elif in_logs and verbosity is Verbosity.NORMAL:
                 done = re.match(r"(\d+) of (\d+)", text)
-                step = int(done[1]) * 20 // max(1, int(done[2])) if done else -1
+                if done is None:
+                    return
+                step = int(done[1]) * 20 // max(1, int(done[2]))
                 if step != last_step:
                     print_error(text)
                 last_step = step

@@ -20,6 +20,7 @@ from brachis.apps.cli.app import (
     Urdf,
     load_changed_task,
     motion_file,
+    read_changes,
     refuse_task_options,
     urdf_of,
 )
@@ -113,27 +114,32 @@ def _plan_task(
 
     changed = load_changed_task(task, changes, strict=strict)
     robot = urdf and urdf_of(urdf)
-    with name_task_file(task):
+    # With a URDF of its own, the robot is not that of the task file.
+    source = None if urdf else task
+    with name_task_file(source, read_changes(changes, strict=strict)):
         return brachis.plan(robot, changed, listener=listener)
 
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
+    from brachis.kinematics import CHART
     from brachis.optimise.candidate import describe_coordinates
     from brachis.search.portfolio import STATUS, TIMES, WORDS, candidate_rows
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate
     trajectory = result.trajectory
-    branch = result.family
-    if trajectory.branch not in {"", branch}:
-        branch = f"{trajectory.branch} ({branch})"
+    named = {}
+    if trajectory.branch not in {"", CHART}:
+        named["branch"] = trajectory.branch
+        if trajectory.branch != result.family:
+            named["branch"] += f" ({result.family})"
     solves = write_count(len(candidate.reports), "solve")
     least_motion = result.least_motion
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
         "redundant joints": describe_coordinates(trajectory),
-        "branch": branch,
+        **named,
         "start posture": _posture(data, "start_posture", degrees=degrees),
         "end posture": _posture(data, "end_posture", degrees=degrees),
         **data["in_use"],

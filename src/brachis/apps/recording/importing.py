@@ -196,7 +196,7 @@ def _read_robot(robot: Given, task: Source | None) -> tuple[Robot, Task | None]:
             where="robot",
             allowed="a URDF file, the name of a robot (brachis.robots), a Robot, or a task file",
         )
-    with name_task_file(task):
+    with name_task_file(None if robot is not None else task):
         return robot_for(locate(robot), robot_settings), settings  # type: ignore[arg-type]
 
 

@@ -17,6 +17,7 @@ import brachis
 from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
 from brachis.apps.plots.panels import Curve, Panel, curves_of, joint_rows_of, panels_of
 from brachis.apps.report.motion import ReportedMotion
+from brachis.kinematics import CHART
 from brachis.optimise.candidate import describe_coordinates
 from brachis.robot.from_task import in_use
 from brachis.task import Task
@@ -79,7 +80,7 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     verification = motion.verification
     boundary = trajectory.task.boundary
     branch = trajectory.branch
-    named = {"branch": branch} if branch else {}
+    named = {} if branch in {"", CHART} else {"branch": branch}
     fastest = np.argmax(samples.tool_speed)
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:

@@ -38,9 +38,9 @@ _STOPPED = {
 
 
 _MOST_SPREAD = 1e-6
-"""Part of themselves by which bounds are widened at most,"""
+"""Largest widening of a bound, as a part of it; no more than the solver's tolerance."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""times multiples of this, modulo 1: they lie evenly, and neighbours differ."""
+"""Multiples of this, modulo 1, are spread evenly."""
 _FAR = 0.5
 """Violation of a limit beyond which a restoration is far from feasible motions, as a part of the limit."""
 _LOST_AFTER = 30
@@ -126,13 +126,13 @@ def _spread_bounds(problem: Problem, tolerance: float) -> tuple[np.ndarray, np.n
 
     At the fastest motion hundreds of neighbouring rows reach their bounds together. Such degenerate subproblems take
     Uno's solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason. Bounds of
-    zero stay, for a sign is strict; so does what is given.
+    zero stay, for a sign is strict; so do rows whose bounds are equal. Bounds above 1 are widened as if they were 1.
     """
     part = np.arange(1, len(problem.lower) + 1) * _GOLDEN % 1.0
     part *= min(tolerance, _MOST_SPREAD)
     part[problem.lower == problem.upper] = 0.0
-    lower = problem.lower - part * np.abs(problem.lower)
-    upper = problem.upper + part * np.abs(problem.upper)
+    lower = problem.lower - part * np.minimum(np.abs(problem.lower), 1.0)
+    upper = problem.upper + part * np.minimum(np.abs(problem.upper), 1.0)
     return lower, upper
 
 
