@@ -83,8 +83,7 @@ _NAMES_HERE = {
         ("show animate display visualize", "view"),
         ("to_csv to_file write dump export", "brachis.export.write"),
         ("q0 q_start initial start_joints start_posture start_state", "start"),
-        ("goal target q_goal q_end goal_state", "end to"),
-        ("stop finish", "end to"),
+        ("goal target q_goal q_end goal_state stop finish", "end to"),
         ("waypoints points", "path through"),
         ("timeout max_time", "time_limit"),
         ("verbose callback", "progress"),
@@ -413,7 +412,6 @@ def nearest(
     """Suggest a valid name.
 
     In turn: the one for a word of other libraries, one with a slip, the longest beginning of `name`, the nearest.
-
     If an attribute is asked for, functions elsewhere in brachis count as well.
     """
     by_small = {one.lower(): one for one in valid}

@@ -320,7 +320,7 @@ def test_a_posture_in_degrees_where_joints_turn_without_end():
     assert remark.startswith(
         "start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad;"
     )
-    assert "30 degrees are 0.523599 rad" in remark
+    assert "30 degrees are 0.523599 rad; in a task file: !degrees 30" in remark
     for way_out in ("strict: false", "strict=False", "--no-strict"):
         assert way_out in caught.value.hint
     with pytest.warns(brachis.PlausibilityWarning, match="looks like degrees"):
@@ -569,6 +569,8 @@ def test_waypoints_in_degrees_of_joints_without_a_range():
     assert remark.startswith(
         "path: the position looks like degrees; found j1 90 rad, j2 -60 rad, j3 45 rad;"
     )
+    assert "90 degrees are 1.5708 rad" in remark
+    assert "!degrees" not in remark, "waypoints need not be in a task file"
 
 
 def test_a_path_of_joints_may_wind_and_its_end_speeds_are_in_rad(recwarn):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -76,12 +78,25 @@ def test_values_are_yaml(text, expected):
 
 
 @pytest.mark.parametrize(
-    "value",
-    ["!degrees [30, !radians 1]", "!degrees [30, a]", "!degrees {j1: 30}"],
+    ("value", "found"),
+    [
+        ("[30, !radians 1]", "a number with another unit"),
+        ("[30, a]", "'a'"),
+        ("[30, null]", "'null'"),
+        ("['30']", "'30'"),
+        ("'30'", "'30'"),
+        ("[30, [30]]", "a list"),
+        ("[{j1: 30}]", "a mapping"),
+        ("{j1: 30}", "a mapping"),
+        ("1e400", "'1e400'"),
+        ("[30, .inf]", "'.inf'"),
+        ("nan", "'nan'"),
+    ],
 )
-def test_a_unit_is_for_numbers_without_one(value):
-    with pytest.raises(TaskError, match="!degrees needs a number, not"):
-        read_assignment(f"start.joints={value}")
+def test_a_unit_is_for_numbers_without_one(value, found):
+    needs = "!degrees needs a number, or a list of numbers, not"
+    with pytest.raises(TaskError, match=f"{needs} {re.escape(found)}$"):
+        read_assignment(f"start.joints=!degrees {value}")
 
 
 @pytest.mark.parametrize("text", ["spline.intervals", "start.joints=[1, 2"])

@@ -227,7 +227,7 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
 def name_task_file(source: object, changes: Collection[str] = ()) -> Iterator[None]:
     """Name the task file in errors that are found after it was read: in its robot, its path, its postures.
 
-    Errors of a URDF file name that file already. A missing library is not an error of the task. Both stay as they are.
+    Two kinds of errors stay as they are: those of a URDF file, which name that file, and those of a missing library.
 
     Parameters
     ----------
@@ -238,9 +238,11 @@ def name_task_file(source: object, changes: Collection[str] = ()) -> Iterator[No
     """
     try:
         yield
-    except (UrdfError, NotInstalledError):
+    except NotInstalledError:
         raise
     except InputError as error:
+        if isinstance(error, UrdfError) and error.where != "robot.urdf":
+            raise
         if isinstance(source, str | os.PathLike) and is_task_file(source):
             named = _name_source(str(Path(source)), changes)
             error.where = ": ".join(filter(None, (named, error.where)))

@@ -277,3 +277,16 @@ def test_what_balances_less_than_the_residual_costs_nothing(residual, cost):
     found = Multipliers(active_set, weights, "least squares", residual, unique=True)
     assert found.change(np.array([1.0, 0.0])) == -1.0
     assert found.change(np.array([0.0, 1.0])) == -cost
+
+
+@pytest.mark.parametrize(("residual", "cost"), [(1e-6, 1e-4), (1e-3, 0.0)])
+def test_so_do_two_rows_that_hold_alike(residual, cost):
+    slopes = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
+    active_set = ActiveSet(slopes, np.arange(3), np.ones(3))
+    assert active_set.dependent
+    weights = np.array([1.0, 3e-5, 7e-5])
+    found = Multipliers(active_set, weights, "least squares", residual, unique=False)
+    both = found.change(np.array([0.0, 1.0, 1.0]))
+    assert both == pytest.approx(-cost, rel=1e-2, abs=1e-12)
+    assert found.change(np.array([0.0, 1.0, 0.0])) == pytest.approx(0.0, abs=1e-7)
+    assert found.change(np.array([1.0, 0.0, 0.0])) == pytest.approx(-1.0, rel=1e-6)

@@ -190,6 +190,9 @@ def test_where_the_tool_is(run):
     )
     iiwa = run("inspect", "iiwa14", "--posture", "0 0.3 0 0 0 0 0").out
     assert "position: [0.279562116, 0, 1.26374832]" in iiwa, "no rounding error"
+    degrees = run("inspect", "scara3", "--posture", "90 0.1 0.1").out
+    assert "90 degrees are 1.5708 rad" in degrees
+    assert "!degrees" not in degrees, "this is for task files alone"
     assert run("inspect", urdf, "--posture", "0 0").code == 2
     assert "--posture" in run("inspect", urdf, "--posture", "a").err
 

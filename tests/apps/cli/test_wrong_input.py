@@ -111,6 +111,27 @@ def test_wrong_task(case, run, task, write, tmp_path):
     assert not out.exists() or not list(out.iterdir())
 
 
+def test_the_task_file_is_not_blamed_for_other_inputs(run, task, write, tmp_path):
+    path = write(task)
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot name='x'><link")
+    outcome = run("plan", path, "--urdf", broken)
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"brachis: {broken}: ")
+    outcome = run("inspect", path, "--task-space", "foo")
+    assert outcome.code == 2
+    assert outcome.err.startswith("brachis: task_space: ")
+    for command in ("plan", "bottleneck"):
+        outcome = run(command, path, "--set", "redundant_joints=[j9]", "--strict")
+        assert outcome.code == 2
+        where = f"{path} with redundant_joints, strict set: redundant_joints: "
+        assert outcome.err.startswith(f"brachis: {where}")
+    task["robot"]["urdf"] = str(broken)
+    outcome = run("inspect", write(task))
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"brachis: {broken}: ")
+
+
 def test_torque_cannot_hold_the_arm(run, task, write):
     # In the vertical plane the first joint alone carries 10 kg at 0.5 m, 1.5 m and 2.5 m from its axis.
     task["robot"]["gravity"] = [0.0, -9.81, 0.0]

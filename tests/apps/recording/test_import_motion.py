@@ -1,5 +1,6 @@
 """A motion that is written to a file and imported is the motion that it was, with its path."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -290,6 +291,19 @@ def test_a_tool_that_stops_and_turns_off_is_refused(motion, table, write):
         match=r"follows no smooth path within the tolerance.* split the file there",
     ):
         import_motion(path, task=motion.task)
+
+
+def test_a_task_file_is_named_if_its_robot_is_wrong(file, motion, tmp_path):
+    content = motion.task.to_dict()
+    content["robot"]["tool_frame"] = "nowhere"
+    task = tmp_path / "task.yaml"
+    task.write_text(json.dumps(content))
+    with pytest.raises(InputError) as raised:
+        import_motion(file, task=task)
+    assert str(raised.value).startswith(f"{task}: ")
+    with pytest.raises(InputError) as raised:
+        import_motion(file, SCARA, task=task)
+    assert "task.yaml" not in str(raised.value)
 
 
 def test_a_path_of_joints(file, motion):

@@ -41,6 +41,18 @@ def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page
     assert planar_page.verified
 
 
+def test_a_branch_is_a_row_if_it_is_not_the_chart_s(planar):
+    reported = reported_motion(planar)
+    own = planar.trajectory.branch
+    assert own
+    for branch, named in ((own, own), ("chart", None), ("", None)):
+        trajectory = dataclasses.replace(
+            planar.trajectory, redundant_joints=(), branch=branch
+        )
+        motion = dataclasses.replace(reported, trajectory=trajectory)
+        assert tables.figures_of_merit(motion).get("branch") == named
+
+
 def test_it_is_said_where_every_limit_holds(planar, planar_page):
     for limit in planar.candidate.refined.program.limits:
         row = f"<tr><th>{limit.name}</th><td>{limit.guarantee.value}</td></tr>"

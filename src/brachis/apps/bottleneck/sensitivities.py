@@ -154,8 +154,8 @@ class Multipliers(Summary):
     def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
         """Directional derivative of t_E if bounds are relaxed.
 
-        The weights leave a part of the gradient, `residual`. Multipliers that make up no larger part of what the weights
-        balance cannot be told from zero, and count as 0.
+        The residual is the part of the gradient that the weights leave. Multipliers that make up no larger part of what
+        the weights balance cannot be told from zero, and count as 0.
 
         Parameters
         ----------

@@ -129,7 +129,7 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
 
     candidate = result.candidate
     trajectory = result.trajectory
-    named = {}
+    named: dict[str, str] = {}
     if trajectory.branch not in {"", CHART}:
         named["branch"] = trajectory.branch
         if trajectory.branch != result.family:
