@@ -90,11 +90,11 @@ A task file is YAML. Units are SI. File names are relative to the task file. Unk
 editors, save a JSON schema next to the task file with `brachis schema --out task.schema.json`, and begin the task file
 with `# yaml-language-server: $schema=task.schema.json`.
 
-**Other units.** `!degrees` and `!millimeters` before a number, or before a list of numbers, change it to rad or m:
+**Other units.** `!degrees` and `!millimeters` before a number change it to rad or m:
 
 ```yaml
-start: {joints: !degrees [30, -120, 120]}
-end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}   # rad without a tag
+start: {joints: [!degrees 30, !degrees -120, 2.0944]}   # rad without a tag
+end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}
 ```
 
 **Limits.** If a key is absent, the URDF's limit holds; `null` removes the limit. A number holds for all joints. A list

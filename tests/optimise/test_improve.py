@@ -189,7 +189,9 @@ def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
         return monitor.report("fake", SolveStatus.OPTIMAL, x, None, "")
 
     def solve_some(problem, x, solve):
-        return solve(problem if rows is None else NearRows(problem, np.array(rows)), x)
+        return solve(
+            problem if rows is None else NearRows(problem, np.array(rows), 1e-6), x
+        )
 
     monkeypatch.setattr(module, "solve_near_rows", solve_some)
     SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)

@@ -332,7 +332,7 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
         ),
         (
             ("!degrees -170", "!degrees left"),
-            ["!degrees needs a number, or a list of numbers, not 'left'"],
+            ["!degrees needs a number, not 'left'"],
         ),
         (
             ("!degrees -170", "!degres -170"),

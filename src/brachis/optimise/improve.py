@@ -365,7 +365,9 @@ class SolverSession:
         solve = partial(solve_with, self.backend)
         is_interior = self.backend.is_interior
         report = (
-            solve(program, x) if is_interior else solve_near_rows(program, x, solve)
+            solve(program, x)
+            if is_interior
+            else solve_near_rows(program, x, solve, self.options.tolerance)
         )
         if report.status.usable or report.violation > self.acceptable:
             return report

@@ -98,8 +98,7 @@ class Posture(Model):
     """A configuration of the robot."""
 
     joints: JointValues
-    """Joint positions, rad (m): in the order of the chain, or by joint name. In a task file, !degrees 30 is 30 degrees,
-    and !degrees before a list holds for all its numbers."""
+    """Joint positions, rad (m): in the order of the chain, or by joint name."""
 
 
 PathStart = Annotated[

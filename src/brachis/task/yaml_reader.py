@@ -26,8 +26,6 @@ _UNITS = {
     "!inches": 0.0254,
 }
 """Tags of units, as xacro knows them, and the factors to SI units."""
-_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
-"""Tags that PyYAML gives numbers without a unit."""
 _BROKEN = (
     yaml.YAMLError,
     ValueError,
@@ -87,37 +85,29 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
     return known[id(node)]
 
 
-def _with_unit(_loader: _Loader, node: yaml.Node) -> float | list[float]:
-    """Read a number with a unit, such as ``!degrees 90``, or a list of them, in SI units (MarkedYAMLError)."""
-    if isinstance(node, yaml.SequenceNode):
-        return [_in_si(each, node.tag) for each in node.value]
-    return _in_si(node, node.tag)
+def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
+    """Read a number with a unit, such as ``!degrees 90``, in SI units (MarkedYAMLError).
 
-
-def _in_si(node: yaml.Node, unit: str) -> float:
-    """Read a number in SI units; text in quotes, a number with another unit and an infinite one are errors."""
+    A list is refused: `!degrees` before the positions of all joints would change those in m, too.
+    """
     value = math.nan
-    is_plain = isinstance(node, yaml.ScalarNode) and node.style is None
-    if is_plain and node.tag in {unit, *_NUMBERS}:
+    if isinstance(node, yaml.ScalarNode) and node.style is None:
         with suppress(ValueError):
-            value = float(node.value) * _UNITS[unit]
+            value = float(node.value) * _UNITS[node.tag]
     if math.isfinite(value):
         return value
     raise yaml.MarkedYAMLError(
-        problem=f"{unit} needs a number, or a list of numbers, not {_describe(node, unit)}",
+        problem=f"{node.tag} needs a number, not {_describe(node)}",
         problem_mark=node.start_mark,
     )
 
 
-def _describe(node: yaml.Node, unit: str) -> str:
+def _describe(node: yaml.Node) -> str:
     """Say what stands where a number with a unit should."""
-    if isinstance(node, yaml.MappingNode):
-        return "a mapping"
-    if isinstance(node, yaml.SequenceNode):
-        return "a list"
-    if node.tag in _UNITS and node.tag != unit:
-        return "a number with another unit"
-    return reprlib.repr(node.value)
+    if isinstance(node, yaml.ScalarNode):
+        return reprlib.repr(node.value)
+    kind = "mapping" if isinstance(node, yaml.MappingNode) else "list"
+    return f"a {kind}: put it before each number that has this unit"
 
 
 for _tag in _UNITS:

@@ -56,7 +56,9 @@ def test_a_start_posture_in_degrees_is_refused_and_the_way_out_works(run, task, 
         in refused.err
     )
     assert "30 degrees are 0.523599 rad; in a task file: !degrees 30" in refused.err
-    meant = run("plan", path, "--set", "start.joints=!degrees [30, -120, 120]")
+    meant = run(
+        "plan", path, "--set", "start.joints=[!degrees 30, !degrees -120, !degrees 120]"
+    )
     assert meant.code == 0
     assert "degrees" not in meant.err
     assert "--no-strict" in " ".join(refused.err.split())

@@ -68,20 +68,6 @@ def test_known_optima(name, make, start, optimum, multipliers):
         np.testing.assert_array_equal(report.multipliers, np.zeros(len(problem.lower)))
 
 
-def test_bounds_are_spread_by_less_than_the_tolerance_and_never_alike():
-    problem = corner()
-    problem.lower = np.array([-np.inf, 2.0, 0.0, -1.0, -1.0])
-    problem.upper = np.array([0.0, 2.0, np.inf, 1.0, 1.0])
-    lower, upper = uno._spread_bounds(problem, 1e-3)
-    np.testing.assert_array_equal(lower[:3], [-np.inf, 2.0, 0.0])
-    np.testing.assert_array_equal(upper[:3], [0.0, 2.0, np.inf])
-    widened = upper[3:] - 1.0
-    assert np.all((widened > 1e-8) & (widened <= 1e-6))
-    assert abs(np.diff(widened)) > 1e-8
-    np.testing.assert_allclose(lower[3:], -upper[3:])
-    assert np.all(uno._spread_bounds(problem, 1e-9)[1][3:] - 1.0 <= 1e-9)
-
-
 def test_large_bounds_are_held_as_exactly_as_others(name):
     problem = dataclasses.replace(
         corner(),

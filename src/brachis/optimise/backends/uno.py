@@ -37,10 +37,6 @@ _STOPPED = {
 }
 
 
-_MOST_SPREAD = 1e-6
-"""Largest widening of a bound, as a part of it; no more than the solver's tolerance."""
-_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""Multiples of this, modulo 1, are spread evenly."""
 _FAR = 0.5
 """Violation of a limit beyond which a restoration is far from feasible motions, as a part of the limit."""
 _LOST_AFTER = 30
@@ -121,21 +117,6 @@ def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 / np.sqrt(slopes))
 
 
-def _spread_bounds(problem: Problem, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Widen the bounds of the rows, (c,), by up to a millionth of themselves, each row by another part.
-
-    At the fastest motion hundreds of neighbouring rows reach their bounds together. Such degenerate subproblems take
-    Uno's solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason. Bounds of
-    zero stay, for a sign is strict; so do rows whose bounds are equal. Bounds above 1 are widened as if they were 1.
-    """
-    part = np.arange(1, len(problem.lower) + 1) * _GOLDEN % 1.0
-    part *= min(tolerance, _MOST_SPREAD)
-    part[problem.lower == problem.upper] = 0.0
-    lower = problem.lower - part * np.minimum(np.abs(problem.lower), 1.0)
-    upper = problem.upper + part * np.minimum(np.abs(problem.upper), 1.0)
-    return lower, upper
-
-
 class _Stall:
     """Uno's termination callback, which also stops a solve that creeps.
 
@@ -198,8 +179,6 @@ def _run(
         unopy.ZERO_BASED_INDEXING,
     )
 
-    lower, upper = _spread_bounds(problem, options.tolerance)
-
     def scale(function: Function, factors: np.ndarray | float) -> Callable[..., None]:
         """Write what a function of scaled variables gives, times factors."""
 
@@ -216,8 +195,8 @@ def _run(
     model.set_constraints(
         len(problem.lower),
         scale(monitor.rows, 1.0),
-        lower.tolist(),
-        upper.tolist(),
+        problem.lower.tolist(),
+        problem.upper.tolist(),
         len(problem.jacobian_rows),
         problem.jacobian_rows.tolist(),
         problem.jacobian_columns.tolist(),
