@@ -178,10 +178,8 @@ class Chain:
             m/s, rad/s or m/s^2.
         """
         sizes = np.empty(len(q))
-        code = _QUANTITIES.index(quantity)
         states = (q, qdot, qddot)
-        none = (0, 0, 0)
-        self._call("brachis_tool_sizes", states, sizes, *none, before=(code, moving))
+        self._write_tool_sizes(quantity, moving, states, (sizes, 0, 0, 0))
         return sizes
 
     def tool_size_slopes(
@@ -195,11 +193,20 @@ class Chain:
         """Compute `tool_sizes`, (K,), and their slopes by q, qdot and qddot, (K, n) each: 0 where the size is 0."""
         sizes = np.empty(len(q))
         by_q, by_qdot, by_qddot = np.empty((3, len(q), self.n))
-        code = _QUANTITIES.index(quantity)
-        states = (q, qdot, qddot)
         found = (sizes, by_q, by_qdot, by_qddot)
-        self._call("brachis_tool_sizes", states, *found, before=(code, moving))
+        self._write_tool_sizes(quantity, moving, (q, qdot, qddot), found)
         return sizes, (by_q, by_qdot, by_qddot)
+
+    def _write_tool_sizes(
+        self,
+        quantity: str,
+        moving: int,
+        states: tuple[np.ndarray, ...],
+        found: tuple[np.ndarray | int, ...],
+    ) -> None:
+        """Write sizes, (K,), and slopes, (K, n) each; 0 stands for slopes that nobody asks for."""
+        before = (_QUANTITIES.index(quantity), moving)
+        self._call("brachis_tool_sizes", states, *found, before=before)
 
     def _call(
         self,

@@ -253,5 +253,7 @@ def _starts_of(
 ) -> list[InitialGuess] | DeadEnd:
     if deadline.passed:
         return []
-    listener(f"looking for joint paths on the lattice of {decomposition.name}")
+    has_joints = len(decomposition.redundant) > 0
+    place = f"lattice of {decomposition.name}" if has_joints else "branches"
+    listener(f"looking for joint paths on the {place}")
     return lattice_starts(decomposition, level, deadline, listener)

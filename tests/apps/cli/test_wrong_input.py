@@ -232,6 +232,14 @@ def test_unusable_output_folder(run, task, write, tmp_path):
     assert occupied.read_text() == ""
 
 
+def test_a_file_in_the_place_of_an_output_folder(run, task, write, tmp_path):
+    outcome = run("plan", write(task), "--out", tmp_path / "motion.npz")
+    assert outcome.code == 2
+    assert "this is the name of a file" in outcome.err
+    assert f"Write --out {tmp_path / 'motion'}" in outcome.err
+    assert not (tmp_path / "motion.npz").exists()
+
+
 def test_error_as_json(run, task, write, tmp_path, monkeypatch):
     task["robot"]["limits"]["torque"] = -1
     cases = [

@@ -247,10 +247,18 @@ def make_folder(
     Raises
     ------
     InputError
-        The folder cannot be made, or holds a file of others under one of these names.
+        The folder cannot be made, has the name of a file, or holds a file of others under one of these names.
     """
     if out is None:
         return
+    if not out.exists() and out.suffix in {Path(name).suffix for name in names}:
+        raise InputError(
+            "several files are written, into a folder, and this is the name of a file",
+            where="--out",
+            found=out,
+            allowed="a folder",
+            hint=f"Write --out {out.with_suffix('')}",
+        )
     try:
         out.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
