@@ -251,7 +251,7 @@ def make_folder(
     """
     if out is None:
         return
-    if not out.exists() and out.suffix in {Path(name).suffix for name in names}:
+    if out.suffix in {Path(name).suffix for name in names} and not is_folder(out):
         raise InputError(
             "several files are written, into a folder, and this is the name of a file",
             where="--out",
