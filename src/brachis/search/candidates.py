@@ -71,7 +71,7 @@ from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 SLOW = "not refined: no faster than another over all knots"
-"""Status of a candidate that is no faster over all its knots than the best one was."""
+"""Status of a candidate that does not beat the best one before refinement."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
@@ -245,7 +245,7 @@ def _refine_if_fast(
     session: SolverSession,
     options: RefinementOptions,
 ) -> Candidate:
-    """Refine and verify a motion over all knots, unless another one is as fast: refinement slows all of them down."""
+    """Refine and verify a motion over all its knots, if it is faster than what it has to beat."""
     if adapted.usable:
         candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= candidate.to_beat:
@@ -257,7 +257,7 @@ def _refine_if_fast(
 
 
 def drop_if_slow(candidate: Candidate, done: Candidate, to_beat: float) -> Candidate:
-    """Return what was finished; the candidate before that if it is no faster over all knots than `to_beat`, s."""
+    """Return what was finished, or the candidate before that if its end time over all knots reaches `to_beat`, s."""
     if not to_beat <= done.adapted < np.inf:
         return done
     return dataclasses.replace(candidate, adapted=done.adapted, status=SLOW)

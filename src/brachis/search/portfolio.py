@@ -3,7 +3,7 @@
 1. Lattices give initial guesses, batch by batch (see `schedule`).
 2. They are solved at the first collocation points. Candidates that agree are merged.
 3. The others are refined and verified in the order of their end times as long as they may beat the best verified one.
-   One that over all knots is no faster than the best one was is not refined: refinement usually slows both alike.
+   Refinement slows all motions by about as much. So a motion that does not beat the best one before is not refined.
 4. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
 The outcome does not depend on the number of processes: work that one process would not have done is thrown away.
