@@ -1,8 +1,8 @@
-"""Solve a program from a motion that is nearly as fast as possible.
+"""Solve a program with only the rows near their bounds.
 
-From there most limits stay far away: at a time one or two of them hold the motion back. A solver's effort grows with
-all rows that it is given. So it is given those near their bounds, and all are checked at its answer; those that are
-violated then are added, and it goes on from there. Bounds are made distinct, for hundreds of rows reach theirs at once.
+From a motion that is nearly as fast as possible most limits stay far away: at a time one or two of them hold the motion
+back. A solver's effort grows with all rows that it is given. So it is given those near their bounds, and all are
+checked at its answer; those that are violated then are added, and it goes on from there.
 """
 
 from __future__ import annotations
@@ -115,10 +115,9 @@ def solve_near_rows(
     is_fast = holding >= _ROWS_A_VARIABLE * len(x) and slack.min() >= -_FIRST_VIOLATION
     if not is_fast:
         return solve(program, x)
-    every = np.arange(len(slack))
     kept = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
     if len(kept) > _MOST_KEPT * len(slack):
-        kept = every
+        return solve(program, x)
     first = program.objective(x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
@@ -131,15 +130,13 @@ def solve_near_rows(
         is_spent = report.status is SolveStatus.ITERATION_LIMIT and report.feasible
         is_good = is_spent and report.objective <= first + _LOSS * abs(first)
         is_done = report.status.usable or is_good
-        is_whole = len(kept) == len(every)
-        if is_over or is_whole or (is_done and not len(missing)):
+        if is_over or (is_done and not len(missing)):
             return _complete(program, kept, reports)
         if not report.status.usable or slack.min() < -_LAST_VIOLATION:
             break
         kept = np.union1d(kept, np.flatnonzero(slack < _NEAR))
         x = report.x
-    report = solve(NearRows(program, every, tolerance), x)
-    return _complete(program, every, [*reports, report])
+    return _complete(program, np.arange(len(slack)), [*reports, solve(program, x)])
 
 
 def _spread_bounds(
