@@ -68,6 +68,8 @@ from brachis.problem.problem import Problem
 from brachis.search.phase_plane import FEW_VARIABLES, initial_breaks, initial_guess
 from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
+_FAR = 0.5
+"""Violation, as a part of a limit, that a smaller branch margin does not mend."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 SLOW = "not refined: no faster than another over all knots"
@@ -289,7 +291,8 @@ def solve_by_margin_continuation(
 ) -> SolvedProgram:
     """Solve with ever smaller branch margins, each from the last answer.
 
-    A margin that does not hold the motion back, or that hardly shortens it, ends the continuation.
+    A margin that does not hold the motion back, or that hardly shortens it, ends the continuation. So does an answer far
+    beyond the limits: no margin is that large.
 
     Parameters
     ----------
@@ -313,7 +316,8 @@ def solve_by_margin_continuation(
             return smaller, x
         report = kept.report
         is_free = kept.usable and not _is_held_back(kept)
-        if is_free or report.status is SolveStatus.TIME_LIMIT:
+        is_far = _FAR < report.violation < np.inf
+        if is_free or is_far or report.status is SolveStatus.TIME_LIMIT:
             return None
         # An unusable answer may have run out of iterations on its way.
         return smaller, report.x if kept.usable or report.violation <= 1e-3 else x

@@ -330,4 +330,4 @@ def test_a_restoration_that_creeps_far_beyond_a_limit_is_given_up(left, is_lost)
     stops = [stall(x, 0.0, own, 1e3, 0.0) for own in violations]
     assert stall.is_lost == is_lost
     assert any(stops) == is_lost
-    assert not any(stops[:30])
+    assert not any(stops[:15])

@@ -39,9 +39,9 @@ _STOPPED = {
 
 _FAR = 0.5
 """Violation of a limit beyond which a restoration is far from feasible motions, as a part of the limit."""
-_LOST_AFTER = 30
+_LOST_AFTER = 15
 """Iterations of a restoration after which it is given up,"""
-_LOST = 0.8
+_LOST = 0.9
 """if more than this part of the violation is left."""
 
 
