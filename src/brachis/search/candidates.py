@@ -291,8 +291,8 @@ def solve_by_margin_continuation(
 ) -> SolvedProgram:
     """Solve with ever smaller branch margins, each from the last answer.
 
-    A margin that does not hold the motion back, or that hardly shortens it, ends the continuation. So does an answer far
-    beyond the limits: no margin is that large.
+    A margin that does not hold the motion back, or that hardly shortens it, ends the continuation. So does an answer
+    far beyond the limits: no margin is that large.
 
     Parameters
     ----------
