@@ -334,7 +334,23 @@ def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
         KeyboardInterrupt,
         match=r"takes \d\.\d{4} s, and exceeds a limit by \d.* % \(unverified\)",
     ):
-        brachis.plan(robot, task(spline=FEW_POINTS))
+        brachis.plan(robot, task(spline={**FEW_POINTS, "intervals": 5}))
+
+
+def test_ctrl_c_before_refinement_lengthens_the_best_motion(robot, monkeypatch):
+    honest, calls = candidates.finish_candidate, []
+
+    def interrupted(*arguments: Any) -> Any:
+        calls.append(1)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return honest(*arguments)
+
+    monkeypatch.setattr(candidates, "finish_candidate", interrupted)
+    result = brachis.plan(robot, task(spline=FEW_POINTS))
+    assert result.interrupted
+    assert result.verified
+    assert 1.01 < result.candidate.time_scaled <= 1.1
 
 
 class Clock:

@@ -25,11 +25,13 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolverReport,
     SolveStatus,
+    objective_at,
     solver_for_large,
 )
 from brachis.optimise.near_rows import NearRows, solve_near_rows
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
+from brachis.optimise.pull import Pulled
 from brachis.task import SolverSettings
 
 
@@ -280,6 +282,8 @@ class SolverSession:
         An answer with no larger violation is usable, however the solve ended.
     for_large : Solver, optional
         What is tried first on large programs over the path, which are sparse; see `solver_for_large`.
+    pull : float, optional
+        Part of the end time that half the squared distance from the first point costs; see `Pulled`.
     """
 
     backend: Solver
@@ -288,6 +292,7 @@ class SolverSession:
     progress: Progress | None = None
     acceptable: float = -np.inf
     for_large: Solver | None = None
+    pull: float = 0.0
 
     @classmethod
     def for_task(
@@ -363,12 +368,18 @@ class SolverSession:
             if report.status.usable:
                 return report
         solve = partial(solve_with, self.backend)
+        problem: Problem = program
+        if self.pull > 0.0:
+            problem = Pulled(program, x, self.pull * program.end_time(x))
         is_interior = self.backend.is_interior
         report = (
-            solve(program, x)
+            solve(problem, x)
             if is_interior
-            else solve_near_rows(program, x, solve, self.options.tolerance)
+            else solve_near_rows(problem, x, solve, self.options.tolerance)
         )
+        if self.pull > 0.0:
+            objective = objective_at(program, report.x)
+            report = dataclasses.replace(report, objective=objective)
         if report.status.usable or report.violation > self.acceptable:
             return report
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)

@@ -273,6 +273,8 @@ def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
 
 _LONGEST = 0.01
 """Fraction by which a motion may get slower where nothing else makes the limits hold."""
+_LONGEST_IF_LATE = 0.1
+"""The same where the time is up: a slower motion within the limits is better than none."""
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 
@@ -354,7 +356,9 @@ def refine(
         reports.append(report)
     answer = reports[-1].x
     violation, _ = violations(dense, answer, goal)
-    by = _LONGEST if options.max_rounds else 0.0
+    is_late = options.deadline.passed
+    by = _LONGEST_IF_LATE if is_late else _LONGEST
+    by = by if options.max_rounds else 0.0
     factor, remaining = _lengthen(dense, answer, violation, options, by)
     return SolvedProgram(
         program, tuple(reports), violation=remaining, time_scaled=factor

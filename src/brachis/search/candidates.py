@@ -72,6 +72,8 @@ _FAR = 0.5
 """Violation, as a part of a limit, that a smaller branch margin does not mend."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
+_PULL = 0.01
+"""Weight of the pull towards the motion that is refined."""
 SLOW = "not refined: no faster than another over all knots"
 """Status of a candidate that does not beat the best one before refinement."""
 SELECTABLE = 0.05
@@ -252,7 +254,7 @@ def _refine_if_fast(
         candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= candidate.to_beat:
             return dataclasses.replace(candidate, status=SLOW)
-    session = dataclasses.replace(session, deadline=options.deadline)
+    session = dataclasses.replace(session, deadline=options.deadline, pull=_PULL)
     return refine_and_verify(
         candidate, adapted.program, adapted.reports, session, options
     )

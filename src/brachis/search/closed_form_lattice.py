@@ -241,4 +241,4 @@ class ClosedFormLattice(Lattice):
         """Keep a bounded number of nodes with several redundant joints."""
         if self._cells.r <= 1:
             return layer
-        return layer[self._choose_some(layer, self._nodes, layer.length)]
+        return layer[self._choose_some(layer, self._nodes)]

@@ -50,6 +50,8 @@ from brachis.search.joint_path import (
 
 LARGEST_STEP = 0.8
 """Largest step of a joint between stations, rad or m."""
+_HOMEWARD = 0.6
+"""Part of the largest step that joints may need at every station that is left to a given end."""
 _LOOKS = 9
 """Postures on a step that are looked at, to name what is in the way."""
 _OTHER_WAYS = 3
@@ -329,7 +331,16 @@ class Lattice(ABC):
             some = shortest(length, edges.key[good])
             ways = before.q[parent[some]], layer.q[some]
             return self._blame(np.linspace(*ways, _LOOKS, axis=1)) or JUMPS
-        return self._keep(layer[chosen], self._thin)
+        return self._keep(self._in_reach(layer[chosen], station), self._thin)
+
+    def _in_reach(self, layer: Layer, station: int) -> Layer:
+        """Leave out nodes from which a given end is too far for the stations that are left, where there are others."""
+        left = len(self.s) - 1 - station
+        if not self._to_end or not left:
+            return layer
+        far = np.abs(layer.q - self.problem.end).max(axis=1)
+        is_near = far <= _HOMEWARD * LARGEST_STEP * left
+        return layer[is_near] if is_near.any() else layer
 
     def _shortest_free(
         self, before: Layer, layer: Layer, keys: np.ndarray
@@ -394,10 +405,14 @@ class Lattice(ABC):
                 )
         return cause
 
-    def _choose_some(self, layer: Layer, most: int, cost: np.ndarray) -> np.ndarray:
-        """Choose `most` nodes: half of least `cost`, (K,), the others far from each other."""
-        if len(cost) <= most:
-            return np.arange(len(cost))
+    def _choose_some(self, layer: Layer, most: int) -> np.ndarray:
+        """Choose `most` nodes: half of least length, what is left to a given end included, the others far apart."""
+        if len(layer.q) <= most:
+            return np.arange(len(layer.q))
+        cost = layer.length
+        if self._to_end:
+            left = self.problem.end - layer.q
+            cost = cost + self._lengths(layer.q, left, np.arange(len(left)))
         order = np.argsort(cost, kind="stable")
         half = most // 2
         nearest = layer.q[order[0]]

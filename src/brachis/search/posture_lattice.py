@@ -37,6 +37,8 @@ from brachis.search.lattice import (
 
 _SAME = 1e-3
 """Spacing, rad or m, below which postures are the same node."""
+_LONGER = 1.5
+"""Factor on the least length to a posture above which a joint path to it comes a long way round."""
 
 
 def start_postures(
@@ -313,17 +315,20 @@ class PostureLattice(Lattice):
         return self._newton.solve(targets, q, rows, levels)
 
     def _thin(self, layer: Layer) -> Layer:
-        """Keep a bounded number of nodes of each label, with several redundant joints."""
+        """Keep a bounded number of nodes of each label; of one redundant joint, those that come no long way round."""
         if self._r <= 1:
-            return layer
-        cost = layer.length
-        if self._to_end:
-            left = self.problem.end - layer.q
-            cost = cost + self._lengths(layer.q, left, np.arange(len(left)))
+            return layer[self._is_short(layer)]
         labels = np.unique(layer.branch)
         most = max(10, self._nodes // len(labels))
         own = (np.flatnonzero(layer.branch == label) for label in labels)
-        kept = [
-            those[self._choose_some(layer[those], most, cost[those])] for those in own
-        ]
+        kept = [those[self._choose_some(layer[those], most)] for those in own]
         return layer[np.concatenate(kept)]
+
+    def _is_short(self, layer: Layer) -> np.ndarray:
+        """Tell which nodes, (K,) bool, are not much longer than those of other labels in the same posture."""
+        postures = np.unique(self._key(layer.q, _SAME), axis=0, return_inverse=True)[
+            1
+        ].ravel()
+        least = np.full(len(layer.q), np.inf)
+        np.minimum.at(least, postures, layer.length)
+        return np.asarray(layer.length <= _LONGER * least[postures] + _SAME)

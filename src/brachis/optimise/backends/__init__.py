@@ -3,7 +3,7 @@
 from brachis.errors import UnknownNameError
 from brachis.optimise.backends import ipopt, slsqp, uno
 from brachis.optimise.backends.child_process import Solver
-from brachis.optimise.backends.monitor import residual
+from brachis.optimise.backends.monitor import objective_at, residual
 from brachis.optimise.backends.protocol import (
     FEASIBLE,
     Problem,
@@ -23,6 +23,7 @@ __all__ = [
     "Solver",
     "SolverOptions",
     "SolverReport",
+    "objective_at",
     "residual",
     "solver_for_large",
     "solvers_for",
