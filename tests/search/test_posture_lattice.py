@@ -421,3 +421,25 @@ def test_the_same_seed_gives_the_same_joint_paths():
 
 def test_no_layer_is_begun_after_the_deadline():
     assert lengthened(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0)) == []
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [
+        ([-0.45, 0.77, -1.3, -1.0], [-0.24, 0.14, -0.77, 0.43]),
+        ([1.02, 0.68, -0.4, -0.15, -0.4], [0.22, -0.32, 0.07, -0.83, -0.8]),
+        ([-1.39, 1.0, -1.34, 0.98], [-2.24, 1.46, -1.74, 1.52]),
+    ],
+    ids=["four joints", "five joints", "four joints, folded"],
+)
+def test_a_given_end_is_reached_with_several_redundant_joints(start, end):
+    """To wait, and to leap to the end at last, is no longer: but the leap would be too large."""
+    robot = planar_robot("CCCCC"[: len(start)])
+    tool = [robot.tool_placement(np.array(q)).translation[:2] for q in (start, end)]
+    by = (tool[1] - tool[0]).tolist()
+    given = line(robot, start, by, end={"joints": end})
+    joint_paths = PostureLattice(given, [], nodes=60).joint_paths(4)
+    assert isinstance(joint_paths, list)
+    assert joint_paths
+    np.testing.assert_allclose(joint_paths[0].q[-1], end, atol=1e-3)
+    assert np.abs(np.diff(joint_paths[0].q, axis=0)).max() <= 0.8

@@ -335,11 +335,12 @@ class Lattice(ABC):
 
     def _in_reach(self, layer: Layer, station: int) -> Layer:
         """Leave out nodes from which a given end is too far for the stations that are left, where there are others."""
-        left = len(self.s) - 1 - station
-        if not self._to_end or not left:
+        if not self._to_end:
             return layer
+        left = len(self.s) - 1 - station
         far = np.abs(layer.q - self.problem.end).max(axis=1)
-        is_near = far <= _HOMEWARD * LARGEST_STEP * left
+        reach = _HOMEWARD * LARGEST_STEP * left
+        is_near = far <= reach if left else self._at_end(layer)
         return layer[is_near] if is_near.any() else layer
 
     def _shortest_free(
