@@ -72,7 +72,7 @@ _FAR = 0.5
 """Violation, as a part of a limit, that a smaller branch margin does not mend."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
-_PULL = 0.1
+_PULL = 0.001
 """Weight of the pull towards the motion that is refined."""
 SLOW = "not refined: no faster than another over all knots"
 """Status of a candidate that does not beat the best one before refinement."""
