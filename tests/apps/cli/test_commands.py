@@ -190,6 +190,26 @@ def test_failure_while_writing_the_result_leaves_the_earlier_one(
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+def test_a_failed_plan_says_which_files_are_of_an_earlier_one(
+    run, task, write, planned, tmp_path
+):
+    out = planned.copied(tmp_path / "out")
+    (out / "notes.txt").write_text("mine")
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    path = write(task)
+    far = ("--set", "path.0.line.length=5", "--json")
+    outcome = run("plan", path, *far, "--out", out)
+    assert outcome.code == 2
+    said, error = outcome.err.splitlines()
+    assert said == (
+        f"brachis: files of an earlier run stay in {out}: result.npz, result.json, overview.png, candidates.png"
+    )
+    assert "out of reach" in error
+    assert "earlier" not in outcome.out
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert "earlier" not in run("plan", path, *far, "--out", tmp_path / "new").err
+
+
 def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
     (tmp_path / "out/result.json").mkdir(parents=True)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
@@ -460,7 +480,7 @@ def test_inspect(run):
 
 
 def test_inspect_says_where_every_limit_holds(run, tmp_path):
-    everywhere = "at all instants, which the verification checks."
+    everywhere = "at all instants of a verified motion."
     data = json.loads(run("inspect", SCARA, "--task-space", "x,y", "--json").out)
     assert data["guarantees"]["torque"] == f"It holds {everywhere}"
     task = yaml.safe_load(
