@@ -1,4 +1,4 @@
-"""``brachis inspect``: the joints of a robot, its closed forms, and the points that a task's path follows."""
+"""``brachis inspect``: the joints of a robot, its closed forms, and the path and the postures of a task."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def inspect(
         Path,
         Argument(
             help="URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the "
-            "points that its path follows.",
+            "path and the postures at its ends.",
             metavar="URDF|TASK",
         ),
     ],
