@@ -109,7 +109,8 @@ Coulomb friction; a larger `coulomb_velocity` makes it change slower.
 **Friction.** If `viscous` or `coulomb` is absent, the URDF's `<dynamics>` has the value. `null` switches it off.
 
 A plan prints the values in use; they are also in the saved motion and, under `in_use`, in the JSON. `brachis inspect
-task.yaml` shows them without planning.
+task.yaml` shows them without planning, with the path and the postures at its ends. What a plan refuses about these is
+an error there too.
 
 **A `Robot` in Python.** `brachis.plan(robot, task)` uses the robot in place of the `urdf` key and adds the settings of
 the task's `robot` part. A setting that contradicts the robot is an error that names its key.

@@ -165,14 +165,7 @@ def plan(
             remarks = report_issues(remarks, strict=asked.strict)
             _report_plan(robot, asked, report)
             problem = Problem.of(robot, asked, own_limits)
-            places = of_places(
-                problem.task_map,
-                problem.path,
-                problem.start,
-                problem.end,
-                asked.path_start,
-            )
-            remarks += report_issues(places, strict=asked.strict)
+            remarks += report_issues(of_places(problem), strict=asked.strict)
             search = _open_search(problem, families, deadline, report)
             exact = None
             if known is None and asked.tolerances != Tolerances():

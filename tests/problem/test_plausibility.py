@@ -291,6 +291,7 @@ def test_warnings_are_emitted_and_kept_in_the_result():
             "message": "the factor raises limits far beyond what was stated",
             "found": "50",
             "usual": "0.1 to 1; a percentage is divided by 100",
+            "advice": "",
         }
     ]
 
@@ -321,6 +322,7 @@ def test_a_posture_in_degrees_where_joints_turn_without_end():
         "start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad;"
     )
     assert "30 degrees are 0.523599 rad; in a task file: !degrees 30" in remark
+    assert remark.count("!degrees") == 1, "once, not for every joint"
     for way_out in ("strict: false", "strict=False", "--no-strict"):
         assert way_out in caught.value.hint
     with pytest.warns(brachis.PlausibilityWarning, match="looks like degrees"):

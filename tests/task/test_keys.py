@@ -94,6 +94,16 @@ def test_a_unit_is_for_numbers_without_one(value, found):
         read_assignment(f"start.joints=!degrees {value}")
 
 
+@pytest.mark.parametrize("value", ["30", "[30, 2]", "{j1: 30}"])
+def test_an_unknown_tag_is_refused_with_those_that_exist(value):
+    with pytest.raises(TaskError) as caught:
+        read_assignment(f"start.joints=!deg {value}")
+    assert str(caught.value) == (
+        "value of start.joints: line 1, column 1: not valid YAML: there is no tag named '!deg'; allowed: "
+        "!radians, !degrees, !meters, !millimeters, !foot, !inches. Did you mean '!degrees'?"
+    )
+
+
 @pytest.mark.parametrize("text", ["spline.intervals", "start.joints=[1, 2"])
 def test_what_is_no_assignment(text):
     with pytest.raises(

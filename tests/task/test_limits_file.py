@@ -336,7 +336,7 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
         ),
         (
             ("!degrees -170", "!degres -170"),
-            ["could not determine a constructor for the tag '!degres'"],
+            ["there is no tag named '!degres'", "Did you mean '!degrees'?"],
         ),
         (
             ("max_jerk", "max_jrk"),

@@ -294,6 +294,14 @@ def test_robot_of_other_joints_is_refused(old, new, planned):
     assert caught.value.allowed == "j1, j2, j3"
 
 
+def test_words_and_table_state_the_same_allowed_value(planned):
+    verification = verify_trajectory(planned)
+    for check in verification.checks:
+        _, allowed, _ = check.figures(degrees=False)
+        assert f"<= {allowed}" in verification.summary()[check.name]
+    assert "<= 1.0001, j" in verification.summary()["torque ratio"]
+
+
 def test_robot_without_redundancy_has_no_spline_check(planned):
     plain = replace(
         planned, redundant_joints=(), control_points=planned.control_points[:1]

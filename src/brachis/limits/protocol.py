@@ -34,7 +34,7 @@ _LARGEST_INSET = 0.1
 class Guarantee(Enum):
     """Where a limit holds; each value is the sentence that a user reads."""
 
-    AT_ALL_INSTANTS = "It holds at all instants, which the verification checks."
+    AT_ALL_INSTANTS = "It holds at all instants of a verified motion."
     AT_COLLOCATION_POINTS = (
         "It holds at the collocation points of the optimiser, and is not verified."
     )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,11 +19,12 @@ from brachis.robot.joints import TURN, UNITS
 from brachis.robot.plausibility import Check, Issue, find_issues, link_lengths, reach
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
-from brachis.task import LIMIT_KINDS, SpeedTable, Task, ToolPose
+from brachis.task import LIMIT_KINDS, SpeedTable, Task
 from brachis.task.limit_kinds import FASTEST, UsualLimit
 
 if TYPE_CHECKING:
     from brachis.path import Path
+    from brachis.problem.problem import Problem
 
 _OR_NULL = ", or null for no limit"
 _OF_SIZE = " for an arm of this size"
@@ -117,30 +118,15 @@ def _bodies(task: Task) -> Iterator[Check]:
         yield _figure("collisions", length, where=where)
 
 
-def of_places(
-    task_map: TaskMap,
-    path: Path,
-    start: np.ndarray | None,
-    end: np.ndarray | None,
-    path_start: Sequence[float] | ToolPose | None,
-) -> tuple[Issue, ...]:
-    """Look at what a task says about where the robot is, in postures or along a path of joints.
-
-    Parameters
-    ----------
-    task_map : TaskMap
-    path : Path
-    start, end : (n,) ndarray or None
-        Postures, None where free.
-    path_start : sequence of float, ToolPose or None
-        As in the task.
-    """
-    along = path.sample(np.linspace(0.0, 1.0, 401)).target
+def of_places(problem: Problem) -> tuple[Issue, ...]:
+    """Look at what a task says about where the robot is, in postures or along a path of joints."""
+    task_map = problem.task_map
+    along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
     of_joints = isinstance(task_map, JointSpace)
     postures = {
-        "start.joints": start,
+        "start.joints": problem.start,
         "path": along if of_joints else None,
-        "end.joints": end,
+        "end.joints": problem.end,
     }
     figures = [
         figure
@@ -149,6 +135,7 @@ def of_places(
         for figure in _positions(task_map.robot, key, given, may_wind=of_joints)
     ]
     if YAW in task_map.rows:
+        path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
         turn = float(np.ptp(along[:, -1]))
         figures += [_figure("path_start", begins), _figure("path", turn)]
@@ -168,17 +155,17 @@ def _positions(
         turns = 5.0 if may_wind else 1.0
         usual = (2.0 if is_ranged[i] else turns) * TURN + 1e-3
         shown = f"{value:.6g}"
-        aside = f"; {shown} degrees are {math.radians(value):.6g} rad"
+        advice = f"{shown} degrees are {math.radians(value):.6g} rad"
         if key in {"start.joints", "end.joints"}:
-            aside += f"; in a task file: !degrees {shown}"
+            advice += f"; in a task file: !degrees {shown}"
         yield Check(
             f"{key}.{robot.joint_names[i]}",
             "the position looks like degrees",
             abs(value),
             usual,
             "rad",
-            aside,
-            shown,
+            shown=shown,
+            advice=advice,
         )
 
 

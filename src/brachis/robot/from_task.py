@@ -225,7 +225,7 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
 
 
 def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
-    """Describe what is in use in words, with units: payload, placements, slower limits, armature, friction.
+    """Describe what is in use in words, with units: payload, placements, gravity, slower limits, armature, friction.
 
     Friction is always described, with where it comes from: the URDF, unless the task says otherwise. So are joints
     without a limit on their acceleration; and, if accelerations of a motion, (K, n), are given, the largest of these.
@@ -246,6 +246,7 @@ def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
             used[name] = (
                 f"at {_vector(placement.xyz)} m, roll, pitch, yaw {_vector(placement.rpy_deg)} deg"
             )
+    used["gravity"] = f"{_vector(robot.model.gravity.linear)} m/s^2"
     if settings.speed_override != 1.0:
         used["speed override"] = (
             f"{100.0 * settings.speed_override:g} % of the joint velocity limits"

@@ -6,7 +6,7 @@ import itertools
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -46,16 +46,20 @@ class Issue:
         The figure with its unit.
     usual : str
         What such figures usually are.
+    advice : str
+        What else to write, if there is such advice.
     """
 
     where: str
     message: str
     found: str
     usual: str
+    advice: str = ""
 
     def __str__(self) -> str:
         """Write it in one line."""
-        return f"{self.where}: {self.message}; found {self.found}; usual: {self.usual}"
+        text = f"{self.where}: {self.message}; found {self.found}; usual: {self.usual}"
+        return f"{text}; {self.advice}" if self.advice else text
 
     def to_dict(self) -> dict[str, str]:
         """Return plain data for JSON."""
@@ -70,7 +74,7 @@ def _join(stem: str, group: list[Issue]) -> Issue:
         f"{issue.where.removeprefix(f'{stem}.')} {issue.found}" for issue in group
     )
     usual = "; ".join(dict.fromkeys(issue.usual for issue in group))
-    return Issue(stem, group[0].message, found, usual)
+    return replace(group[0], where=stem, found=found, usual=usual)
 
 
 def report_issues(
@@ -78,7 +82,18 @@ def report_issues(
 ) -> tuple[Issue, ...]:
     """Warn of issues, or refuse some or all of them; return them, one for all joints with the same message.
 
-    Warnings blame the caller of the function that calls this one.
+    Warnings blame the caller of the function that calls this one. The rest is as in `refuse_issues`.
+    """
+    joined = refuse_issues(issues, strict=strict)
+    for issue in joined:
+        warnings.warn(str(issue), PlausibilityWarning, stacklevel=3)
+    return joined
+
+
+def refuse_issues(
+    issues: tuple[Issue, ...], *, strict: bool | None
+) -> tuple[Issue, ...]:
+    """Refuse some or all issues; return them, one for all joints with the same message.
 
     Parameters
     ----------
@@ -102,8 +117,6 @@ def report_issues(
     ]
     if refused:
         raise PlausibilityError(refused)
-    for issue in joined:
-        warnings.warn(str(issue), PlausibilityWarning, stacklevel=3)
     return joined
 
 
@@ -121,9 +134,11 @@ class Check:
         In `unit`; a NaN passes.
     unit : str
     aside : str
-        Text after the usual figure: for which robot or limit, or what else to write.
+        Text after the usual figure: for which robot or limit.
     shown : str
         The figure in words, if it is more than one number.
+    advice : str
+        What else to write.
     """
 
     where: str
@@ -133,6 +148,7 @@ class Check:
     unit: str
     aside: str = ""
     shown: str = ""
+    advice: str = ""
 
 
 def find_issues(checks: Iterable[Check]) -> Iterator[Issue]:
@@ -141,7 +157,8 @@ def find_issues(checks: Iterable[Check]) -> Iterator[Issue]:
         if check.value > check.usual:
             found = check.shown or f"{check.value:.6g}"
             usual = f"below {check.usual:.3g} {check.unit}{check.aside}"
-            yield Issue(check.where, check.message, f"{found} {check.unit}", usual)
+            found = f"{found} {check.unit}"
+            yield Issue(check.where, check.message, found, usual, check.advice)
 
 
 def link_lengths(robot: Robot) -> list[float]:

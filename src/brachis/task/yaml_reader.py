@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from brachis.errors import TaskError
+from brachis.errors import TaskError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
+    from typing import NoReturn
 
 _LARGEST = 1_000_000
 """Of a document with all its aliases written out, nodes."""
@@ -110,8 +111,15 @@ def _describe(node: yaml.Node) -> str:
     return f"a {kind}: put it before each number that has this unit"
 
 
+def _refuse_tag(_loader: _Loader, node: yaml.Node) -> NoReturn:
+    """Refuse a tag that neither YAML nor the units define (MarkedYAMLError)."""
+    problem = str(UnknownNameError("tag", node.tag, _UNITS))
+    raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+
+
 for _tag in _UNITS:
     _Loader.add_constructor(_tag, _with_unit)
+_Loader.add_constructor(None, _refuse_tag)
 
 # PyYAML reads YAML 1.1, where 1e-6, without a point or without the exponent's sign, is a string; everybody means the
 # number.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -274,3 +275,8 @@ def test_new_and_robots(run, tmp_path, monkeypatch):
     assert "task.yaml: the file exists" in outcome.err
     assert (tmp_path / "task.yaml").read_text() == before
     assert run("plan", "task.yaml", *SMALL).code == 0
+
+
+def test_new_tells_how_long_the_motion_lasts(run, tmp_path):
+    outcome = run("new", "gantry2", "--out", tmp_path / "task.yaml")
+    assert re.search(r"verified: the motion lasts \d+\.\d{4} s", outcome.out)

@@ -24,7 +24,7 @@ from brachis.optimise import candidate
 from brachis.search import candidates
 from brachis.trajectory import Trajectory
 
-from .conftest import SCARA
+from .conftest import ROOT, SCARA
 
 
 def test_plan_json(planned):
@@ -188,6 +188,26 @@ def test_failure_while_writing_the_result_leaves_the_earlier_one(
         in outcome.err
     )
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_a_failed_plan_says_which_files_are_of_an_earlier_one(
+    run, task, write, planned, tmp_path
+):
+    out = planned.copied(tmp_path / "out")
+    (out / "notes.txt").write_text("mine")
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    path = write(task)
+    far = ("--set", "path.0.line.length=5", "--json")
+    outcome = run("plan", path, *far, "--out", out)
+    assert outcome.code == 2
+    said, error = outcome.err.splitlines()
+    assert said == (
+        f"brachis: files of an earlier run stay in {out}: result.npz, result.json, overview.png, candidates.png"
+    )
+    assert "out of reach" in error
+    assert "earlier" not in outcome.out
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert "earlier" not in run("plan", path, *far, "--out", tmp_path / "new").err
 
 
 def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
@@ -460,7 +480,7 @@ def test_inspect(run):
 
 
 def test_inspect_says_where_every_limit_holds(run, tmp_path):
-    everywhere = "at all instants, which the verification checks."
+    everywhere = "at all instants of a verified motion."
     data = json.loads(run("inspect", SCARA, "--task-space", "x,y", "--json").out)
     assert data["guarantees"]["torque"] == f"It holds {everywhere}"
     task = yaml.safe_load(
@@ -520,6 +540,44 @@ def test_inspect_of_a_task_shows_what_is_in_use(run, tmp_path):
     outcome = run("inspect", path, "--lock", "j3=0.5")
     assert outcome.code == 2
     assert "--lock" in outcome.err
+
+
+WELD = ROOT / "examples/13_weld_seams.yaml"
+
+
+def test_inspect_of_a_task_shows_gravity_postures_and_path(run):
+    shown = run("inspect", WELD).out
+    assert "gravity: [0, 0, -9.81] m/s^2\n" in shown
+    assert "start posture: rail 0.0000 m, shoulder_pan_joint 0.4000 rad, " in shown
+    assert "end posture: free\n" in shown
+    assert "path: 2 segments (line), 0.7651 m long\n" in shown
+    assert "shoulder_pan_joint 22.9183 deg" in run("inspect", WELD, "--degrees").out
+    data = json.loads(run("inspect", WELD, "--json").out)
+    assert data["start_posture"][:2] == [0.0, 0.4]
+    assert data["end_posture"] is None
+    assert data["path"]["segments"] == ["line", "line"]
+    joints = json.loads(
+        run("inspect", ROOT / "examples/11_from_toppra.yaml", "--json").out
+    )
+    assert joints["path"] == {"segments": ["spline"], "length": None}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("start.joints.1=9", "'shoulder_pan_joint' is out of its range; found 9 rad"),
+        ("end={joints: [0, 1, -1.3, 1.9, -2.1, -1.4, 0]}", "end posture is off the"),
+        (
+            "path_start={position: [0, 0, 1], rpy_deg: [0, 0, 0]}",
+            "start posture is off",
+        ),
+    ],
+)
+def test_inspect_refuses_postures_as_plan_does(run, change, words):
+    refused = run("inspect", WELD, "--set", change)
+    assert refused.code == 2
+    assert words in refused.err
+    assert refused == run("plan", WELD, "--set", change)
 
 
 def test_inspect_says_why_not(run):

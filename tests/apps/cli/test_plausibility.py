@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,29 @@ def test_a_start_posture_in_degrees_is_refused_and_the_way_out_works(run, task, 
     assert run("bottleneck", path).code == 2
 
 
+def test_inspect_refuses_what_a_plan_refuses(run, task, write):
+    task["start"] = {"joints": [30, -120, 120]}
+    path = write(task)
+    refused = run("inspect", path)
+    assert refused == run("plan", path)
+    assert refused.code == 2
+    assert refused.err.count("degrees are") == 1
+    shown = run("inspect", path, "--set", "strict=false", "--json")
+    assert shown.code == 0
+    (remark,) = json.loads(shown.out)["remarks"]
+    assert remark.startswith(
+        "warning: start.joints: the position looks like degrees; found j1 30 rad, j2"
+    )
+
+
+def test_inspect_says_once_that_limits_look_like_degrees(run, task, write):
+    task["robot"]["limits"]["velocity"] = 180
+    (line,) = re.findall("warning: .*", run("inspect", write(task)).out)
+    assert line.startswith(
+        "warning: robot.limits.velocity: the velocity limit looks like degrees per second; found j1 180 rad/s, j2"
+    )
+
+
 def test_a_failed_plan_shows_its_warnings(run, task, write):
     task["robot"]["limits"] = {"torque": 10, "scale": {"velocity": 80}}
     task["path"] = [{"line": {"length": 5.0, "angle_deg": 0}}]
@@ -100,5 +124,6 @@ def test_a_posture_in_degrees_is_warned_of(run):
     outcome = run("inspect", "scara3", "--posture", "30, -120, 120")
     assert outcome.code == 0
     assert (
-        "--posture.j2: the position looks like degrees; found -120 rad" in outcome.out
+        "--posture: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad"
+        in outcome.out
     )

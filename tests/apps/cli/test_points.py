@@ -69,10 +69,9 @@ def test_inspect_says_what_happens_at_corners(corner, said, task, write, tmp_pat
 
 
 def test_inspect_of_a_path_without_points(task, write):
-    assert (
-        "no part of the path comes from points"
-        in RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
-    )
+    shown = RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
+    assert "path: 1 segment (line), 1 m long\n" in shown
+    assert "position error" not in shown
 
 
 def test_plan_reports_and_draws_the_fit(seam, tmp_path):

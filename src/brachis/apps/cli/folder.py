@@ -27,6 +27,7 @@ from brachis.apps.cli.output import (
 )
 from brachis.common.files import (
     atomic_write,
+    is_file,
     is_folder,
     status_of,
     temporary_in,
@@ -239,7 +240,32 @@ def _unverified(name: str) -> str:
     return _UNVERIFIED.get(name, f"unverified_{name}")
 
 
-def make_folder(
+@contextmanager
+def output_folder(
+    out: Path | None, names: Sequence[str], inputs: Sequence[Path | None]
+) -> Iterator[None]:
+    """Make the folder for a motion's files; if the block fails, say which files of an earlier run are there.
+
+    Raises
+    ------
+    InputError
+        As `_make_folder` does.
+    """
+    _make_folder(out, names, inputs)
+    try:
+        yield
+    except (Exception, KeyboardInterrupt):
+        if out is not None:
+            both = (*names, *map(_unverified, names))
+            older = [name for name in dict.fromkeys(both) if is_file(out / name)]
+            if older:
+                print_error(
+                    f"files of an earlier run stay in {out}: {', '.join(older)}"
+                )
+        raise
+
+
+def _make_folder(
     out: Path | None, names: Sequence[str], inputs: Sequence[Path | None]
 ) -> None:
     """Make the folder for a motion's files, and refuse what `check_output` refuses; without a folder do nothing.

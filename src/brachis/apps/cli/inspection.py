@@ -1,4 +1,4 @@
-"""``brachis inspect``: the joints of a robot, its closed forms, and the points that a task's path follows."""
+"""``brachis inspect``: the joints of a robot, its closed forms, and the path and the postures of a task."""
 
 from __future__ import annotations
 
@@ -23,7 +23,12 @@ from brachis.apps.cli.app import (
     task_space_of,
     urdf_of,
 )
-from brachis.apps.cli.output import print_json, print_lines, print_table
+from brachis.apps.cli.output import (
+    print_json,
+    print_lines,
+    print_table,
+    write_posture,
+)
 from brachis.common.files import is_task_file
 from brachis.errors import InputError, write_count
 
@@ -31,6 +36,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from brachis import ik
+    from brachis.problem.problem import Problem
     from brachis.robot import Robot
     from brachis.task import FitReport, Task
 
@@ -71,7 +77,7 @@ def inspect(
         Path,
         Argument(
             help="URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the "
-            "points that its path follows.",
+            "path and the postures at its ends.",
             metavar="URDF|TASK",
         ),
     ],
@@ -88,19 +94,23 @@ def inspect(
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
-    from brachis.limits import describe_guarantees, joint_limits_of, limits_of
+    from brachis.limits import describe_guarantees, joint_limits_of
+    from brachis.problem.problem import Problem
     from brachis.robot import bind
     from brachis.robot.from_task import in_use, robot_from_settings
     from brachis.task import name_task_file
 
     remarks: list[str] = []
     task = None
+    problem = None
+    keys = read_changes(changes)
     space: str | Sequence[str] | None = task_space_of(task_space)
     if is_task_file(source):
         _refuse_urdf_options(tool_frame, base_frame, lock)
         task = load_changed_task(source, changes)
-        with name_task_file(source, read_changes(changes)):
+        with name_task_file(source, keys):
             robot = robot_from_settings(task.robot)
+            problem = Problem.of(robot, task)
         space = space or task.task_space
     else:
         refuse_task_options({"--set": changes}, "a URDF")
@@ -111,13 +121,13 @@ def inspect(
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
         remarks.append(f"task space: {words}; --task-space names another one")
-    keys = read_changes(changes)
     with name_task_file(None if task_space else source, keys):
         robot, task_map = bind(robot, space, None if task is None else task.tolerances)
         candidates = brachis.ik.find_all(robot, task_map)
     with name_task_file(source, keys):
-        limits = joint_limits_of(robot) if task is None else limits_of(robot, task)
+        remarks += _warnings(robot, problem)
     remarks += _remarks(robot, candidates, posture)
+    limits = joint_limits_of(robot) if problem is None else problem.limits
     data = {
         "robot": str(source),
         "tool_frame": robot.tool_frame,
@@ -131,6 +141,7 @@ def inspect(
         "collisions": _collisions(robot, task),
         "decompositions": [_decomposition(candidate) for candidate in candidates],
         "fits": [fit.to_dict() for fit in task.fits] if task else [],
+        **(_places(problem) if problem else {}),
     }
     if json:
         print_json(data)
@@ -156,21 +167,51 @@ def _refuse_urdf_options(
             )
 
 
+def _places(problem: Problem) -> dict[str, Any]:
+    """Describe the postures at both ends, None where free, and the path; its length is None without positions."""
+    robot = problem.robot
+    ends = {"start_posture": problem.start, "end_posture": problem.end}
+    return {
+        "joint_names": list(robot.joint_names),
+        "position_units": list(robot.position_units),
+        **{key: None if q is None else q.tolist() for key, q in ends.items()},
+        "path": {
+            "segments": [segment.kind for segment in problem.task.path],
+            "length": problem.path.length if problem.task_map.axes else None,
+        },
+    }
+
+
+def _warnings(robot: Robot, problem: Problem | None) -> list[str]:
+    """Say what is implausible, or refuse it where a plan of the task would (PlausibilityError)."""
+    from brachis.problem.plausibility import of_places, of_robot, of_task
+    from brachis.robot.plausibility import refuse_issues
+
+    issues = of_robot(robot)
+    strict = None
+    if problem is not None:
+        issues += of_task(problem.task) + of_places(problem)
+        strict = problem.task.strict
+    return [f"warning: {issue}" for issue in refuse_issues(issues, strict=strict)]
+
+
 def _remarks(
     robot: Robot, candidates: list[ik.TriedDecomposition], posture: str | None
 ) -> list[str]:
-    """Say what is implausible, whether closed forms are missing, and where the tool is in a posture."""
-    from brachis.problem.plausibility import of_posture, of_robot
+    """Say whether closed forms are missing, and where the tool is in a posture."""
+    from brachis.problem.plausibility import of_posture
+    from brachis.robot.plausibility import refuse_issues
 
     ik = brachis.ik
-    remarks = [f"warning: {remark}" for remark in of_robot(robot)]
+    remarks = []
     if candidates and not any(candidate.solver for candidate in candidates):
         remarks.append(ik.NO_CLOSED_FORM)
     if missing := ik.missing_eaik(candidates):
         remarks.append(missing)
     if posture is not None:
         q = _read_posture(robot, posture)
-        remarks += [f"warning: {each}" for each in of_posture(robot, "--posture", q)]
+        issues = refuse_issues(of_posture(robot, "--posture", q), strict=False)
+        remarks += [f"warning: {issue}" for issue in issues]
         remarks.append(_tool_pose(robot, q))
     return remarks
 
@@ -198,8 +239,10 @@ def _print_robot(
             f"  {'; '.join(pairs[:_LISTED])}{more}",
         )
     if task is not None:
-        if not task.fits:
-            print_lines("no part of the path comes from points")
+        for end in ("start", "end"):
+            posture = write_posture(data, f"{end}_posture", degrees=degrees)
+            print_lines(f"{end} posture: {posture}")
+        print_lines(f"path: {_path_in_words(data['path'])}")
         for fit in task.fits:
             _print_fit(fit)
     redundancy = data["degree_of_redundancy"]
@@ -211,6 +254,14 @@ def _print_robot(
         )
     else:
         _print_decompositions(data["decompositions"])
+
+
+def _path_in_words(path: dict[str, Any]) -> str:
+    """Say how many segments of which kinds a path has, and how long it is."""
+    segments = path["segments"]
+    kinds = ", ".join(dict.fromkeys(segments))
+    text = f"{write_count(len(segments), 'segment')} ({kinds})"
+    return text if path["length"] is None else f"{text}, {path['length']:.4g} m long"
 
 
 def _collisions(robot: Robot, task: Task | None) -> dict[str, list[str]]:

@@ -146,6 +146,20 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
     print_lines(*(f"{each.name}: {each.in_words()}" for each in verification.margins))
 
 
+def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
+    """Write a posture with names and units; None is free."""
+    from brachis.robot.joints import shown_unit
+
+    if data[key] is None:
+        return "free"
+    parts = []
+    columns = (data["joint_names"], data[key], data["position_units"])
+    for name, value, si_unit in zip(*columns, strict=True):
+        unit, factor = shown_unit(si_unit, degrees=degrees)
+        parts.append(f"{name} {factor * value:z.4f} {unit}")
+    return ", ".join(parts)
+
+
 def print_error(message: str) -> None:
     """Print one message on standard error, if that can be written."""
     with suppress(OSError):

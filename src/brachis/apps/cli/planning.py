@@ -31,7 +31,7 @@ from brachis.apps.cli.folder import (
     end_cleanly,
     exit_code,
     finish,
-    make_folder,
+    output_folder,
     write_files,
 )
 from brachis.apps.cli.motions import show
@@ -41,6 +41,7 @@ from brachis.apps.cli.output import (
     print_table,
     print_verification,
     show_progress,
+    write_posture,
 )
 from brachis.common.progress import Listener
 from brachis.errors import write_count
@@ -73,8 +74,7 @@ def plan(
 
     if view:
         require_viser()
-    make_folder(out, _PLANNED, (task, urdf))
-    with show_progress() as listener:
+    with output_folder(out, _PLANNED, (task, urdf)), show_progress() as listener:
         result = _plan_task(task, urdf, changes, strict, listener)
     plots = brachis.plots
     trajectory = result.trajectory
@@ -140,8 +140,8 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
         "end time t_E": f"{result.t_end:.4f} s",
         "redundant joints": describe_coordinates(trajectory),
         **named,
-        "start posture": _posture(data, "start_posture", degrees=degrees),
-        "end posture": _posture(data, "end_posture", degrees=degrees),
+        "start posture": write_posture(data, "start_posture", degrees=degrees),
+        "end posture": write_posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
         "iterations": f"{data['iterations']} in {solves} (refined to {data['collocation_points']} collocation points)",
@@ -169,18 +169,6 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
         columns = (*WORDS, *TIMES, STATUS)
         print_table(f"candidates ({count})", columns, listed, numbers=TIMES)
     print_verification(result.verification, degrees=degrees)
-
-
-def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
-    """Write a posture with names and units."""
-    from brachis.robot.joints import shown_unit
-
-    parts = []
-    columns = (data["joint_names"], data[key], data["position_units"])
-    for name, value, si_unit in zip(*columns, strict=True):
-        unit, factor = shown_unit(si_unit, degrees=degrees)
-        parts.append(f"{name} {factor * value:z.4f} {unit}")
-    return ", ".join(parts)
 
 
 CheckedAgain = Annotated[
@@ -229,10 +217,9 @@ def bottleneck(
     """
     from brachis.optimise.candidate import describe_coordinates
 
-    make_folder(out, _BOTTLENECK, (task, urdf))
-    source = motion_file(task)
     result = None
-    with show_progress() as listener:
+    with output_folder(out, _BOTTLENECK, (task, urdf)), show_progress() as listener:
+        source = motion_file(task)
         if source.suffix.lower() == ".npz":
             given = {"--urdf": urdf, "--set": changes, "--strict": strict}
             refuse_task_options(given, "a saved motion")

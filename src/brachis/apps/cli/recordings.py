@@ -10,7 +10,7 @@ from typer import Argument, Option
 
 import brachis
 from brachis.apps.cli.app import Degrees, Figures, Json, task_space_of
-from brachis.apps.cli.folder import Drawing, finish, make_folder, write_one
+from brachis.apps.cli.folder import Drawing, finish, output_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
     print_lines,
@@ -153,8 +153,7 @@ def compare(
     """Compare a recorded motion with a plan along its path."""
     from brachis.apps.comparison import plot_both_motions
 
-    make_folder(out, _FILES, (csv, robot))
-    with show_progress() as listener:
+    with output_folder(out, _FILES, (csv, robot)), show_progress() as listener:
         found = brachis.compare(
             csv,
             str(robot),

@@ -99,7 +99,7 @@ def new(
             "verified": result.verified,
         },
         f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(joints)}",
-        f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out",
+        f"a quick plan of it is verified: the motion lasts {result.t_end:.4f} s; next: brachis plan {out} --out out",
         as_json=json,
     )
 
