@@ -319,6 +319,7 @@ class SolverSession:
             options = dataclasses.replace(options, progress=1e-4, patience=5)
         if has_time_law and joint_map.r:
             options = dataclasses.replace(options, progress=_PROGRESS, patience=5)
+        options = dataclasses.replace(options, apart=has_time_law)
 
         def progress(iteration: int, objective: float) -> None:
             text = f"iteration {iteration}, t_E = {objective:.4f} s"
@@ -337,6 +338,7 @@ class SolverSession:
             options,
             max_iterations=min(options.max_iterations, task.max_iterations),
             time_limit=min(options.time_limit, task.time_limit),
+            apart=task.apart,
         )
         return dataclasses.replace(self, options=own, acceptable=1e-2)
 

@@ -65,6 +65,32 @@ def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch
                 assert there == here
 
 
+@pytest.mark.parametrize("apart", [True, False])
+def test_a_small_problem_is_solved_apart_if_it_asks_for_it(apart, monkeypatch):
+    monkeypatch.setattr(child_process, "ENTRIES", 1000)
+    solved_by = []
+    honest = uno._run
+
+    def note(*arguments):
+        solved_by.append(os.getpid())
+        return honest(*arguments)
+
+    monkeypatch.setattr(uno, "_run", note)
+    assert solve(SolverOptions(apart=apart)).status.usable
+    assert solved_by == ([] if apart else [os.getpid()])
+
+
+def test_a_small_problem_that_is_silent_for_long_is_ended(monkeypatch):
+    monkeypatch.setattr(child_process, "ENTRIES", 1000)
+    monkeypatch.setattr(child_process, "_SILENCE", 0.1)
+    monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
+    report = solve(SolverOptions(apart=True))
+    assert report.status is SolveStatus.STALLED
+    assert report.message == "ended: a subproblem took too long"
+    np.testing.assert_array_equal(report.x, START)
+    assert not own_children()
+
+
 def test_a_solver_that_does_not_come_back_is_ended(monkeypatch):
     monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
     report = solve(SolverOptions(time_limit=0.1))

@@ -2,7 +2,8 @@
 
 A backend sees the time between its iterations and evaluations. An active-set method may spend minutes within a single
 quadratic subproblem of thousands of variables, where nothing of ours is called. Such solves run in a process of their
-own, which can be ended.
+own, which can be ended. So do those that ask for it: where a speed is given, Uno's BQPD may pivot for ever in a
+restoration.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ Below a time limit of 10 s smaller problems, too, are solved apart: one iteratio
 """
 _GRACE = 0.25
 """Seconds after its time limit at which a process is ended; a backend that sees the limit answers before."""
+_SILENCE = 5.0
+"""Seconds without an iteration after which a small problem's process is ended: an iteration takes hundredths."""
 Run = Callable[[SolveMonitor, np.ndarray], SolverReport]
 """What a backend does: ``run(monitor, x)`` solves the monitor's problem from x, and returns ``monitor.report(...)``."""
 solve_lock = threading.RLock()
@@ -75,7 +78,8 @@ class Solver:
     ) -> SolverReport:
         """Solve `problem` from the start `x`.
 
-        A large problem that is not solved in time has the start as its `x`, and the status `TIME_LIMIT`.
+        A large problem that is not solved in time has the start as its `x`, and the status `TIME_LIMIT`; one whose
+        solve is ended for its silence, the status `STALLED`.
 
         Raises
         ------
@@ -96,7 +100,8 @@ class Solver:
             most = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
             # A daemonic process may have no children; the limit then holds between iterations alone.
             alone = multiprocessing.current_process().daemon
-            if len(x) * len(problem.lower) > most and not alone:
+            entries = len(x) * len(problem.lower)
+            if (options.apart or entries > most) and not alone:
                 return subprocess_solve(self, problem, x, options, progress)
             return self.run(SolveMonitor(problem, options, progress), x)
 
@@ -140,7 +145,9 @@ def subprocess_solve(
             )
             process.start()
         sender.close()
-        answer = _receive(receiver, until + _GRACE, progress)
+        is_large = len(x) * len(problem.lower) > ENTRIES
+        silence = np.inf if is_large else _SILENCE
+        answer = _receive(receiver, until + _GRACE, silence, progress)
     finally:
         if process.pid is not None:
             process.kill()
@@ -154,6 +161,9 @@ def subprocess_solve(
     now = time.monotonic()
     status = SolveStatus.FAILED
     message = "crashed"
+    if isinstance(answer, SolveStatus):
+        status = answer
+        message = "ended: a subproblem took too long"
     if now > until:
         status = SolveStatus.TIME_LIMIT
         message = "ended: it did not finish in time"
@@ -161,10 +171,13 @@ def subprocess_solve(
 
 
 def _receive(
-    receiver: Connection, until: float, progress: Progress | None
-) -> SolverReport | Exception | None:
-    """Pass on the progress until the answer comes; None where none comes in time, or at all."""
-    while receiver.poll(max(until - time.monotonic(), 0.0)):
+    receiver: Connection, until: float, silence: float, progress: Progress | None
+) -> SolverReport | Exception | SolveStatus | None:
+    """Pass on the progress until the answer comes; None where none comes in time, or at all.
+
+    Where nothing comes for so many seconds, `silence`, this is a stall.
+    """
+    while receiver.poll(max(min(until - time.monotonic(), silence), 0.0)):
         try:
             message = receiver.recv()
         except EOFError:
@@ -173,7 +186,7 @@ def _receive(
             return message
         if progress is not None:
             progress(*message)
-    return None
+    return None if time.monotonic() >= until else SolveStatus.STALLED
 
 
 def _work(
