@@ -320,9 +320,10 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
     monkeypatch.setattr(candidates, "solve_candidate", slow)
     monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
     task |= {
-        "spline": {"intervals": 5, "points_per_interval": 1},
+        "spline": {"intervals": 10, "points_per_interval": 1},
         "search": {"effort": "fast"},
     }
+    monkeypatch.setattr("brachis.optimise.refine._LONGEST_IF_LATE", 0.0)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     assert outcome.code == 1
     assert (tmp_path / "out/unverified.npz").exists()
