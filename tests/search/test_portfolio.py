@@ -404,6 +404,7 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     robot, clock, monkeypatch, asked, solved, left
 ):
     monkeypatch.setattr(schedule, "_SIZE", 4)
+    monkeypatch.setattr("brachis.optimise.refine._LONGEST_IF_LATE", 0.0)
     clock.jump(candidates, "solve_candidate", at=solved)
     result = brachis.plan(robot, task(spline=FEW_POINTS, **asked))
     assert result.interrupted

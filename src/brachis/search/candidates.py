@@ -254,7 +254,9 @@ def _refine_if_fast(
         candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= candidate.to_beat:
             return dataclasses.replace(candidate, status=SLOW)
-    session = dataclasses.replace(session, deadline=options.deadline, pull=_PULL)
+    is_open = adapted.program.phases[0].joint_map.r > 1
+    pull = _PULL if is_open else 0.0
+    session = dataclasses.replace(session, deadline=options.deadline, pull=pull)
     return refine_and_verify(
         candidate, adapted.program, adapted.reports, session, options
     )
