@@ -118,8 +118,9 @@ def _improve(
     if deadline.passed:
         return start
     problem = start.problem
-    (backend,) = solvers_for(solvers_of(problem)[0])
-    options = SolverOptions(time_limit=np.inf)
+    # Over the path no mean is held.
+    backend = solvers_for(problem.task.solver.name)[0]
+    options = SolverOptions(time_limit=np.inf, apart=any(problem.time_laws))
     for_large = solver_for_large(problem.task.solver.name)
     session = SolverSession(backend, options, deadline, for_large=for_large)
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.optimise.backends.monitor import SolveMonitor, objective_at
+from brachis.optimise.backends.monitor import SolveMonitor, objective_at, residual
 from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
 
 NAME = "slsqp"
@@ -53,7 +53,9 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
 
     def callback(point: np.ndarray) -> None:
         last[:] = point
-        if monitor.between_iterations(objective(point)):
+        value = objective(point)
+        has_settled = monitor.has_settled(value, residual(problem, point))
+        if monitor.between_iterations(value) or has_settled:
             raise _StopSolveError
 
     try:
@@ -76,7 +78,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
                 },
             )
     except (_StopSolveError, UnreachableError):
-        # Where the time is up, the report says so.
+        # Where the time is up, or the iterates have settled, the report says so.
         status = SolveStatus.EVALUATION_ERROR
         return monitor.report(NAME, status, last, None, "stopped")
     # SciPy gives no status where no variable is free.
