@@ -318,9 +318,9 @@ def test_a_real_ctrl_c_ends_worker_processes(robot):
     )
 
 
-def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
-    robot, monkeypatch
-):
+@pytest.fixture
+def ctrl_c_before_refinement(monkeypatch):
+    """Ctrl-C as the first motion is finished; the second call is the last look at it."""
     honest, calls = candidates.finish_candidate, []
 
     def interrupted(*arguments: Any) -> Any:
@@ -330,6 +330,10 @@ def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
         return honest(*arguments)
 
     monkeypatch.setattr(candidates, "finish_candidate", interrupted)
+
+
+@pytest.mark.usefixtures("ctrl_c_before_refinement")
+def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(robot):
     with pytest.raises(
         KeyboardInterrupt,
         match=r"takes \d\.\d{4} s, and exceeds a limit by \d.* % \(unverified\)",
@@ -337,16 +341,8 @@ def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
         brachis.plan(robot, task(spline={**FEW_POINTS, "intervals": 5}))
 
 
-def test_ctrl_c_before_refinement_lengthens_the_best_motion(robot, monkeypatch):
-    honest, calls = candidates.finish_candidate, []
-
-    def interrupted(*arguments: Any) -> Any:
-        calls.append(1)
-        if len(calls) == 1:
-            raise KeyboardInterrupt
-        return honest(*arguments)
-
-    monkeypatch.setattr(candidates, "finish_candidate", interrupted)
+@pytest.mark.usefixtures("ctrl_c_before_refinement")
+def test_ctrl_c_before_refinement_lengthens_the_best_motion(robot):
     result = brachis.plan(robot, task(spline=FEW_POINTS))
     assert result.interrupted
     assert result.verified

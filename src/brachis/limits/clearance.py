@@ -108,6 +108,7 @@ class Clearance(Limit):
         return found
 
     def partials(self, motion: JointStates) -> Partials:
+        """Slopes of the distances by q, (K, P, n); 0 for pairs that are far apart."""
         close = self._close_pairs(motion.q)
         joints = self._scene.joints[self._scene.pairs[close.pair]]
         placed = self._chain.place(motion.q)

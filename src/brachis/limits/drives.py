@@ -205,12 +205,14 @@ class TorqueSpeedLimit(Limit):
         return np.repeat([function(*pair) for pair in pairs], 2, axis=0).T
 
     def values(self, motion: JointStates) -> np.ndarray:
+        """Torques beyond what the curves allow at the joints' velocities, over the torque at rest, (K, c)."""
         tau = motion.torque(self._robot)[:, self._joints]
         allowed = self._by_curve(RoundedCurve.values, motion)
         excess = self._signs * tau - allowed
         return excess / self._at_rest
 
     def partials(self, motion: JointStates) -> Partials:
+        """Slopes of the values by q, qdot and qddot, (K, c, n) each."""
         exact = motion.torque_derivatives(self._robot)
         scale = (self._signs / self._at_rest)[:, None]
         by_q, by_qdot, by_qddot = (

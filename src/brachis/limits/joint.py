@@ -250,6 +250,7 @@ class TorqueRateLimit(_DynamicLimit):
     order = 3
 
     def quantity(self, motion: JointStates) -> np.ndarray:
+        """Rates of the torques of all joints, (K, n), Nm/s or N/s."""
         exact = motion.torque_derivatives(self._robot)
         return (
             apply_each(exact.q, motion.qdot)
@@ -258,6 +259,7 @@ class TorqueRateLimit(_DynamicLimit):
         )
 
     def quantity_partials(self, motion: JointStates) -> Partials:
+        """Slopes of the rates by q and its first three derivatives, (K, n, n) each."""
         exact = motion.torque_derivatives(self._robot)
 
         def slopes(*states: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -47,6 +47,7 @@ class SingularityLimit(Limit):
         return least / self._figure
 
     def partials(self, motion: JointStates) -> Partials:
+        """Slopes of the least singular value, over its smallest figure, by q, (K, 1, n)."""
         twists = self._task_map.twists(motion.q)
         left, sizes, right = np.linalg.svd(self._arm_jacobian(twists))
         last = sizes.shape[1] - 1

@@ -95,6 +95,7 @@ class TiltLimit(_Size):
         return np.arccos(np.clip(cosine, -1.0, 1.0)) / self._largest
 
     def partials(self, motion: JointStates) -> Partials:
+        """Slopes of the tilt, over the largest one, by q, (K, 1, n)."""
         angles = motion.q[:, self._joints]
         tilt = self.values(motion) * self._largest
         falls = np.tan(angles) * np.cos(angles).prod(axis=1, keepdims=True)
@@ -165,6 +166,7 @@ class RangeLimit(Limit):
         return apply_each(rotations, away) * self._scale
 
     def partials(self, motion: JointStates) -> Partials:
+        """Slopes of the values by q, (K, 3, n)."""
         rotations = self._robot.chain.tool(motion.q, in_tool_axes=True)[1]
         away = motion.q[:, self._joints]
         turning = self._pose.twists(motion.q)[3:]

@@ -216,6 +216,7 @@ class ToolSpeedLimit(ToolRatios):
         return self._tool.sizes(motion)[:, None] / self.largest_at(motion.s)[0]
 
     def partials(self, motion: JointStates) -> Partials:
+        """Slopes of the values by q and qdot, (K, c, n) each, and by s, (K, c)."""
         largest, slope = self.largest_at(motion.s)
         speed, (by_q, by_qdot, _) = self._tool.slopes(motion)
         q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))

@@ -356,9 +356,9 @@ def refine(
         reports.append(report)
     answer = reports[-1].x
     violation, _ = violations(dense, answer, goal)
-    is_late = options.deadline.passed
-    by = _LONGEST_IF_LATE if is_late else _LONGEST
-    by = by if options.max_rounds else 0.0
+    by = _LONGEST_IF_LATE if options.deadline.passed else _LONGEST
+    if not options.max_rounds:
+        by = 0.0
     factor, remaining = _lengthen(dense, answer, violation, options, by)
     return SolvedProgram(
         program, tuple(reports), violation=remaining, time_scaled=factor

@@ -74,7 +74,7 @@ def _join(stem: str, group: list[Issue]) -> Issue:
         f"{issue.where.removeprefix(f'{stem}.')} {issue.found}" for issue in group
     )
     usual = "; ".join(dict.fromkeys(issue.usual for issue in group))
-    return replace(group[0], where=stem, found=found, usual=usual)
+    return replace(group[0], where=stem or "robot", found=found, usual=usual)
 
 
 def report_issues(

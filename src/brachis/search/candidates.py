@@ -73,7 +73,7 @@ _FAR = 0.5
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 _PULL = 0.001
-"""Weight of the pull towards the motion that is refined."""
+"""Weight of the pull towards the motion that is refined, with several redundant joints; see `Pulled`."""
 SLOW = "not refined: no faster than another over all knots"
 """Status of a candidate that does not beat the best one before refinement."""
 SELECTABLE = 0.05
@@ -254,8 +254,8 @@ def _refine_if_fast(
         candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= candidate.to_beat:
             return dataclasses.replace(candidate, status=SLOW)
-    is_open = adapted.program.phases[0].joint_map.r > 1
-    pull = _PULL if is_open else 0.0
+    has_several = adapted.program.phases[0].joint_map.r > 1
+    pull = _PULL if has_several else 0.0
     session = dataclasses.replace(session, deadline=options.deadline, pull=pull)
     return refine_and_verify(
         candidate, adapted.program, adapted.reports, session, options

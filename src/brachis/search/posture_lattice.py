@@ -39,6 +39,8 @@ _SAME = 1e-3
 """Spacing, rad or m, below which postures are the same node."""
 _LONGER = 1.5
 """Factor on the least length to a posture above which a joint path to it comes a long way round."""
+_ALWAYS = 1e-3
+"""Length, s^2, up to which no way counts as long."""
 
 
 def start_postures(
@@ -326,9 +328,9 @@ class PostureLattice(Lattice):
 
     def _is_short(self, layer: Layer) -> np.ndarray:
         """Tell which nodes, (K,) bool, are not much longer than those of other labels in the same posture."""
-        postures = np.unique(self._key(layer.q, _SAME), axis=0, return_inverse=True)[
-            1
-        ].ravel()
-        least = np.full(len(layer.q), np.inf)
-        np.minimum.at(least, postures, layer.length)
-        return np.asarray(layer.length <= _LONGER * least[postures] + _SAME)
+        keys = self._key(layer.q, _SAME)
+        _, postures = np.unique(keys, axis=0, return_inverse=True)
+        least = np.full(len(keys), np.inf)
+        np.minimum.at(least, postures.ravel(), layer.length)
+        most = _LONGER * least[postures.ravel()]
+        return np.asarray(layer.length <= most + _ALWAYS)

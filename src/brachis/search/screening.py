@@ -24,7 +24,6 @@ from brachis.optimise.retiming import ROUGH, PathEffort, coarse_for
 from brachis.optimise.transcription import breaks_of, program_of
 from brachis.search.over_path import CHARTS, improve_guess
 from brachis.search.processes import run_in_processes
-from brachis.search.timed import solvers_of
 
 _SAME_LEAST = 1.003
 """Least times that differ by less than this factor are the same."""

@@ -94,10 +94,9 @@ def inspect(
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
-    from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.problem.problem import Problem
     from brachis.robot import bind
-    from brachis.robot.from_task import in_use, robot_from_settings
+    from brachis.robot.from_task import robot_from_settings
     from brachis.task import name_task_file
 
     remarks: list[str] = []
@@ -127,26 +126,37 @@ def inspect(
     with name_task_file(source, keys):
         remarks += _warnings(robot, problem)
     remarks += _remarks(robot, candidates, posture)
-    limits = joint_limits_of(robot) if problem is None else problem.limits
-    data = {
+    found = {
         "robot": str(source),
-        "tool_frame": robot.tool_frame,
-        "base_frame": robot.base_frame,
         "task_space": list(task_map.rows),
         "degree_of_redundancy": robot.n - task_map.m,
         "remarks": remarks,
-        "in_use": in_use(robot),
-        "joints": _joint_rows(robot),
-        "guarantees": describe_guarantees(limits),
-        "collisions": _collisions(robot, task),
         "decompositions": [_decomposition(candidate) for candidate in candidates],
-        "fits": [fit.to_dict() for fit in task.fits] if task else [],
-        **(_places(problem) if problem else {}),
     }
+    data = found | _describe(robot, problem)
     if json:
         print_json(data)
     else:
         _print_robot(robot, task, data, degrees=degrees)
+
+
+def _describe(robot: Robot, problem: Problem | None) -> dict[str, Any]:
+    """Describe a robot, and what a task says of it and of its path, as plain data for JSON."""
+    from brachis.limits import describe_guarantees, joint_limits_of
+    from brachis.robot.from_task import in_use
+
+    task = None if problem is None else problem.task
+    limits = joint_limits_of(robot) if problem is None else problem.limits
+    return {
+        "tool_frame": robot.tool_frame,
+        "base_frame": robot.base_frame,
+        "in_use": in_use(robot),
+        "joints": _joint_rows(robot),
+        "guarantees": describe_guarantees(limits),
+        "collisions": _collisions(robot, task),
+        "fits": [fit.to_dict() for fit in task.fits] if task else [],
+        **(_places(problem) if problem else {}),
+    }
 
 
 def _refuse_urdf_options(

@@ -161,7 +161,7 @@ def subprocess_solve(
     now = time.monotonic()
     status = SolveStatus.FAILED
     message = "crashed"
-    if isinstance(answer, SolveStatus):
+    if answer is SolveStatus.STALLED:
         status = answer
         message = "ended: a subproblem took too long"
     if now > until:
@@ -175,7 +175,7 @@ def _receive(
 ) -> SolverReport | Exception | SolveStatus | None:
     """Pass on the progress until the answer comes; None where none comes in time, or at all.
 
-    Where nothing comes for so many seconds, `silence`, this is a stall.
+    Where nothing is heard for `silence`, s, return `SolveStatus.STALLED`.
     """
     while receiver.poll(max(min(until - time.monotonic(), silence), 0.0)):
         try:
