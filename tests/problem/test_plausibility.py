@@ -23,6 +23,7 @@ from brachis.errors import (
 )
 from brachis.problem.plausibility import of_end_time, of_robot, of_task
 from brachis.robot import Robot
+from brachis.robot.plausibility import refuse_issues
 from brachis.robot.urdf import default_chain, read_file
 from support.chains import Joint, chain_urdf
 
@@ -195,6 +196,13 @@ def test_masses_in_g_and_inertias_in_kg_mm2():
     assert {message for _, message in told(arm(mass=2.0, inertia=1e4))} == {
         "the inertia looks like kg mm^2"
     }
+
+
+def test_the_masses_of_all_bodies_are_told_of_the_robot():
+    issues = of_robot(arm(mass=2000.0))
+    (joined,) = refuse_issues(issues, strict=False)
+    assert joined.where == "robot"
+    assert "URDF inertials that joint j1 moves 2000 kg" in joined.found
 
 
 @pytest.mark.parametrize(
