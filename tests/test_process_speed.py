@@ -9,6 +9,7 @@ import pytest
 
 import brachis
 from brachis.errors import InputError
+from brachis.robot import dynamics
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[1]
@@ -120,3 +121,33 @@ def test_two_parts():
         begin, end = part["s"]
         inside = (s > begin + 1e-3) & (s < end - 1e-3)
         np.testing.assert_allclose(speed[inside], part["speed"], rtol=1e-8)
+
+
+def test_a_closed_motion_with_mean_torques_meets_its_own_beginning():
+    result = brachis.plan(
+        {
+            "brachis": 1,
+            "robot": {
+                "urdf": str(ROOT / "robots/scara3/robot.urdf"),
+                "gravity": [0.0, 0.0, 0.0],
+                "limits": {"torque": 10.0, "velocity": None, "rms_torque": 5.0},
+            },
+            "start": "free",
+            "path_start": [1.7, 0.0],
+            "task_space": ["x", "y"],
+            "path": [{"circle": {"center": [1.4, 0.0]}}],
+            "boundary": {"periodic": True},
+            "tool_limits": {"process_speed": {"speed": 0.4, "s": [0.2, 0.5]}},
+            "spline": {"intervals": 10},
+            "search": QUICK,
+        }
+    )
+    assert result.verified, str(result.verification)
+    t = np.linspace(0.0, result.t_end, 20_001)
+    motion = result.trajectory.at(t)
+    robot = result.trajectory.robot
+    torque = dynamics.torque(robot, motion.q, motion.qdot, motion.qddot)
+    mean = np.sqrt(np.trapezoid(torque**2, t, axis=0) / result.t_end)
+    assert 4.99 < mean.max() < 5.001
+    for own in (motion.q, motion.qdot, motion.qddot):
+        np.testing.assert_allclose(own[-1], own[0], atol=1e-9 * np.abs(own).max())

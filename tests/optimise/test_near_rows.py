@@ -35,6 +35,9 @@ class Disc:
     def jacobian(self, _x):
         return np.column_stack([np.cos(ANGLES), np.sin(ANGLES)]).ravel()
 
+    def curvature(self, _x):
+        return None
+
 
 class Counting:
     """Solves with Uno, and notes how many rows it is given."""

@@ -184,7 +184,7 @@ def test_jacobian_of_phases_with_a_pause(knots, orders):
     )
     exact = dense(program, x)
     expected = differences(program, x, 1e-5)
-    (mean,) = program.means
+    (mean,) = program.means.limits
     own = program.rows_of(mean).ravel()
     size = np.abs(expected[own]).max()
     assert np.count_nonzero(exact[own]) > 0.9 * exact[own].size
@@ -213,7 +213,7 @@ def test_jacobian_of_phases_with_a_pause(knots, orders):
 def test_mean_over_phases_and_pause_is_the_integral():
     program = in_two_phases("uniform", points=1001)
     x = point_in_two_phases(program)
-    (mean,) = program.means
+    (mean,) = program.means.limits
     sums = 0.0
     for phase, part in program.split(x):
         t_norm = np.linspace(0.0, 1.0, 4001)
@@ -225,9 +225,45 @@ def test_mean_over_phases_and_pause_is_the_integral():
             robot = phase.joint_map.robot
             load = dynamics.torque(robot, state.q[-1:], still, still)[0]
             sums = sums + PAUSE * (load / 70.0) ** 2
-    np.testing.assert_allclose(
-        program.mean_values(x), sums / program.end_time(x), rtol=1e-6
+    found = program.means.values(program.split(x))
+    np.testing.assert_allclose(found, sums / program.end_time(x), rtol=1e-6)
+
+
+def torque_ratios(program: Program, x: np.ndarray) -> np.ndarray:
+    """Torques over the limit whose mean is held, at all collocation points."""
+    states = [phase.state(part) for phase, part in program.split(x)]
+    robot = program.phases[0].joint_map.robot
+    return np.concatenate([state.torque(robot) / 70.0 for state in states]).ravel()
+
+
+@pytest.mark.parametrize("knots", ["uniform", "free"])
+def test_the_curvature_of_a_mean_is_that_of_its_squares(knots):
+    program = in_two_phases(knots)
+    x = point_in_two_phases(program)
+    known = program.curvature(x)
+    assert known is not None
+    limits = len(program.means)
+    weights = np.linspace(0.5, 2.0, limits)
+    multipliers = np.zeros(len(program.lower))
+    multipliers[program.rows_of(program.means.limits[0])[0]] = -weights
+    steps = 1e-6 * np.eye(len(x))
+    steps[0] = 0.0  # the first duration is given
+    ends = [
+        torque_ratios(program, x + h) - torque_ratios(program, x - h) for h in steps
+    ]
+    slopes = np.array(ends).T / 2e-6
+    shares = np.concatenate(
+        [part[0] * phase.mean_weights(part) for phase, part in program.split(x)]
     )
+    factors = np.outer(shares / program.end_time(x), weights).ravel()
+    expected = 2.0 * slopes.T @ (factors[:, None] * slopes)
+    found = known.hessian(x, multipliers)
+    found[0] = 0.0
+    found[:, 0] = 0.0
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, atol=1e-6 * size)
+    assert not known.hessian(x, np.zeros(len(program.lower))).any()
+    assert known.hessian(x, known.multipliers).any()
 
 
 def test_a_bent_time_law_is_a_spline():

@@ -244,13 +244,14 @@ def test_one_phase_is_the_program():
     np.testing.assert_array_equal(program.x_upper, phase.x_upper)
     # Means over time come behind the phase's rows, and depend on all variables.
     own = len(phase.lower)
-    (mean,) = program.means
+    (mean,) = program.means.limits
     assert program.rows_of(mean).tolist() == [list(range(own, len(program.lower)))]
     np.testing.assert_array_equal(program.lower[:own], phase.lower)
     np.testing.assert_array_equal(program.upper[:own], phase.upper)
     np.testing.assert_array_equal(program.upper[own:], mean.upper)
     np.testing.assert_array_equal(program.rows(x)[:own], phase.rows(x))
-    np.testing.assert_allclose(program.rows(x)[own:], phase.means(x), rtol=1e-14)
+    mean_values = phase.mean_weights(x) @ mean.values(phase.state(x))
+    np.testing.assert_allclose(program.rows(x)[own:], mean_values, rtol=1e-14)
     exact = dense(program, x)
     np.testing.assert_array_equal(exact[:own], dense(phase, x))
     assert np.all(np.bincount(program.jacobian_rows)[own:] == program.variables)

@@ -29,6 +29,9 @@ class HalfPlane:
     def jacobian(self, _x):
         return np.ones(2)
 
+    def curvature(self, _x):
+        return None
+
 
 START = np.array([3.0, 0.0])
 

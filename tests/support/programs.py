@@ -54,6 +54,9 @@ class Program:
         self._visit(x)
         return self.row_slopes(x).ravel()
 
+    def curvature(self, _x):
+        return None
+
     def _visit(self, x) -> None:
         self.evaluations.append(x.copy())
         time.sleep(self.pause)

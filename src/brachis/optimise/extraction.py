@@ -11,7 +11,7 @@ from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Link, Program
+from brachis.optimise.program import Link
 from brachis.task import Task
 from brachis.trajectory import CONTINUOUS_TORQUE, PhaseSpline, Trajectory, join_splines
 
@@ -33,11 +33,12 @@ def extract_trajectory(task: Task, solved: SolvedProgram) -> Trajectory:
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    parts = [_Part.of(solved, 0)]
-    for number in range(1, len(solved.program.phases)):
-        if parts[-1].pause:
-            parts.append(parts[-1].wait())
-        parts.append(_Part.of(solved, number, parts[-1]))
+    parts: list[_Part] = []
+    for phase, motion in zip(solved.program.phases, _join(solved), strict=True):
+        before = parts[-1] if parts else None
+        if before is not None and before.pause:
+            parts.append(before.wait())
+        parts.append(_Part.of(phase, motion, before))
     splines = [part.spline for part in parts]
     knots, control_points = join_splines(splines)
     joint_map = solved.program.phases[0].joint_map
@@ -73,29 +74,21 @@ class _Part:
     spline: PhaseSpline
     nodes: Nodes
     pause: float = 0.0
-    motion: Motion | None = None
 
     @classmethod
-    def of(
-        cls, solved: SolvedProgram, number: int, before: _Part | None = None
-    ) -> _Part:
-        """Extract a phase that goes on exactly as the part before it ends."""
-        phase, x = solved.program.split(solved.x)[number]
-        motion = phase.motion(x)
+    def of(cls, phase: Phase, motion: Motion, before: _Part | None) -> _Part:
+        """Extract the motion of a phase that begins in the posture in which the part before it ends."""
         joint_map = phase.joint_map
         path = joint_map.path
         assert path is not None
         if before is not None:
             joint_map = joint_map.along(path, before.nodes.q[-1])
-            motion = _continue(
-                motion, phase, before, _find_link(solved.program, number)
-            )
         joins = motion.times_of(_select_inside(path.breaks, motion))
         gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
         breaks = np.union1d(motion.breaks, joins[gaps > 1e-7 * motion.t_end])
         jumps = motion.degree < CONTINUOUS_TORQUE
         nodes = interpolate(joint_map, motion.at, breaks, jumps=jumps)
-        return cls(motion.as_spline(), nodes, phase.pause, motion)
+        return cls(motion.as_spline(), nodes, phase.pause)
 
     def wait(self) -> _Part:
         """Wait at rest where this part ends."""
@@ -109,29 +102,28 @@ class _Part:
         return _Part(PhaseSpline(self.pause, knots, degree, points), nodes)
 
 
-def _find_link(program: Program, number: int) -> Link | None:
-    """Return the link from the phase before; None without one."""
-    pair = (number - 1, number)
-    links = (link for link in program.links if (link.before, link.after) == pair)
-    return next(links, None)
+def _join(solved: SolvedProgram) -> list[Motion]:
+    """Return the motions of all phases; each begins exactly as links ask for, which rows hold to a tolerance."""
+    program = solved.program
+    motions = program.motions(solved.x)
+    for link in program.links:
+        before = motions[link.before]
+        last = np.array(before.at(np.array([before.t_end])))[:, 0]
+        motions[link.after] = _begin_with(
+            motions[link.after], program.phases[link.after], link, last
+        )
+    return motions
 
 
-def _continue(motion: Motion, phase: Phase, before: _Part, link: Link | None) -> Motion:
-    """Let the redundant curves begin exactly as those of the part before end, which a link holds to rounding."""
-    if link is None:
-        return motion
-    if before.motion is None:
-        last = before.spline.control_points[1:, -1][None]
-    else:
-        ends = before.motion.at(np.array([before.motion.t_end]))
-        last = np.array([ends[order][0, 1:] for order in link.orders])
+def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> Motion:
+    """Return a motion that begins with what a link joins of curves and derivatives, (4, c); given values stay."""
     first = phase.boundary.given
-    own = motion.at(np.zeros(1))
+    own = np.array(motion.at(np.zeros(1)))[:, 0]
     given = len(phase.boundary.start[-1].derivatives)
-    count = max(len(last), 1 + given)
-    values = np.array([curves[0, first:] for curves in own[:count]])
-    values[: len(last), 1 - first :] = last
-    return motion.with_start(values)
+    joined = np.ix_(link.orders, link.curves)
+    own[joined] = last[joined]
+    count = 1 + max(given, *link.orders)
+    return motion.with_start(own[:count, first:])
 
 
 def _select_inside(s: np.ndarray, motion: Motion) -> np.ndarray:

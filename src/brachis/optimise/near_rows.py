@@ -15,6 +15,7 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import (
     FEASIBLE,
+    Curvature,
     Problem,
     SolverReport,
     SolveStatus,
@@ -86,6 +87,20 @@ class NearRows:
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian that are left."""
         return self._program.jacobian(x)[self._entries]
+
+    def curvature(self, x: np.ndarray) -> Curvature | None:
+        """Return what the program knows of its Hessian; multipliers of the rows that are left out are zero."""
+        whole = self._program.curvature(x)
+        if whole is None:
+            return None
+
+        def find_hessian(x: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+            """Return the known part by the multipliers of the rows that are left."""
+            every = np.zeros_like(whole.multipliers)
+            every[self._kept] = multipliers
+            return whole.hessian(x, every)
+
+        return Curvature(find_hessian, whole.multipliers[self._kept])
 
 
 def solve_near_rows(

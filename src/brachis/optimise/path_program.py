@@ -138,9 +138,8 @@ class PathPhase:
             squares = _follow(phase.time_law, self._s) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
         evenly = np.linspace(0.0, timing.t_end, intervals + 1)
-        breaks = self._part(np.interp(evenly, t, curves[:, 0]))
-        self.breaks = breaks
-        self._knots = clamped_knots(_DEGREE, breaks)
+        self.breaks = self._part(np.interp(evenly, t, curves[:, 0]))
+        self._knots = clamped_knots(_DEGREE, self.breaks)
         self._basis = self._basis_at(places)
         self._count = intervals + _DEGREE
         matrix = basis_matrix(self._knots, _DEGREE, self._part(curves[:, 0]))
@@ -304,7 +303,7 @@ class PathPhase:
         """Move both bounds of some values inwards, (c,), beside an end with a given posture by less."""
         number = np.arange(float(len(self._places)))
         ends = self.phase.boundary.start, self.phase.boundary.end
-        part = np.ones(len(number))
+        part = np.ones_like(number)
         for away, conditions in zip((number, number[::-1]), ends, strict=True):
             if any(np.isfinite(condition.value) for condition in conditions[1:]):
                 part = np.minimum(part, away / _RAMP)
@@ -351,9 +350,8 @@ class PathPhase:
         value, first, second, _ = self._basis.values
         basis = np.array([value, first * rate, second * square + first * u])
         slopes = evaluation.slopes[:3]
-        every = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
-        where = (self._points, self._curves)
-        return find_entries(slopes, by_squares, *where, every).ravel()
+        own = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
+        return find_entries(slopes, by_squares, self._points, self._curves, own).ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:
         """Take s and the redundant curves at many places, (S, c)."""
@@ -462,11 +460,13 @@ class PathProgram:
         """Gradient of the time, (v,)."""
         return np.concatenate([own.gradient(part) for own, part in self._split(x)])
 
+    def curvature(self, _x: np.ndarray) -> None:
+        """Nothing of the Hessian is known."""
+
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError where there are none."""
-        before, after = self._pairs.T
         rows = [own.rows(part) for own, part in self._split(x)]
-        return np.concatenate([*rows, x[before] - x[after]])
+        return np.concatenate([*rows, -np.diff(x[self._pairs])[:, 0]])
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,); raises as `rows` does."""

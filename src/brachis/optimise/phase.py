@@ -20,7 +20,7 @@ import numpy as np
 
 from brachis.kernel import find_entries
 from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Moments, Partials, Role
+from brachis.limits import Limit, Partials, Role
 from brachis.limits.safeguards import MARGIN, build_branch_margins
 from brachis.optimise.boundary import (
     Boundary,
@@ -203,6 +203,11 @@ class Phase:
         return self.with_limits([*own, *build_branch_margins(self.joint_map, margin)])
 
     @property
+    def lengths(self) -> slice:
+        """The variables that are interval lengths; none where the knots are fixed."""
+        return self._layout.lengths
+
+    @property
     def jumps(self) -> np.ndarray:
         """Knots, in normalised time, at which the highest derivative that a limit asks for jumps."""
         order = max((limit.order for limit in self.limits), default=0)
@@ -316,38 +321,9 @@ class Phase:
         number = next(i for i, own in enumerate(self.limits) if own is limit)
         return self._layout.limit_rows[number]
 
-    def means(self, x: np.ndarray) -> np.ndarray:
-        """Means over the phase of the values that are held as means, (m,)."""
-        weights = self.grid.mean_weights(self._h(x))
-        return np.asarray(weights @ self.evaluate(x).values[:, self.evaluator.is_mean])
-
-    def mean_slopes(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of `means`, (m, v)."""
-        is_mean = self.evaluator.is_mean
-        evaluation = self.evaluate(x)
-        weights = self.grid.mean_weights(self._h(x))
-        slopes = self._chain_rule(evaluation.slopes, x)[:, is_mean]
-        total = self._sum_up(slopes, weights)
-        values = evaluation.values[:, is_mean]
-        total[:, self._layout.lengths] += values.T @ self.grid.mean_slopes.T
-        return total
-
-    def values_at_rest(self, x: np.ndarray) -> np.ndarray:
-        """Values that are held as means while the arm waits at the phase's end, (m,)."""
-        still = Moments.at_rest(self.state(x).q[-1:])
-        limits = [limit for limit in self.limits if limit.guarantee.is_mean]
-        return np.concatenate([limit.values(still)[0] for limit in limits])
-
-    def slopes_at_rest(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of `values_at_rest`, (m, v)."""
-        state = self.state(x)
-        still = Moments.at_rest(state.q[-1:])
-        limits = [limit for limit in self.limits if limit.guarantee.is_mean]
-        by_q = [_by_posture(limit.partials(still), still.q) for limit in limits]
-        at_end = np.concatenate(by_q) @ state.gradient[-1]
-        by_y = np.zeros((len(self.t_norm), *at_end.shape))
-        by_y[-1] = at_end
-        return self._sum_up(self._chain_rule(by_y[None], x), np.ones(len(self.t_norm)))
+    def mean_weights(self, x: np.ndarray) -> np.ndarray:
+        """Weights of the collocation points in a mean over the phase's time, (K,)."""
+        return self.grid.mean_weights(self._h(x))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
         """How far the limits are violated at every collocation point, (K, c); negative inside.
@@ -382,7 +358,7 @@ class Phase:
                 continue
             own = values
             if limit.guarantee.is_mean:
-                own = self.grid.mean_weights(self._h(x))[None] @ values
+                own = self.mean_weights(x)[None] @ values
             ratios.append(limit.ratio(own) + every)
         return np.hstack(ratios)
 
@@ -391,7 +367,7 @@ class Phase:
         self.evaluations["jacobians"] += 1
         evaluation = self.evaluate(x)
         is_mean = self.evaluator.is_mean
-        slopes = self._chain_rule(evaluation.slopes, x)
+        slopes = self.slopes_by_variables(evaluation.slopes, x)
         of_limits = (slopes[:, ~is_mean] if is_mean.any() else slopes).ravel()
         of_progress = self._layout.progress.jacobian(x)
         of_total = np.ones(len(self.grid.lower))
@@ -410,8 +386,8 @@ class Phase:
 
     def gradient_by_curves(self, slopes: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Gradient, (v,), of a sum over the collocation points with slopes by y, ydot, ..., (orders, K, 1, c)."""
-        entries = self._chain_rule(slopes, x)
-        return self._sum_up(entries, np.ones(len(self.t_norm)))[0]
+        entries = self.slopes_by_variables(slopes, x)
+        return self.sum_up(entries)[0]
 
     def end_pattern(self, point: int) -> np.ndarray:
         """Variables, (z,), that matter for the curves at the first (0) or last (-1) collocation point."""
@@ -440,15 +416,27 @@ class Phase:
         is_free = (self._layout.variable > 0) | (self.time_law is None)
         return np.flatnonzero((self._layout.point == number) & is_free)
 
-    def _sum_up(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    def sum_up(
+        self, slopes: np.ndarray, weights: np.ndarray | float = 1.0
+    ) -> np.ndarray:
         """Add up slopes, (z, c), over the collocation points, with weights (K,): (c, v)."""
-        terms = slopes * weights[self._layout.point][:, None]
+        factors = np.broadcast_to(weights, len(self.t_norm))[self._layout.point]
+        terms = slopes * factors[:, None]
         variable = self._layout.variable
         return np.array(
             [np.bincount(variable, term, self.variables) for term in terms.T]
         )
 
-    def _chain_rule(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
+    def spread_slopes(self, slopes: np.ndarray) -> np.ndarray:
+        """Put slopes, (z, c), in their places: by point, value and variable, (K, c, v)."""
+        columns = slopes.shape[1]
+        found = np.zeros((len(self.t_norm), columns, self.variables))
+        point = self._layout.point[:, None]
+        variable = self._layout.variable[:, None]
+        found[point, np.arange(columns), variable] = slopes
+        return found
+
+    def slopes_by_variables(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""
         orders = len(by)
         layout = self._layout
@@ -487,12 +475,3 @@ class Phase:
             own = [part.entries(basis.values) for part in self._layout.patterns]
             self._entries = (basis, np.concatenate([np.empty((ORDERS, 0)), *own], 1))
         return np.array(per_second(self._entries[1], x[0]))
-
-
-def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:
-    """Slopes of a limit at rest by the posture, (c, n); zero where it does not depend on it."""
-    if partials.q is None:
-        parts = (partials.qdot, partials.qddot, partials.qdddot)
-        other = next(part for part in parts if part is not None)
-        return np.zeros((other.shape[1], q.shape[1]))
-    return np.asarray(partials.q[0])

@@ -6,8 +6,6 @@
 
 Rows are those of the phases, one phase after the other, then means over the whole motion, then those of the links. Most
 motions have one phase and no links; see `phase`. The objective is a sum over the phases.
-
-A mean is held over all phases, and over the pauses at rest between them, by their durations.
 """
 
 from __future__ import annotations
@@ -21,6 +19,8 @@ import numpy as np
 from brachis.common.summary import Summary
 from brachis.kinematics import JointState
 from brachis.limits import Bound, Limit, Role
+from brachis.optimise.backends import Curvature
+from brachis.optimise.means import Means
 from brachis.optimise.motion import Motion
 from brachis.optimise.objective import EndTime, Objective
 from brachis.optimise.phase import Phase
@@ -120,8 +120,8 @@ class Program(Summary):
     phases : tuple of Phase
     links : tuple of Link
     minimised : Objective
-    means : tuple of Limit
-        The limits whose means are held.
+    means : Means
+        Of the limits that are held as means.
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -156,26 +156,24 @@ class Program(Summary):
         longest = np.broadcast_to(self.minimised.longest, len(self.phases))
         given = self.x_upper[self._durations]
         self.x_upper[self._durations] = np.minimum(given, longest)
-        self.means = tuple(
-            limit for limit in self.phases[0].limits if limit.guarantee.is_mean
-        )
+        self.means = Means(self.phases[0].limits)
         joined = np.zeros(sum(link.size for link in self.links))
         self.lower = np.concatenate(
             [
                 *(phase.lower for phase in self.phases),
-                *(limit.lower for limit in self.means),
+                self.means.lower,
                 joined,
             ]
         )
         self.upper = np.concatenate(
             [
                 *(phase.upper for phase in self.phases),
-                *(limit.upper for limit in self.means),
+                self.means.upper,
                 joined,
             ]
         )
         heights = [len(phase.lower) for phase in self.phases]
-        heights.append(sum(len(limit.lower) for limit in self.means))
+        heights.append(len(self.means))
         heights += [link.size for link in self.links]
         patterns = [
             (phase.jacobian_rows, phase.jacobian_columns + a)
@@ -186,6 +184,8 @@ class Program(Summary):
         patterns.append((np.repeat(np.arange(count), first[-1]), np.tile(every, count)))
         patterns += [link.pattern(self.phases, first) for link in self.links]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
+        first_mean = self._first_rows[len(self.phases)]
+        self._mean_rows = slice(first_mean, first_mean + len(self.means))
         pairs = zip(patterns, self._first_rows, strict=True)
         self.jacobian_rows = np.concatenate([rows + a for (rows, _), a in pairs])
         self.jacobian_columns = np.concatenate([columns for _, columns in patterns])
@@ -271,7 +271,7 @@ class Program(Summary):
         """Values of the rows, (c,); raises UnreachableError as `states` does."""
         parts = self.split(x)
         rows = [phase.rows(part) for phase, part in parts]
-        rows.append(self.mean_values(x))
+        rows.append(self.means.values(parts))
         rows += [link.rows(parts) for link in self.links]
         return np.concatenate(rows)
 
@@ -279,42 +279,23 @@ class Program(Summary):
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `states` does."""
         parts = self.split(x)
         entries = [phase.jacobian(part) for phase, part in parts]
-        entries.append(self._mean_slopes(x).ravel())
+        entries.append(self.means.slopes(parts).ravel())
         entries += [link.jacobian(parts) for link in self.links]
         return np.concatenate(entries)
 
-    def mean_values(self, x: np.ndarray) -> np.ndarray:
-        """Means over the whole motion of the values that are held as means, (m,)."""
-        if not self.means:
-            return np.empty(0)
-        sums = []
-        for phase, part in self.split(x):
-            sums.append(part[0] * phase.means(part))
-            if phase.pause:
-                sums.append(phase.pause * phase.values_at_rest(part))
-        return np.asarray(sum(sums) / self.end_time(x))
+    def curvature(self, x: np.ndarray) -> Curvature | None:
+        """Return what means add to the Hessian of the Lagrangian, its Gauss-Newton part; None without means."""
+        if not len(self.means):
+            return None
+        # Squares of accelerations fall with the fourth power of the time: dT/d(mean) = -T/4 if the mean alone holds.
+        guess = np.zeros(len(self.lower))
+        guess[self._mean_rows] = -0.25 * self.end_time(x) / len(self.means)
+        return Curvature(self._find_hessian, guess)
 
-    def _mean_slopes(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of `mean_values`, (m, v)."""
-        if not self.means:
-            return np.empty((0, len(x)))
-        total = self.mean_values(x)
-        columns = []
-        for phase, part in self.split(x):
-            own = part[0] * phase.mean_slopes(part)
-            own[:, 0] += phase.means(part) - total
-            if phase.pause:
-                own += phase.pause * phase.slopes_at_rest(part)
-            columns.append(own)
-        return np.hstack(columns) / self.end_time(x)
-
-    def violation_of_means(self, x: np.ndarray) -> float:
-        """How far the limits that hold over the whole motion are violated; -inf without such limits."""
-        ends = np.cumsum([len(limit.lower) for limit in self.means])
-        values = np.split(self.mean_values(x), ends[:-1])
-        pairs = zip(self.means, values, strict=False)
-        found = [limit.violation(own[None]).max() for limit, own in pairs]
-        return float(max(found, default=-np.inf))
+    def _find_hessian(self, x: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """Return that part by the multipliers of all rows."""
+        weights = -multipliers[self._mean_rows].clip(max=0.0)
+        return self.means.curvature(self.split(x), weights)
 
     @property
     def limits(self) -> tuple[Limit, ...]:
@@ -328,9 +309,10 @@ class Program(Summary):
         One row of numbers, (1, c), where its means are held.
         """
         if limit.guarantee.is_mean:
-            number = next(i for i, own in enumerate(self.means) if own is limit)
-            before = sum(len(own.lower) for own in self.means[:number])
-            first = self._first_rows[len(self.phases)] + before
+            limits = self.means.limits
+            number = next(i for i, own in enumerate(limits) if own is limit)
+            before = sum(len(own.lower) for own in limits[:number])
+            first = self._mean_rows.start + before
             return np.arange(first, first + len(limit.lower))[None]
         # The links' rows come behind.
         pairs = zip(self.phases, self._first_rows, strict=False)

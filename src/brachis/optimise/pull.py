@@ -35,6 +35,7 @@ class Pulled:
         self.jacobian_columns = program.jacobian_columns
         self.rows = program.rows
         self.jacobian = program.jacobian
+        self.curvature = program.curvature
 
     def objective(self, x: np.ndarray) -> float:
         """Objective of the program, and the pull."""

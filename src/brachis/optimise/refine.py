@@ -117,7 +117,7 @@ def violations(
     violation = max(largest for largest, _ in found)
     missing = [own for _, own in found]
     if np.isfinite(violation):
-        of_means = dense.violation_of_means(x)
+        of_means = dense.means.violation(dense.split(x))
         violation = max(violation, of_means)
         if of_means > goal:  # too few points everywhere
             pairs = zip(dense.phases, missing, strict=True)

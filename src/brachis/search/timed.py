@@ -28,9 +28,7 @@ _LONGEST = 0.1
 
 def solvers_of(problem: Problem) -> list[str]:
     """Names of the solvers for a problem, the one that is tried first at the front."""
-    curved = any(limit.guarantee.is_mean for limit in problem.limits)
-    found = solvers_for(problem.task.solver.name, curved=curved)
-    return [solver.name for solver in found]
+    return [solver.name for solver in solvers_for(problem.task.solver.name)]
 
 
 def begin_with_timing(

@@ -280,7 +280,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
         No backend found a feasible point, and x is not feasible either.
     """
     answers = []
-    for solver in solvers_for("auto", curved=bool(program.means)):
+    for solver in solvers_for("auto"):
         try:
             report = solver.solve(program, x, SolverOptions(tolerance=1e-8), None)
         except ImportError:

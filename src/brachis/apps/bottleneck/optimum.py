@@ -73,7 +73,7 @@ def solve_again(trajectory: Trajectory, listener: Listener = ignore) -> SolvedPr
             program, x = _over_few_knots(program, x, task.spline.points_per_interval)
             longest = 0.01  # a timing may be faster than splines over few knots
         has_law = any(phase.time_law is not None for phase in program.phases)
-        for backend in solvers_for(task.solver.name, curved=bool(program.means)):
+        for backend in solvers_for(task.solver.name):
             if deadline.passed:
                 break
             solve = SolverSession.for_task(

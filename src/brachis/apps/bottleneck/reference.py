@@ -210,7 +210,7 @@ def _plan_on_mesh(
 
 def _violation(answer: SolvedProgram) -> float:
     """Largest violation of a limit on a dense grid and on both sides of every knot; infinite if out of reach."""
-    violations = [answer.program.violation_of_means(answer.x)]
+    violations = [answer.program.means.violation(answer.program.split(answer.x))]
     for phase, x in answer.program.split(answer.x):
         breaks = phase.breaks
         grid = np.linspace(0.0, 1.0, 30 * phase.intervals + 1)

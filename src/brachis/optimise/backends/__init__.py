@@ -6,6 +6,7 @@ from brachis.optimise.backends.child_process import Solver
 from brachis.optimise.backends.monitor import objective_at, residual
 from brachis.optimise.backends.protocol import (
     FEASIBLE,
+    Curvature,
     Problem,
     Progress,
     SolverOptions,
@@ -17,6 +18,7 @@ __all__ = [
     "AUTO_ORDER",
     "FEASIBLE",
     "NAMES",
+    "Curvature",
     "Problem",
     "Progress",
     "SolveStatus",
@@ -34,26 +36,22 @@ TABLE = {
 }
 AUTO_ORDER = tuple(TABLE)
 """The order in which ``auto`` tries them."""
-CURVED_ORDER = ("slsqp", "uno", "ipopt")
-"""That order where a mean over the motion is held: its optimum is inside an edge, and a full Hessian pays."""
 NAMES = ("auto", *TABLE)
 
 
-def solvers_for(name: str, *, curved: bool = False) -> tuple[Solver, ...]:
+def solvers_for(name: str) -> tuple[Solver, ...]:
     """Backends to try for a name, in order: one, or all for ``auto``.
 
     Parameters
     ----------
     name : str
-    curved : bool, optional
-        Whether a mean over the whole motion is held.
 
     Raises
     ------
     UnknownNameError
     """
     if name == "auto":
-        return tuple(TABLE[each] for each in (CURVED_ORDER if curved else AUTO_ORDER))
+        return tuple(TABLE[each] for each in AUTO_ORDER)
     if name not in TABLE:
         raise UnknownNameError("solver", name, NAMES, where="solver.name")
     return (TABLE[name],)

@@ -40,6 +40,22 @@ class SolveStatus(enum.Enum):
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Curvature:
+    """What is known of the Hessian of a problem's Lagrangian, L = objective - multipliers . rows.
+
+    Attributes
+    ----------
+    hessian : callable
+        ``hessian(x, multipliers)`` returns the known part, (v, v), by multipliers, (c,).
+    multipliers : (c,) ndarray
+        A guess, for as long as those of a solver make the known part zero.
+    """
+
+    hessian: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    multipliers: np.ndarray
+
+
 class Problem(Protocol):
     """A sparse nonlinear program; `brachis.optimise.program.Program` is one."""
 
@@ -72,6 +88,10 @@ class Problem(Protocol):
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern; raises UnreachableError as `rows` does."""
+        ...
+
+    def curvature(self, x: np.ndarray) -> Curvature | None:
+        """Return what is known of the Lagrangian's Hessian in a solve from x; None if that is nothing."""
         ...
 
 

@@ -1,7 +1,8 @@
 """Uno (Vanaret and Leyffer): an active-set SQP with a filter and a trust region, the default.
 
 Bang-bang optima are vertices of the feasible set, which an active-set method reaches in a few steps. The Hessian is
-Uno's limited-memory approximation, the subproblem solver its BQPD. https://github.com/cvanaret/Uno
+Uno's limited-memory approximation, or, where a problem knows a part of it, that of `secant`; the subproblem solver is
+its BQPD. https://github.com/cvanaret/Uno
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
 from brachis.optimise.backends.protocol import Problem, SolverReport, SolveStatus
+from brachis.optimise.backends.secant import SecantHessian
 
 NAME = "uno"
 
@@ -202,6 +204,9 @@ def _run(
         problem.jacobian_columns.tolist(),
         scale(monitor.jacobian, units[problem.jacobian_columns]),
     )
+    known = problem.curvature(x)
+    if known is not None:
+        _set_hessian(model, SecantHessian(problem, known), units)
     model.set_initial_primal_iterate((x / units).tolist())
     settings = {
         "primal_tolerance": options.tolerance,
@@ -213,3 +218,20 @@ def _run(
     backend = _backend(settings)
     backend.set_termination_callback(terminate)
     return backend.optimize(model)
+
+
+def _set_hessian(model: Any, hessian: SecantHessian, units: np.ndarray) -> None:
+    """Let Uno take a Hessian in place of its own approximation."""
+    import unopy
+
+    rows, columns = np.tril_indices(len(units))
+    factors = units[rows] * units[columns]
+
+    def write(
+        point: np.ndarray, multiplier: float, multipliers: np.ndarray, out: np.ndarray
+    ) -> None:
+        matrix = hessian(units * point, multiplier, np.array(multipliers))
+        out[:] = factors * matrix[rows, columns]
+
+    entries = (rows.tolist(), columns.tolist())
+    model.set_lagrangian_hessian(len(rows), unopy.LOWER_TRIANGLE, *entries, write)

@@ -1,0 +1,149 @@
+"""Means over the whole motion: their values, slopes and curvature.
+
+A mean is held over all phases, and over the pauses at rest between them, by their durations.
+
+Values that are held as means are squares f^2. The Hessian of their mean has the Gauss-Newton part 2 f' f'^T, which
+follows from the slopes g = 2 f f' as g g^T / (2 f^2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from brachis.limits import Limit, Moments, Partials
+from brachis.optimise.phase import Phase
+
+_NO_SQUARE = 1e-12
+"""Least square that counts: where a value is nearly zero, so are its slopes."""
+
+Parts = Sequence[tuple[Phase, np.ndarray]]
+"""Phases, each with its variables."""
+
+
+class Means:
+    """Means of the limits' values that are held as means.
+
+    Parameters
+    ----------
+    limits : sequence of Limit
+        Of the phases.
+
+    Attributes
+    ----------
+    limits : tuple of Limit
+        Those whose means are held.
+    lower, upper : (m,) ndarray
+        Their bounds.
+    """
+
+    def __init__(self, limits: Sequence[Limit]) -> None:
+        self.limits = tuple(limit for limit in limits if limit.guarantee.is_mean)
+        none = np.empty(0)
+        self.lower = np.concatenate([none, *(limit.lower for limit in self.limits)])
+        self.upper = np.concatenate([none, *(limit.upper for limit in self.limits)])
+
+    def __len__(self) -> int:
+        """Count the values, m."""
+        return len(self.lower)
+
+    def values(self, parts: Parts) -> np.ndarray:
+        """Means over all phases, (m,); raises UnreachableError as `Phase.evaluate` does."""
+        if not self.limits:
+            return np.empty(0)
+        sums = []
+        for phase, x in parts:
+            sums.append(x[0] * _means_of(phase, x))
+            if phase.pause:
+                sums.append(phase.pause * self._values_at_rest(phase, x))
+        return np.asarray(sum(sums) / _end_time(parts))
+
+    def slopes(self, parts: Parts) -> np.ndarray:
+        """Slopes of the values by all variables, (m, v)."""
+        total = self.values(parts)
+        columns = [np.empty((len(self), 0))]
+        for phase, x in parts if self.limits else ():
+            own = x[0] * _mean_slopes_of(phase, x)
+            own[:, 0] += _means_of(phase, x) - total
+            if phase.pause:
+                own += phase.pause * self._slopes_at_rest(phase, x)
+            columns.append(own)
+        return np.hstack(columns) / _end_time(parts)
+
+    def curvature(self, parts: Parts, weights: np.ndarray) -> np.ndarray:
+        """Gauss-Newton part of the Hessian, (v, v), of the values' sum with weights, (m,); see the module."""
+        ends = np.cumsum([0, *(len(x) for _, x in parts)])
+        total = np.zeros((ends[-1], ends[-1]))
+        for (phase, x), first in zip(parts, ends, strict=False):
+            own = slice(first, first + len(x))
+            share = x[0] / _end_time(parts)
+            total[own, own] = share * _curvature_of(phase, x, weights)
+        return total
+
+    def violation(self, parts: Parts) -> float:
+        """How far the limits are violated; -inf without any."""
+        ends = np.cumsum([len(limit.lower) for limit in self.limits])
+        values = np.split(self.values(parts), ends[:-1])
+        pairs = zip(self.limits, values, strict=False)
+        found = [limit.violation(own[None]).max() for limit, own in pairs]
+        return float(max(found, default=-np.inf))
+
+    def _values_at_rest(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Values while the arm waits at the phase's end, (m,)."""
+        still = Moments.at_rest(phase.state(x).q[-1:])
+        return np.concatenate([limit.values(still)[0] for limit in self.limits])
+
+    def _slopes_at_rest(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Slopes of `_values_at_rest`, (m, v)."""
+        state = phase.state(x)
+        still = Moments.at_rest(state.q[-1:])
+        by_q = [_by_posture(limit.partials(still), still.q) for limit in self.limits]
+        at_end = np.concatenate(by_q) @ state.gradient[-1]
+        by_y = np.zeros((1, len(phase.t_norm), *at_end.shape))
+        by_y[0, -1] = at_end
+        return phase.sum_up(phase.slopes_by_variables(by_y, x))
+
+
+def _end_time(parts: Parts) -> float:
+    """Time of all phases and pauses, s."""
+    return float(sum(x[0] + phase.pause for phase, x in parts))
+
+
+def _means_of(phase: Phase, x: np.ndarray) -> np.ndarray:
+    """Means over one phase, (m,)."""
+    values = phase.evaluate(x).values[:, phase.evaluator.is_mean]
+    return np.asarray(phase.mean_weights(x) @ values)
+
+
+def _mean_slopes_of(phase: Phase, x: np.ndarray) -> np.ndarray:
+    """Slopes of the means over one phase, (m, v)."""
+    is_mean = phase.evaluator.is_mean
+    evaluation = phase.evaluate(x)
+    slopes = phase.slopes_by_variables(evaluation.slopes, x)[:, is_mean]
+    total = phase.sum_up(slopes, phase.mean_weights(x))
+    by_lengths = phase.grid.mean_slopes
+    total[:, phase.lengths] += evaluation.values[:, is_mean].T @ by_lengths.T
+    return total
+
+
+def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Gauss-Newton part of the Hessian, (v, v), of the means over one phase with weights, (m,)."""
+    is_mean = phase.evaluator.is_mean
+    evaluation = phase.evaluate(x)
+    squares = evaluation.values[:, is_mean].clip(_NO_SQUARE)
+    factors = phase.mean_weights(x)[:, None] * weights / (2.0 * squares)
+    slopes = phase.slopes_by_variables(evaluation.slopes, x)[:, is_mean]
+    rows = phase.spread_slopes(slopes)
+    return np.asarray(
+        (rows * factors[:, :, None]).reshape(-1, len(x)).T @ rows.reshape(-1, len(x))
+    )
+
+
+def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:
+    """Slopes of a limit at rest by the posture, (c, n); zero where it does not depend on it."""
+    if partials.q is None:
+        parts = (partials.qdot, partials.qddot, partials.qdddot)
+        other = next(part for part in parts if part is not None)
+        return np.zeros((other.shape[1], q.shape[1]))
+    return np.asarray(partials.q[0])

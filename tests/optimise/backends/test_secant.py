@@ -1,0 +1,93 @@
+"""Hessians of which a part is known, and solves with them."""
+
+import numpy as np
+import pytest
+
+from brachis.optimise.backends import Curvature, SolverOptions, solvers_for
+from brachis.optimise.backends.secant import SecantHessian
+from support.programs import Program
+
+SIZE = 30
+RNG = np.random.default_rng(4)
+COSTS = RNG.normal(size=SIZE)
+FACTORS = RNG.normal(size=(SIZE, SIZE)) * np.geomspace(1.0, 30.0, SIZE)
+SQUARES = FACTORS.T @ FACTORS
+OPTIMUM = -np.linalg.solve(SQUARES, COSTS)
+OPTIMUM = OPTIMUM / np.sqrt(OPTIMUM @ SQUARES @ OPTIMUM)
+
+
+class Ellipsoid(Program):
+    """Go as far along the costs as an ellipsoid allows, which knows a part of its curvature, or nothing."""
+
+    known: float | None = 1.0
+
+    def curvature(self, _x):
+        if self.known is None:
+            return None
+        return Curvature(
+            lambda _x, multipliers: -2.0 * self.known * multipliers[0] * SQUARES,
+            np.array([-1.0]),
+        )
+
+
+def ellipsoid(known: float | None) -> Ellipsoid:
+    program = Ellipsoid(
+        COSTS,
+        lambda x: np.array([x @ SQUARES @ x]),
+        lambda x: 2.0 * (SQUARES @ x)[None],
+        np.array([-np.inf]),
+        np.ones(1),
+        np.full(SIZE, -10.0),
+        np.full(SIZE, 10.0),
+    )
+    program.known = known
+    return program
+
+
+def solve(known: float | None):
+    (uno,) = solvers_for("uno")
+    start = 0.1 * np.ones(SIZE) / np.sqrt(SIZE)
+    return uno.solve(ellipsoid(known), start, SolverOptions(1e-8), None)
+
+
+@pytest.mark.parametrize("known", [1.0, 0.5])
+def test_the_optimum_on_an_ellipsoid_is_found_in_few_iterations(known):
+    report = solve(known)
+    assert report.status.usable
+    np.testing.assert_allclose(COSTS @ report.x, COSTS @ OPTIMUM, rtol=1e-7)
+    assert report.iterations < 0.5 * solve(None).iterations
+
+
+def test_steps_teach_what_is_not_known():
+    problem = ellipsoid(0.7)
+    known = problem.curvature(None)
+    hessian = SecantHessian(problem, known)
+    multipliers = np.array([-1.3])
+    exact = 2.6 * SQUARES
+    x = np.zeros(SIZE)
+    hessian(x, 1.0, multipliers)
+    for _ in range(5):
+        step = RNG.normal(size=SIZE)
+        x = x + step
+        found = hessian(x, 1.0, multipliers)
+    np.testing.assert_allclose(found @ step, exact @ step, rtol=1e-9)
+    # A restoration teaches nothing.
+    np.testing.assert_allclose(hessian(x + step, 0.0, multipliers), found, rtol=1e-12)
+
+
+def test_no_eigenvalue_is_negative():
+    problem = ellipsoid(3.0)  # more than there is
+    hessian = SecantHessian(problem, problem.curvature(None))
+    for _ in range(4):
+        found = hessian(RNG.normal(size=SIZE), 1.0, np.array([-1.0]))
+        assert np.linalg.eigvalsh(found).min() > -1e-9 * np.abs(found).max()
+
+
+def test_without_multipliers_the_last_ones_count():
+    problem = ellipsoid(1.0)
+    hessian = SecantHessian(problem, problem.curvature(None))
+    none = np.zeros(1)
+    np.testing.assert_allclose(hessian(np.zeros(SIZE), 1.0, none), 2.0 * SQUARES)
+    hessian(np.ones(SIZE), 1.0, np.array([-3.0]))
+    again = hessian(np.ones(SIZE), 1.0, none)
+    np.testing.assert_allclose(again, 6.0 * SQUARES, rtol=1e-9)
