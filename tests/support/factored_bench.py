@@ -23,7 +23,7 @@ class Bench:
         self,
         robot,
         redundant,
-        postures=800,
+        postures=300,
         seed=5,
         family=spherical_wrist,
         rows="pose",
