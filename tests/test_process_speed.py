@@ -50,8 +50,8 @@ def fastest(speed: float) -> float:
 
 
 def sampled(trajectory):
-    """s and the tool's speed by differences, at 20,000 times."""
-    t = np.linspace(0.0, trajectory.t_end, 20_001)
+    """s and the tool's speed by differences, at 5,000 times."""
+    t = np.linspace(0.0, trajectory.t_end, 5_001)
     motion = trajectory.at(t)
     positions, _ = trajectory.robot.tool_placements(motion.q)
     return motion.s, np.linalg.norm(np.gradient(positions, t, axis=0), axis=1)
