@@ -75,7 +75,7 @@ def test_the_speed_is_met_and_reached_and_left_fast():
     assert fastest(SPEED) <= result.t_end < 1.05 * fastest(SPEED)
 
 
-@pytest.mark.parametrize("speed", [1.0, 0.3, 0.1])
+@pytest.mark.parametrize("speed", [1.0, 0.1])
 def test_with_enough_knots_it_is_the_optimum(speed):
     part = {**PART, "speed": speed}
     result = brachis.plan(task(part, intervals="auto", tolerance=5e-4))
