@@ -185,9 +185,7 @@ def test_robot_part_of_the_readme_is_one(clone):
 
 def test_example_03(monkeypatch):
     module = load(ROOT / "examples/03_tx90l_rail_line.py")
-    monkeypatch.setattr(
-        module, "JOINTS", ("rail",)
-    )  # one of the lines, for time
+    monkeypatch.setattr(module, "JOINTS", ("rail",))  # one of the lines, for time
     results = module.plan_all()
     assert len(results) == 3
     assert all(result.verified for result in results.values())
@@ -233,9 +231,7 @@ def test_example_06(monkeypatch):
 
 def test_example_07(monkeypatch):
     module = load(ROOT / "examples/07_find_the_fastest.py")
-    monkeypatch.setattr(
-        module, "ANGLES_DEG", (45, 180)
-    )  # some of the lines, for time
+    monkeypatch.setattr(module, "ANGLES_DEG", (45, 180))  # some of the lines, for time
     results = module.plan_all()
     assert all(result.verified for result in results.values())
     for angle in module.ANGLES_DEG:

@@ -26,9 +26,10 @@ def saved(line_trajectory, tmp_path_factory):
     """The same figure in two files of every format, by its suffix."""
     folder = tmp_path_factory.mktemp("figures")
     files = {suffix: [folder / f"{k}.{suffix}" for k in "ab"] for suffix in SUFFIXES}
-    for path in sum(files.values(), []):
+    paths = [path for pair in files.values() for path in pair]
+    for path in paths:
         save_figure(plot_torques(line_trajectory), path)
-    assert set(folder.iterdir()) == set(sum(files.values(), []))
+    assert set(folder.iterdir()) == set(paths)
     return files
 
 
