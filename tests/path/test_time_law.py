@@ -136,7 +136,8 @@ def test_a_narrow_turn_is_passed_to_the_rounding_of_times() -> None:
     assert np.quantile(off, 0.9) < 1e-9
 
 
-def test_a_cusp_has_no_constant_speed() -> None:
+def test_a_cusp_has_no_constant_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("brachis.path.time_law._MOST_INTERVALS", 1000)  # for time
     task_map, path = turning_back(0.0)
     with pytest.raises(PathError, match="bends too abruptly") as caught:
         time_law_of(Leg(0.1, 0.9, speed=0.1), task_map, path)
