@@ -135,9 +135,9 @@ def test_example_01_python(capsys):
 
 def test_example_02(monkeypatch):
     module = load(ROOT / "examples/02_scara_table.py")
-    monkeypatch.setattr(module, "ANGLES_DEG", (90, 180))  # some of the lines, for time
+    monkeypatch.setattr(module, "ANGLES_DEG", (90,))  # one of the lines, for time
     results = module.plan_all()
-    assert len(results) == 6
+    assert len(results) == 3
     assert all(result.verified for result in results.values())
     assert (
         max(result.verification.worst_ratio for result in results.values()) <= 1 + 1e-4

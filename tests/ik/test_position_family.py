@@ -124,7 +124,7 @@ def test_built_arms_with_all_choices_of_redundant_joints(name):
         rest = [i for i in range(robot.n) if i not in redundant]
         singular = np.abs(np.linalg.det(jacobian[:, :, rest])).max() < 1e-9
         try:
-            bench(robot, redundant, 200).check()
+            bench(robot, redundant, 200).check(with_gradient=False)
         except NotApplicableError as reason:
             named = all(robot.joint_names[i] in str(reason) for i in rest)
             says_so = str(reason).startswith("J_nr is singular everywhere")
