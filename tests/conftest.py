@@ -18,13 +18,13 @@ import pytest
 
 _TESTS = Path(__file__).resolve().parent
 _LONG = (
+    "test_browser.py",
     "test_readme.py",
-    "test_random_poses.py",
-    "test_random_lines.py",
+    "test_wheel.py",
     "test_fuzz.py",
     "test_auto_on_robots.py",
 )
-"""Tests of these files take up to a minute each: they come first, so that no worker is left alone with one at last."""
+"""Tests of these files take longest: they come first, so that no worker is left alone with one at last."""
 _CHROMIUM = (
     "--headless",
     "--no-sandbox",
