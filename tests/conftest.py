@@ -18,13 +18,13 @@ import pytest
 
 _TESTS = Path(__file__).resolve().parent
 _LONG = (
+    "test_browser.py",
     "test_readme.py",
-    "test_random_poses.py",
-    "test_random_lines.py",
+    "test_wheel.py",
     "test_fuzz.py",
     "test_auto_on_robots.py",
 )
-"""Tests of these files take up to a minute each: they come first, so that no worker is left alone with one at last."""
+"""Tests of these files take longest: they come first, so that no worker is left alone with one at last."""
 _CHROMIUM = (
     "--headless",
     "--no-sandbox",
@@ -93,7 +93,7 @@ def wall_clock(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def rough_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures of few pixels and with no layout, which take a third of the time; tests of plots have the real ones."""
+    """Figures that are made and written as files of few pixels, but not drawn; tests of plots have the real ones."""
     from brachis.apps.plots import style
 
     honest = style.new_figure
@@ -101,6 +101,7 @@ def rough_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     def rough(width: float, height: float) -> Any:
         figure = honest(width, height)
         figure.set_layout_engine("none")
+        figure.draw = lambda _renderer: None
         return figure
 
     monkeypatch.setattr(style, "new_figure", rough)

@@ -131,13 +131,21 @@ def imports_of(
     return frozenset(names)
 
 
+def function_name(call: ast.Call) -> str:
+    """Name of the function that is called, without the module that it comes from."""
+    named = call.func
+    if isinstance(named, ast.Attribute):
+        return named.attr
+    return named.id if isinstance(named, ast.Name) else ""
+
+
 def modules_named(module: str) -> frozenset[str]:
     """Modules that a module imports by a string."""
     calls = [node for node in ast.walk(tree_of(module)) if isinstance(node, ast.Call)]
-    importing = [call for call in calls if "import_module" in ast.unparse(call.func)]
-    return frozenset(
-        name for name in FILES for call in importing if f"'{name}'" in ast.unparse(call)
-    )
+    importing = [call for call in calls if function_name(call) == "import_module"]
+    inside = [node for call in importing for node in ast.walk(call)]
+    words = {node.value for node in inside if isinstance(node, ast.Constant)}
+    return frozenset(words & set(FILES))
 
 
 @cache

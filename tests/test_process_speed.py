@@ -51,8 +51,8 @@ def fastest(speed: float) -> float:
 
 
 def sampled(trajectory):
-    """s and the tool's speed by differences, at 20,000 times."""
-    t = np.linspace(0.0, trajectory.t_end, 20_001)
+    """s and the tool's speed by differences, at 5,000 times."""
+    t = np.linspace(0.0, trajectory.t_end, 5_001)
     motion = trajectory.at(t)
     positions, _ = trajectory.robot.tool_placements(motion.q)
     return motion.s, np.linalg.norm(np.gradient(positions, t, axis=0), axis=1)
@@ -76,7 +76,7 @@ def test_the_speed_is_met_and_reached_and_left_fast():
     assert fastest(SPEED) <= result.t_end < 1.05 * fastest(SPEED)
 
 
-@pytest.mark.parametrize("speed", [1.0, 0.3, 0.1])
+@pytest.mark.parametrize("speed", [1.0, 0.1])
 def test_with_enough_knots_it_is_the_optimum(speed):
     part = {**PART, "speed": speed}
     result = brachis.plan(task(part, intervals="auto", tolerance=5e-4))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import re
 import shlex
@@ -134,9 +135,9 @@ def test_example_01_python(capsys):
 
 def test_example_02(monkeypatch):
     module = load(ROOT / "examples/02_scara_table.py")
-    monkeypatch.setattr(module, "ANGLES_DEG", (90, 180))  # some of the lines, for time
+    monkeypatch.setattr(module, "ANGLES_DEG", (90,))  # one of the lines, for time
     results = module.plan_all()
-    assert len(results) == 6
+    assert len(results) == 3
     assert all(result.verified for result in results.values())
     assert (
         max(result.verification.worst_ratio for result in results.values()) <= 1 + 1e-4
@@ -184,11 +185,9 @@ def test_robot_part_of_the_readme_is_one(clone):
 
 def test_example_03(monkeypatch):
     module = load(ROOT / "examples/03_tx90l_rail_line.py")
-    monkeypatch.setattr(
-        module, "JOINTS", ("rail", "joint_2")
-    )  # half of the lines, for time
+    monkeypatch.setattr(module, "JOINTS", ("rail",))  # one of the lines, for time
     results = module.plan_all()
-    assert len(results) == 6
+    assert len(results) == 3
     assert all(result.verified for result in results.values())
     assert results["rail", 10].t_end <= 0.4275
     assert results["rail", 20].t_end <= 0.4027
@@ -220,7 +219,10 @@ def test_example_05(monkeypatch):
     assert all(result.verified for result in results.values())
 
 
-def test_example_06():
+def test_example_06(monkeypatch):
+    # Which of equally fast motions it is does not matter here.
+    fastest = functools.partial(brachis.plan, least_motion=False)
+    monkeypatch.setattr(brachis, "plan", fastest)
     results = load(ROOT / "examples/06_free_roll.py").main()
     assert all(result.verified for result in results.values())
     assert results["free roll"].t_end < results["fixed"].t_end
@@ -229,9 +231,7 @@ def test_example_06():
 
 def test_example_07(monkeypatch):
     module = load(ROOT / "examples/07_find_the_fastest.py")
-    monkeypatch.setattr(
-        module, "ANGLES_DEG", (45, 180, 315)
-    )  # some of the lines, for time
+    monkeypatch.setattr(module, "ANGLES_DEG", (45, 180))  # some of the lines, for time
     results = module.plan_all()
     assert all(result.verified for result in results.values())
     for angle in module.ANGLES_DEG:
@@ -242,9 +242,8 @@ def test_example_07(monkeypatch):
         )
     assert results[180, "auto"].t_end <= 2.10
     # The path begins on the x axis: a line and its mirror image only differ by the start posture.
-    assert results[45, "free start"].t_end == pytest.approx(
-        results[315, "free start"].t_end, rel=2e-3
-    )
+    mirrored = brachis.plan(module.variants(315)["free start"])
+    assert results[45, "free start"].t_end == pytest.approx(mirrored.t_end, rel=2e-3)
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
 
 
@@ -317,14 +316,18 @@ def test_example_13():
 
 
 @pytest.mark.parametrize(
-    "name", ["14_round_the_post", "15_tilted_torch", "16_into_the_car_body"]
+    ("name", "changes"),
+    [
+        ("14_round_the_post", {}),
+        ("15_tilted_torch", {"intervals": 10}),
+        # One closed form instead of all postures, and few intervals, for time.
+        ("16_into_the_car_body", {"intervals": 10, "redundant_joints": ["rail"]}),
+    ],
 )
-def test_examples_of_cells(name):
+def test_examples_of_cells(name, changes):
     """They keep their clearance and their cone, and say so."""
     task = brachis.load_task(ROOT / f"examples/{name}.yaml")
-    # Over as many intervals as anybody waits for.
-    spline = {} if task.spline.intervals != "auto" else {"intervals": 10}
-    result = brachis.plan(task, effort="single", least_motion=False, **spline)
+    result = brachis.plan(task, effort="single", least_motion=False, **changes)
     assert result.verified
     kinds = {check.name for check in result.verification.checks}
     assert kinds >= ({"clearance ratio"} if task.scene else {"tool tilt ratio"})

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shlex
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -12,8 +14,11 @@ import pytest
 
 import brachis
 from brachis.errors import UnknownNameError
+from brachis.kernel.compile import find_compiler
 
 ROOT = Path(__file__).parents[1]
+FOLDERS = ("src", "robots", "examples")
+FILES = ("pyproject.toml", "README.md", "LICENSE", "hatch_build.py")
 SCRIPT = """
 import brachis
 result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], intervals=8, effort="single")
@@ -39,7 +44,32 @@ def test_unknown_names_are_answered_with_those_there_are():
         _ = brachis.examples.scara
 
 
-def test_an_installed_wheel_plans_its_example(tmp_path):
+@pytest.fixture
+def source(tmp_path):
+    """The files of a source distribution without libraries, so that the kernel in use is not compiled anew."""
+    folder = tmp_path / "source"
+    folder.mkdir()
+    for name in (*FILES, *FOLDERS):
+        copy = shutil.copytree if name in FOLDERS else shutil.copy
+        copy(ROOT / name, folder / name)
+    for library in folder.rglob("*.so"):
+        library.unlink()
+    return folder
+
+
+@pytest.fixture
+def quick_compiler(tmp_path):
+    """The machine's compiler without optimisation, as its libraries are used for one small plan."""
+    command = find_compiler()
+    if command is None:
+        pytest.skip("there is no C compiler")
+    script = tmp_path / "cc"
+    script.write_text(f'#!/bin/sh\nexec {shlex.join(command)} "$@" -O0\n')
+    script.chmod(0o755)
+    return script
+
+
+def test_an_installed_wheel_plans_its_example(tmp_path, source, quick_compiler):
     build = [
         sys.executable,
         "-m",
@@ -50,7 +80,8 @@ def test_an_installed_wheel_plans_its_example(tmp_path):
         "-d",
         str(tmp_path),
     ]
-    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    compiling = {**os.environ, "CC": str(quick_compiler)}
+    subprocess.run(build, cwd=source, env=compiling, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
@@ -65,8 +96,8 @@ def test_an_installed_wheel_plans_its_example(tmp_path):
         text=True,
     )
     data = tmp_path / "site/brachis/data"
-    source, rail = done.stdout.splitlines()
-    assert Path(source).resolve() == data / "robots/scara3/robot.urdf"
+    urdf, rail = done.stdout.splitlines()
+    assert Path(urdf).resolve() == data / "robots/scara3/robot.urdf"
     assert (
         rail
         == f"{data}/robots/tx90l_rail/robot.urdf {len(brachis.robots.names())} {len(brachis.examples.names())}"

@@ -26,7 +26,7 @@ def macro_mini(first, second, turn, plane_rows):
     robot = Robot.from_urdf(
         "macro-mini", urdf_text=chain_urdf(joints, tool=(0.3, 0.02, 0.05))
     )
-    return Bench(robot, plane_rows, 2000)
+    return Bench(robot, plane_rows, 500)
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def macro_mini(first, second, turn, plane_rows):
     ids=str,
 )
 def test_gantries(axes, rows):
-    bench = Bench(gantry_robot(axes), rows, 2000)
+    bench = Bench(gantry_robot(axes), rows, 500)
     found = 0
     for redundant, exists in bench.decompositions():
         if exists:

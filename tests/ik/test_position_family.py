@@ -34,7 +34,7 @@ X, Y, Z = np.eye(3)
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
-def bench(robot, redundant, postures=800, rows="position"):
+def bench(robot, redundant, postures=300, rows="position"):
     return Bench(robot, redundant, postures, family=positioning, rows=rows)
 
 
@@ -75,9 +75,7 @@ def crane():
 
 
 @pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize(
-    "arrangement", ["alone", "backwards", "carried", "carried backwards"]
-)
+@pytest.mark.parametrize("arrangement", ["alone", "carried", "carried backwards"])
 def test_every_recipe(name, arrangement):
     rng = np.random.default_rng(len(name))
     axes, redundant = [*BASES[name]], ()
@@ -126,7 +124,7 @@ def test_built_arms_with_all_choices_of_redundant_joints(name):
         rest = [i for i in range(robot.n) if i not in redundant]
         singular = np.abs(np.linalg.det(jacobian[:, :, rest])).max() < 1e-9
         try:
-            bench(robot, redundant, 500).check()
+            bench(robot, redundant, 200).check(with_gradient=False)
         except NotApplicableError as reason:
             named = all(robot.joint_names[i] in str(reason) for i in rest)
             says_so = str(reason).startswith("J_nr is singular everywhere")

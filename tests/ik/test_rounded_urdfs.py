@@ -53,7 +53,7 @@ def bench_of(name, joints, postures=2000):
     return PoseBench(Family("found", lambda *_: solver, ""), robot, redundant, postures)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 5])
+@pytest.mark.parametrize("seed", [0, 5])
 @pytest.mark.parametrize("name", ARMS)
 def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
     _, exact = candidates(name, EXACT, seed)

@@ -118,7 +118,7 @@ def test_torque_that_falls_with_speed(slide, curve):
     assert expected > 1.05 * free
 
     def excess(planned):
-        dense = planned.trajectory.at(np.linspace(0.0, planned.t_end, 20_001))
+        dense = planned.trajectory.at(np.linspace(0.0, planned.t_end, 5_001))
         return (
             np.abs(dense.tau[:, 0]) - allowed(np.abs(dense.qdot[:, 0]))
         ).max() / FORCE
@@ -175,7 +175,7 @@ def test_a_speed_table_is_a_staircase_of_cruises(slide):
     assert result.t_end == pytest.approx(
         expected, rel=5e-3
     )  # the speed changes at three places, off the knots
-    motion = result.trajectory.at(np.linspace(0.0, result.t_end, 20_001))
+    motion = result.trajectory.at(np.linspace(0.0, result.t_end, 5_001))
     speed, s = np.abs(motion.qdot[:, 0]), motion.s
     assert speed[s >= step].max() <= slow * (1.0 + 1e-4)
     assert speed[s < step].max() == pytest.approx(fast, rel=1e-3)

@@ -44,7 +44,7 @@ def result(kind):
     return brachis.plan(task(**{kind: FIGURES[kind]}))
 
 
-def rates(trajectory, kind, count=20_000):
+def rates(trajectory, kind, count=5_000):
     """Differences of accelerations or torques over the saved motion, per second."""
     t = np.linspace(0.0, trajectory.t_end, count)
     values = trajectory.acceleration(t) if kind == "jerk" else trajectory.torque(t)

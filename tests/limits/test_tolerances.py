@@ -147,7 +147,7 @@ def leaning():
         "start": {"joints": [0.5, 0.4, 1.3, 0.0, np.pi / 2 - 0.13, 0.3]},
         "task_space": "pose",
         "path": [{"line": {"by": [0.1, -0.3, 0.05]}}],
-        "spline": {"intervals": "auto", "rest": "velocity"},
+        "spline": {"intervals": 12, "rest": "velocity"},
         "search": {"least_motion": False},
     }
     urdf = brachis.robots.tx90l_rail.source
@@ -196,7 +196,7 @@ def test_tolerances_that_gain_nothing_leave_the_tool_on_the_path():
         "path": [brachis.Line(by=[0.0, 0.5, 0.0])],
         "start": [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0],
         "task_space": "pose",
-        "intervals": 10,
+        "intervals": 8,
         "effort": "single",
     }
     plain = brachis.plan("iiwa14", **line)

@@ -31,7 +31,7 @@ def result(task):
     return brachis.plan(task)
 
 
-def speeds(trajectory, count=20_000):
+def speeds(trajectory, count=5_000):
     """Speed of the tool by differences of its position over the saved motion, m/s."""
     t = np.linspace(0.0, trajectory.t_end, count)
     positions, _ = trajectory.robot.tool_placements(trajectory.at(t).q)

@@ -57,7 +57,7 @@ def plan(
     redundant=(),
     robot=None,
     joints=None,
-    intervals=40,
+    intervals=20,
     degree=3,
     rest="velocity",
     solver="auto",

@@ -42,7 +42,7 @@ def rms(trajectory: Trajectory) -> np.ndarray:
 
 
 def free_roll() -> brachis.Task:
-    return task_with(brachis.examples.free_roll, effort="single", intervals=14)
+    return task_with(brachis.examples.free_roll, effort="single", intervals=10)
 
 
 def seven_joints() -> brachis.Task:

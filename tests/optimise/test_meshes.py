@@ -95,9 +95,9 @@ def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
 
 def test_a_motion_along_a_branch_boundary_is_verified_too():
     """Rounding is amplified there; more nodes than it allows made torques of 7 % too much."""
-    result = brachis.plan(robot(), task("j3", intervals="auto"))
+    result = brachis.plan(robot(), task("j3", intervals="auto", tolerance=0.004))
     assert result.verified
-    assert result.t_end < 2.335
+    assert result.t_end < 2.345
     assert len(result.trajectory.times) < 1500
 
 

@@ -18,7 +18,7 @@ from brachis.search.schedule import batches
 from brachis.search.starts import SEARCH_LEVELS
 
 ROOT = Path(__file__).parents[2]
-COARSE = {"cells_per_turn": 36, "nodes": 60}
+COARSE = {"cells_per_turn": 24, "nodes": 40}
 RAIL_LINE = ROOT / "examples/03_tx90l_rail_line.yaml"
 
 
@@ -37,10 +37,9 @@ def bench():
     return module
 
 
-@pytest.mark.parametrize("intervals", [10, 20])
-def test_auto_is_never_slower_than_the_rail_alone(intervals):
+def test_auto_is_never_slower_than_the_rail_alone():
     task = brachis.load_task(RAIL_LINE).to_dict()
-    task["spline"]["intervals"] = intervals
+    task["spline"]["intervals"] = 10
     rail = brachis.plan(task)
     auto = brachis.plan({**task, "redundant_joints": "auto"})
     assert rail.verified
@@ -103,7 +102,7 @@ def test_closed_forms_are_left_for_the_last(
 
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("scara3", 3), ("tx90l_rail", 1), ("ur10_rail", 1), ("iiwa14", 1)],
+    [("scara3", 1), ("tx90l_rail", 1), ("ur10_rail", 1), ("iiwa14", 1)],
 )
 def test_random_postures_and_lines_with_everything_left_open(bench, name, count):
     robot = {"scara3": bench.planar_arm()}.get(name) or brachis.Robot.from_urdf(

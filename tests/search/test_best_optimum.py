@@ -1,6 +1,6 @@
 """Two of the paper's lines with everything left open: at the best optimum that random restarts find.
 
-All lines, with three times as many restarts: `studies/scara_restarts.py`.
+All lines, with more restarts: `studies/scara_restarts.py`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import brachis
 from brachis.problem.problem import Problem
 
 ROOT = Path(__file__).parents[2]
-RESTARTS = 4
+RESTARTS = 3
 LINES_DEG = (180, 270)
 """One with two optima, and the one whose plans with different redundant joints differ most."""
 spec = importlib.util.spec_from_file_location(

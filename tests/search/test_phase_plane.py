@@ -108,26 +108,23 @@ def least_time_by_trial(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> f
     a = dynamics.torque(robot, q, zero, q_ds)
     b = dynamics.torque(robot, q, q_ds, q_dds)
 
-    def accelerations(k: int, x: float) -> tuple[float, float]:
-        low, high = np.sort(
-            [(-limit - b[k] * x) / a[k], (limit - b[k] * x) / a[k]], axis=0
-        )
-        return float(low.max()), float(high.min())
+    def accelerations(k: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        bias = b[k] * x[:, None]
+        low, high = np.sort([(-limit - bias) / a[k], (limit - bias) / a[k]], axis=0)
+        return low.max(axis=1), high.min(axis=1)
 
     grid = np.linspace(0.0, 4.0, 1001)
     reach = 0.0
     highest = np.zeros(len(s))
     for k in range(len(s) - 2, -1, -1):
-        bounds = [(x, *accelerations(k, x)) for x in grid]
-        good = [
-            x for x, low, high in bounds if low <= high and x + 2 * step * low <= reach
-        ]
-        reach = max(good, default=0.0)
+        low, high = accelerations(k, grid)
+        good = grid[(low <= high) & (grid + 2 * step * low <= reach)]
+        reach = good.max(initial=0.0)
         highest[k] = reach
     x = np.zeros(len(s))
     for k in range(len(s) - 1):
         x[k + 1] = np.clip(
-            x[k] + 2 * step * accelerations(k, x[k])[1], 0.0, highest[k + 1]
+            x[k] + 2 * step * accelerations(k, x[[k]])[1][0], 0.0, highest[k + 1]
         )
     speed = np.sqrt(np.maximum(x, 1e-6))
     return float(np.sum(2 * step / (speed[1:] + speed[:-1])))

@@ -191,11 +191,12 @@ def test_a_speed_that_joint_velocities_forbid(monkeypatch):
 def test_a_jerk_that_leaves_too_short_a_run_up(monkeypatch):
     """The phase plane knows no jerk, so that plans are tried: j t^3 / 6 takes 0.1 m to (j d^2)^(1/3) and less."""
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
+    few = {"spline": {"intervals": 6}, "search": {"effort": "single"}}
     with pytest.raises(
         brachis.PlanningError,
         match=r"no motion within the limits was found.*Lower tool_limits.process_speed\[0\].speed",
     ):
-        brachis.plan(slide(0.4, (0.2, 0.6), limits={"jerk": 2.0}))
+        brachis.plan(slide(0.4, (0.2, 0.6), limits={"jerk": 2.0}, **few))
 
 
 def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is_tried(
@@ -258,7 +259,8 @@ def test_two_speeds_that_are_too_high_are_both_named(monkeypatch):
 def test_a_speed_that_is_slightly_too_high_is_named_after_plans_failed(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     limits = {"velocity": 0.3}
-    content = slide(0.305, (0.3, 0.6), limits=limits)
+    few = {"spline": {"intervals": 6}, "search": {"effort": "single"}}
+    content = slide(0.305, (0.3, 0.6), limits=limits, **few)
     with monkeypatch.context() as patch:
         patch.setattr("brachis.search.candidates.solve_candidate", refuse)
         with pytest.raises(TriedError):

@@ -6,10 +6,15 @@ import contextlib
 import signal
 import sys
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
+import typer.main
 
 from brachis.apps.cli.main import main
+
+make_group = cache(typer.main.get_command)
+"""Typer's table of commands, which takes 0.05 s; a process of a user makes it once."""
 
 
 def code_of(*arguments: object, columns: int = 200) -> int:
@@ -17,6 +22,7 @@ def code_of(*arguments: object, columns: int = 200) -> int:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["brachis", *map(str, arguments)])
         patch.setenv("COLUMNS", str(columns))
+        patch.setattr(typer.main, "get_command", make_group)
         with pytest.raises(SystemExit) as stop:
             main()
     return int(stop.value.code or 0)

@@ -23,7 +23,7 @@ class Bench:
         self,
         robot,
         redundant,
-        postures=800,
+        postures=300,
         seed=5,
         family=spherical_wrist,
         rows="pose",
@@ -63,8 +63,8 @@ class Bench:
     def determinant(self, q):
         return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
 
-    def check(self):
-        """Hold the closed form to its promises."""
+    def check(self, *, with_gradient=True):
+        """Hold the closed form to its promises; slopes of margins are recorded anew for every one, which takes time."""
         postures = self.answers(self.q)
         finite = np.isfinite(postures).all(axis=2)
         solved = postures[:, :, self.rest]
@@ -107,7 +107,8 @@ class Bench:
         determinant = self.determinant(self.q)
         ratio = determinant[product > 1e-4] / margins[product > 1e-4, 0].prod(axis=1)
         np.testing.assert_allclose(ratio, ratio[0], rtol=1e-7)
-        self.check_gradient()
+        if with_gradient:
+            self.check_gradient()
         return self
 
     def check_gradient(self):

@@ -38,7 +38,7 @@ def check_of(result):
     return checks.get("clearance ratio")
 
 
-def dense(result, count=20_000):
+def dense(result, count=5_000):
     """Smallest distance on a fine grid, m."""
     trajectory = result.trajectory
     robot = robot_for(None, trajectory.task.robot)

@@ -21,20 +21,32 @@ from brachis.errors import InputError, NotInstalledError
 MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_the_suffix_gives_the_format(line_trajectory, tmp_path, suffix):
-    path = tmp_path / f"figure.{suffix.upper()}"
-    save_figure(plot_torques(line_trajectory), path)
-    assert path.read_bytes().startswith(MAGIC[suffix])
-    assert list(tmp_path.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_the_same_figure_gives_the_same_file(line_trajectory, tmp_path, suffix):
-    paths = [tmp_path / f"{k}.{suffix}" for k in range(2)]
+@pytest.fixture(scope="module")
+def saved(line_trajectory, tmp_path_factory):
+    """The same figure in two files of every format, by its suffix."""
+    folder = tmp_path_factory.mktemp("figures")
+    files = {suffix: [folder / f"{k}.{suffix}" for k in "ab"] for suffix in SUFFIXES}
+    paths = [path for pair in files.values() for path in pair]
     for path in paths:
         save_figure(plot_torques(line_trajectory), path)
-    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert set(folder.iterdir()) == set(paths)
+    return files
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_suffix_gives_the_format(saved, suffix):
+    assert all(path.read_bytes().startswith(MAGIC[suffix]) for path in saved[suffix])
+
+
+def test_the_suffix_may_be_in_capitals(tmp_path):
+    save_figure(Figure(), tmp_path / "figure.PNG")
+    assert (tmp_path / "figure.PNG").read_bytes().startswith(MAGIC["png"])
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_same_figure_gives_the_same_file(saved, suffix):
+    first, second = saved[suffix]
+    assert first.read_bytes() == second.read_bytes()
 
 
 @pytest.mark.parametrize("name", ["figure.jpg", "figure", "figure.csv"])
@@ -63,15 +75,19 @@ def test_figures_have_the_width_of_journal_columns(line_trajectory, name, width)
     )  # inches
 
 
-def test_pixels_are_those_of_300_dpi(line_trajectory, tmp_path):
-    save_figure(plot_torques(line_trajectory), tmp_path / "figure.png")
-    pixels = struct.unpack(">I", (tmp_path / "figure.png").read_bytes()[16:20])[0]
+def test_pixels_are_those_of_300_dpi(saved):
+    pixels = struct.unpack(">I", saved["png"][0].read_bytes()[16:20])[0]
     assert pixels == pytest.approx(89.0 / 25.4 * 300.0, abs=1.0)
 
 
-@pytest.mark.parametrize("name", sorted(PLOTS))
-@pytest.mark.parametrize("fixture", ["line_trajectory", "spatial_trajectory"])
-def test_all_text_is_readable_and_inside_the_figure(name, fixture, request):
+@pytest.mark.parametrize(
+    ("fixture", "name"),
+    [
+        *(("spatial_trajectory", name) for name in sorted(PLOTS)),
+        ("line_trajectory", "overview"),  # with the picture of a planar arm
+    ],
+)
+def test_all_text_is_readable_and_inside_the_figure(fixture, name, request):
     figure = PLOTS[name](request.getfixturevalue(fixture))
     figure.draw_without_rendering()
     texts = [
@@ -99,16 +115,12 @@ def test_all_text_is_readable_and_inside_the_figure(name, fixture, request):
         ), text.get_text()
 
 
-def test_pdf_fonts_are_truetype_and_svg_text_is_text(line_trajectory, tmp_path):
-    figure = plot_torques(line_trajectory)
-    save_figure(figure, tmp_path / "figure.pdf")
-    content = (tmp_path / "figure.pdf").read_bytes()
+def test_pdf_fonts_are_truetype_and_svg_text_is_text(saved):
+    content = saved["pdf"][0].read_bytes()
     assert b"/CIDFontType2" in content
     assert b"/Type3" not in content
-    save_figure(figure, tmp_path / "figure.svg")
-    assert re.search(
-        r"<text[^>]*>j1</text>", (tmp_path / "figure.svg").read_text(encoding="utf-8")
-    )
+    content = saved["svg"][0].read_text(encoding="utf-8")
+    assert re.search(r"<text[^>]*>j1</text>", content)
 
 
 def test_joints_are_told_apart():
@@ -140,8 +152,8 @@ from brachis.trajectory import Trajectory
 from brachis.apps.plots import PLOTS, plot_comparison, save_figure, style
 style._DPI = 30
 trajectory = Trajectory.load(sys.argv[1])
-for name, plot in PLOTS.items():
-    save_figure(plot(trajectory), f"{sys.argv[2]}/{name}.png")
+figures = {name: plot(trajectory) for name, plot in PLOTS.items()}
+save_figure(figures["overview"], f"{sys.argv[2]}/overview.png")  # has parts of all kinds
 save_figure(plot_comparison([(0.0, "j1", 1.0)]), f"{sys.argv[2]}/comparison.pdf")
 assert dict(dict.items(matplotlib.rcParams)) == before, "settings of Matplotlib were changed"
 assert "matplotlib.figure" in sys.modules
@@ -164,10 +176,8 @@ def test_matplotlib_is_imported_late_and_left_as_it_is_and_pyplot_never(
     ]
     run = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
-    assert {path.stem for path in tmp_path.glob("*.p[nd][gf]")} == {
-        *PLOTS,
-        "comparison",
-    }
+    names = {path.name for path in tmp_path.glob("*.p[nd][gf]")}
+    assert names == {"overview.png", "comparison.pdf"}
 
 
 def test_without_matplotlib_the_error_says_what_to_install(

@@ -11,20 +11,21 @@ MOVE = """part => {
 }"""
 
 
-@pytest.fixture
-def opened(browser, tmp_path):
+@pytest.fixture(scope="module")
+def opened(browser, tmp_path_factory):
     """Open a report; gives the page, what it said and what it asked for."""
+    file = tmp_path_factory.mktemp("reports") / "report.html"
 
     def visit(report, scheme="light"):
-        report.save(tmp_path / "report.html")
+        report.save(file)
         page = browser.new_page(
-            viewport={"width": 1200, "height": 900}, color_scheme=scheme
+            viewport={"width": 1000, "height": 600}, color_scheme=scheme
         )
         said, asked = [], []
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: asked.append(request.url))
-        page.goto((tmp_path / "report.html").as_uri())
+        page.goto(file.as_uri())
         page.wait_for_selector("body[data-ready]", timeout=60_000)
         page.wait_for_selector(
             "#timeline_figure .cursor", state="attached", timeout=60_000
@@ -34,14 +35,19 @@ def opened(browser, tmp_path):
     return visit
 
 
+@pytest.fixture(scope="module")
+def planar_opened(opened, planar_page):
+    """The report of the planar motion, whose slider every test moves where it needs it."""
+    return opened(planar_page)
+
+
 def pixels(page):
     return page.evaluate("document.getElementById('robot').toDataURL()")
 
 
-def test_the_slider_moves_the_robot_and_all_that_follows_it(
-    opened, planar_page, planar
-):
-    page, said, asked = opened(planar_page)
+def test_the_slider_moves_the_robot_and_all_that_follows_it(planar_opened, planar):
+    page, said, asked = planar_opened
+    page.evaluate(MOVE, 0.0)
     before, first = pixels(page), page.locator("#values tbody td").all_inner_texts()
     page.evaluate(MOVE, 0.5)
     assert pixels(page) != before
@@ -58,8 +64,8 @@ def test_the_slider_moves_the_robot_and_all_that_follows_it(
     assert asked == [page.url], "the page asked for nothing but itself"
 
 
-def test_it_plays_to_the_end_and_stops(opened, planar_page, planar):
-    page, said, _ = opened(planar_page)
+def test_it_plays_to_the_end_and_stops(planar_opened, planar):
+    page, said, _ = planar_opened
     page.evaluate(MOVE, 0.97)
     page.click("#play")
     page.get_by_role("button", name="Play", exact=True).wait_for(timeout=60_000)
