@@ -287,11 +287,12 @@ def test_a_motion_with_another_start(orders):
     phase = phase_of("r2", degree=5)
     (x,) = reachable_points(phase, 1)
     motion = phase.motion(x)
-    values = np.random.default_rng(2).normal(size=(orders, 3))
-    other = motion.with_start(values)
+    values = np.random.default_rng(2).normal(size=(orders, 2))
+    other = motion.with_start(values, [1, 2])
     found = other.at(np.zeros(1))
     for order in range(orders):
-        np.testing.assert_allclose(found[order][0], values[order], atol=1e-10)
+        np.testing.assert_allclose(found[order][0, 1:], values[order], atol=1e-10)
+    np.testing.assert_array_equal(other.control_points[0], motion.control_points[0])
     np.testing.assert_array_equal(
         other.control_points[:, orders:], motion.control_points[:, orders:]
     )

@@ -117,13 +117,13 @@ def _join(solved: SolvedProgram) -> list[Motion]:
 
 def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> Motion:
     """Return a motion that begins with what a link joins of curves and derivatives, (4, c); given values stay."""
-    first = phase.boundary.given
     own = np.array(motion.at(np.zeros(1)))[:, 0]
     given = len(phase.boundary.start[-1].derivatives)
     joined = np.ix_(link.orders, link.curves)
     own[joined] = last[joined]
     count = 1 + max(given, *link.orders)
-    return motion.with_start(own[:count, first:])
+    curves = [curve - phase.boundary.given for curve in link.curves]
+    return motion.with_start(own[:count, list(link.curves)], curves)
 
 
 def _select_inside(s: np.ndarray, motion: Motion) -> np.ndarray:

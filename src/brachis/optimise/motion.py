@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,20 +81,22 @@ class Motion(Summary):
         points = insert_knots(self.control_points, self.knots, knots, self.degree)
         return replace(self, knots=knots, control_points=points)
 
-    def with_start(self, values: np.ndarray) -> Motion:
+    def with_start(self, values: np.ndarray, curves: Sequence[int]) -> Motion:
         """Return the motion with other values and derivatives at its beginning.
 
         Parameters
         ----------
         values : (1 + k, c) ndarray
-            Of the curves that have control points, by order, per second.
+            By order, per second.
+        curves : sequence of int
+            Whose they are, counted among those that have control points.
         """
         orders = np.arange(len(values))[:, None]
         _, basis = local_basis(self.knots, self.degree, np.zeros(1))
         matrix = basis[: len(values), 0, : len(values)]
         points = self.control_points.copy()
         first = np.linalg.solve(matrix, values * self.t_end**orders)
-        points[:, : len(values)] = first.T
+        points[curves, : len(values)] = first.T
         return replace(self, control_points=points)
 
     def as_spline(self) -> PhaseSpline:

@@ -12,8 +12,8 @@ from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoord
 from brachis.path.joins import find_joins, refuse_corners
 from brachis.path.protocol import Array, Curve, Path
 from brachis.path.sequence import PathFrame, Piece
-from brachis.robot import TaskMap
-from brachis.robot.plausibility import place_hint, turn_hint
+from brachis.robot import Robot, TaskMap
+from brachis.robot.plausibility import place_hint, position_hint, turn_hint
 from brachis.robot.task_map.protocol import POSE_ROWS, joints_of, position_rows
 from brachis.task import Segment, Task
 
@@ -175,12 +175,21 @@ def check_on_path(
             where=f"{name}.joints",
             found=f"{found} {unit} off in {task_map.rows[worst]}",
             allowed=f"at most {allowed} {unit}",
-            hint=_hint(task_map, place, target)
+            hint=_place_hint(task_map, place, target)
+            or _posture_hint(task_map.robot, posture)
             or f"Choose a posture whose tool is at the path's {end}",
         )
 
 
-def _hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
+def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
+    """Say what a posture, (n,), looks like whose tool is elsewhere; None if its angles and positions are usual."""
+    ends = robot.limits.position_lower, robot.limits.position_upper
+    joints = zip(posture.tolist(), *ends, robot.position_units, strict=True)
+    hints = (position_hint(*joint) for joint in joints)
+    return next(filter(None, hints), None)
+
+
+def _place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
     """Say what stated coordinates, (c,), that are not the tool's, (c,), look like."""
     axes = len(task_map.axes)
     found = place_hint(place[:axes], target[:axes], task_map.rows)

@@ -122,9 +122,9 @@ def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
     speeds = {"dwell": "at rest", "move": "as fast as the limits allow"}
     rows: list[tuple[str, ...]] = []
     for number, phase in enumerate(phases, start=1):
-        s = f"{phase.s_begin:.4g}"
+        s = f"{round(phase.s_begin, 12):.4g}"
         if not phase.is_dwell:
-            s += f" to {phase.s_end:.4g}"
+            s += f" to {round(phase.s_end, 12):.4g}"
         time = f"{phase.duration:.4f} s ({phase.begin:.4f} to {phase.end:.4f} s)"
         speed = speeds.get(phase.kind, f"{phase.speed} m/s")
         rows.append((f"{number} {phase.kind}", s, time, speed))
