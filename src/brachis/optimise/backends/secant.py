@@ -17,6 +17,8 @@ import numpy as np
 
 from brachis.optimise.backends.protocol import Curvature, Problem
 
+_LITTLE = 0.01
+"""Part of the first guess of K, by its trace, below which K is too little."""
 _SMALL = 1e-8
 """Cosine between s and y below which a step does not change A."""
 
@@ -34,6 +36,7 @@ class SecantHessian:
         self._problem = problem
         self._known = known
         self._multipliers = known.multipliers
+        self._least: float | None = None
         count = len(problem.x_lower)
         self._rest = np.zeros((count, count))
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -57,8 +60,10 @@ class SecantHessian:
             Symmetric, without negative eigenvalues.
         """
         known = self._known.hessian(x, multipliers)
-        if not known.any():
-            # Steps without any curvature would lead far away: the last multipliers that gave some do for now.
+        if self._least is None:
+            self._least = _LITTLE * np.trace(self._known.hessian(x, self._multipliers))
+        if np.trace(known) < self._least:
+            # Steps without curvature would lead far away: the last multipliers that gave some do for now.
             multipliers = self._multipliers
             known = self._known.hessian(x, multipliers)
         if objective_multiplier > 0.0:
@@ -89,7 +94,7 @@ class SecantHessian:
     def _update(self, s: np.ndarray, y: np.ndarray, known: np.ndarray) -> None:
         """Update A after a step."""
         curved = s @ y
-        if curved <= _SMALL * np.linalg.norm(s) * np.linalg.norm(y):
+        if not curved > _SMALL * np.linalg.norm(s) * np.linalg.norm(y):
             return
         left = y - known @ s
         before = abs(s @ self._rest @ s)

@@ -1,0 +1,112 @@
+"""Random tasks with root-mean-square limits on the torques: time and end time with Uno and with SLSQP.
+
+Usage: python benchmarks/mean_torques.py [--seed 0] [--count 6] [--save]
+
+Tasks are those of `mixed_cases`. Each is planned without such limits first. Of the mean squares of its torques beyond
+the static loads along the motion, the limits then allow two thirds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import brachis
+import mixed_cases
+from brachis.errors import BrachisError, BrachisWarning
+from brachis.robot import dynamics
+from brachis.task import Task, load_task
+from brachis.task.keywords import task_with
+from committed import processor_time, save
+
+ROBOTS = ("panda", "iiwa14", "tx90l_rail", "ur10_rail", "planar4", "scara3")
+SOLVERS = ("auto", "slsqp")
+SETTINGS = {"search.least_motion": False, "search.jobs": 1}
+SHARE = 2.0 / 3.0
+LEAST = 1e-3
+"""Part of a torque limit: joints that need less on the average get no such limit."""
+
+
+def limits_of(result: brachis.Result) -> dict[str, float]:
+    """RMS torques, Nm or N, that make a motion slower."""
+    robot = result.trajectory.robot
+    t = np.linspace(0.0, result.t_end, 4001)
+    motion = result.trajectory.at(t)
+    still = np.zeros_like(motion.q)
+    squares = [
+        np.trapezoid(dynamics.torque(robot, motion.q, *rates) ** 2, t, axis=0)
+        for rates in ((motion.qdot, motion.qddot), (still, still))
+    ]
+    whole, static = np.array(squares) / result.t_end
+    allowed = np.sqrt(static + SHARE * np.maximum(whole - static, 0.0))
+    own = allowed > LEAST * robot.limits.torque_upper
+    names = np.array(robot.joint_names)[own]
+    return dict(zip(names.tolist(), allowed[own].tolist(), strict=True))
+
+
+def timed(task: Task, solver: str) -> tuple[float, float, bool]:
+    """Processor time, s, end time, s, and whether the plan is verified."""
+    busy = processor_time()
+    t_end = np.inf
+    verified = False
+    try:
+        result = brachis.plan(task, solver={"name": solver}, strict=False)
+        t_end = result.t_end
+        verified = result.verified
+    except BrachisError as error:
+        print(f"  {solver}: {error}")
+    return processor_time() - busy, t_end, verified
+
+
+def main() -> None:
+    """Plan and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--count", type=int, default=6, help="tasks of each robot")
+    parser.add_argument("--save", action="store_true")
+    arguments = parser.parse_args()
+    rows: list[tuple[str, ...]] = []
+    ratios: list[tuple[float, float]] = []
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", BrachisWarning)
+        for number in range(arguments.count):
+            for robot in ROBOTS:
+                case = mixed_cases.case(robot, arguments.seed, number, Path(folder))
+                task = load_task(case.task, changes=SETTINGS)
+                free = brachis.plan(task, strict=False)
+                task = task_with(task, limits={"rms_torque": limits_of(free)})
+                auto, other = (timed(task, solver) for solver in SOLVERS)
+                if auto[2] and other[2]:
+                    ratios.append((other[0] / auto[0], auto[1] / other[1]))
+                row = (
+                    case.name,
+                    *(f"{t_end:.4f} s" for t_end in (free.t_end, auto[1], other[1])),
+                    *(f"{time:.1f} s" for time in (auto[0], other[0])),
+                    f"{'yes' if auto[2] else 'no'}, {'yes' if other[2] else 'no'}",
+                )
+                rows.append(row)
+                print(" | ".join(row), flush=True)
+    faster, later = np.exp(np.log(ratios).mean(axis=0))
+    about = (
+        f"{len(ratios)} of {len(rows)} are verified with both. In the geometric mean SLSQP takes {faster:.2f} times "
+        f"the processor time, and the end time of auto is {later:.5f} of its."
+    )
+    print(about)
+    columns = (
+        "task",
+        "without",
+        "auto",
+        "SLSQP",
+        "processor time, auto",
+        "processor time, SLSQP",
+        "verified",
+    )
+    save("Root-mean-square torques", columns, rows, about)
+
+
+if __name__ == "__main__":
+    main()
