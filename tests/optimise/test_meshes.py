@@ -335,3 +335,14 @@ def test_settings_choose_what_is_done(solved):
 def test_auto_begins_coarse():
     program, _ = brachis.transcribe(robot(), task(intervals="auto"))
     assert program.intervals == 10
+
+
+def test_a_mesh_is_refined_where_a_mean_torque_holds_the_motion():
+    slow = robot().with_limits(rms_torque=9.0)
+    short = {"path": [brachis.Line(by=[0.0, 0.6])], "redundant_joints": "auto"}
+    even, adapted = (
+        brachis.plan(slow, task(intervals=intervals), **short)
+        for intervals in (80, "auto")
+    )
+    assert adapted.verified, str(adapted.verification)
+    assert adapted.t_end < even.t_end

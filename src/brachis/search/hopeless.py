@@ -43,6 +43,12 @@ _REACHED = 0.92
 """Part of the largest speed to which a leg leads in the phase plane: splines over the first mesh fall short of it."""
 _LEAST = 1e-4
 """Share of a speed that is possible wherever the arm can hold its postures."""
+_HEAVY = 0.95
+"""Ratio of a load at rest to a limit on its mean above which that is the most likely reason of a failure."""
+_TOO_HEAVY = 1.05
+"""Such a ratio, in every posture of the path, that is out of the question."""
+_FAR_TOO_HEAVY = 1.5
+"""The same for the joint paths that were found, where a redundant robot has others."""
 _S = np.linspace(0.0, 1.0, 101)
 """Path coordinates at which the arm is held at rest."""
 
@@ -175,9 +181,12 @@ def explain_holding(
     if not worst:
         return None
     load = min(worst, key=measure)
+    is_redundant = starts[0].joint_map.r > 0
     # Before a plan is tried it has to be out of the question; afterwards it is the most likely reason.
-    if measure(load) < (1.05 if everywhere else 0.95):
+    hopeless = _FAR_TOO_HEAVY if is_redundant else _TOO_HEAVY
+    if measure(load) < (hopeless if everywhere else _HEAVY):
         return None
+    where = "the best joint path that was found" if is_redundant else "the path"
     label = load.limit.labels[load.column]
     figure = _figure(load.limit, load.column)
     low, high = (f"{figure * ratio:.4g}" for ratio in (load.least, load.largest))
@@ -187,7 +196,7 @@ def explain_holding(
         starts[0].problem.robot, load.limit, load.column, load.mean
     )
     return Failure(
-        f"the {label.kind} limit of {label.subject!r} is too low to hold the arm against gravity along the path",
+        f"the {label.kind} limit of {label.subject!r} is too low to hold the arm against gravity along {where}",
         where=label.key or load.limit.name,
         found=f"{taken} {label.unit} to hold the arm, {mean} {label.unit} on average (root mean square)",
         needed=f"{figure:.4g} {label.unit}",
