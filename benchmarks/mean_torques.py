@@ -1,9 +1,9 @@
-"""Random tasks with root-mean-square limits on the torques: time and end time with Uno and with SLSQP.
+"""Random tasks with root-mean-square limits on the torques, planned with `solver: auto` and with SLSQP.
 
 Usage: python benchmarks/mean_torques.py [--seed 0] [--count 6] [--save]
 
-Tasks are those of `mixed_cases`. Each is planned without such limits first. Of the mean squares of its torques beyond
-the static loads along the motion, the limits then allow two thirds.
+Tasks are those of `mixed_cases`. Each is planned without such limits first. The limits then allow the mean squares of
+the static torques, and two thirds of what the motion adds.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ ROBOTS = ("panda", "iiwa14", "tx90l_rail", "ur10_rail", "planar4", "scara3")
 SOLVERS = ("auto", "slsqp")
 SETTINGS = {"search.least_motion": False, "search.jobs": 1}
 SHARE = 2.0 / 3.0
-LEAST = 1e-3
-"""Part of a torque limit: joints that need less on the average get no such limit."""
+LEAST_SHARE = 1e-3
+"""Part of a torque limit: joints that need less on average get no such limit."""
 
 
-def limits_of(result: brachis.Result) -> dict[str, float]:
+def find_rms_limits(result: brachis.Result) -> dict[str, float]:
     """RMS torques, Nm or N, that make a motion slower."""
     robot = result.trajectory.robot
     t = np.linspace(0.0, result.t_end, 4001)
@@ -41,14 +41,14 @@ def limits_of(result: brachis.Result) -> dict[str, float]:
         np.trapezoid(dynamics.torque(robot, motion.q, *rates) ** 2, t, axis=0)
         for rates in ((motion.qdot, motion.qddot), (still, still))
     ]
-    whole, static = np.array(squares) / result.t_end
-    allowed = np.sqrt(static + SHARE * np.maximum(whole - static, 0.0))
-    own = allowed > LEAST * robot.limits.torque_upper
-    names = np.array(robot.joint_names)[own]
-    return dict(zip(names.tolist(), allowed[own].tolist(), strict=True))
+    total, static = np.array(squares) / result.t_end
+    allowed = np.sqrt(static + SHARE * np.maximum(total - static, 0.0))
+    is_loaded = allowed > LEAST_SHARE * robot.limits.torque_upper
+    names = np.array(robot.joint_names)[is_loaded]
+    return dict(zip(names.tolist(), allowed[is_loaded].tolist(), strict=True))
 
 
-def timed(task: Task, solver: str) -> tuple[float, float, bool]:
+def measure_plan(task: Task, solver: str) -> tuple[float, float, bool]:
     """Processor time, s, end time, s, and whether the plan is verified."""
     busy = processor_time()
     t_end = np.inf
@@ -78,8 +78,8 @@ def main() -> None:
                 case = mixed_cases.case(robot, arguments.seed, number, Path(folder))
                 task = load_task(case.task, changes=SETTINGS)
                 free = brachis.plan(task, strict=False)
-                task = task_with(task, limits={"rms_torque": limits_of(free)})
-                auto, other = (timed(task, solver) for solver in SOLVERS)
+                task = task_with(task, limits={"rms_torque": find_rms_limits(free)})
+                auto, other = (measure_plan(task, solver) for solver in SOLVERS)
                 if auto[2] and other[2]:
                     ratios.append((other[0] / auto[0], auto[1] / other[1]))
                 row = (
@@ -90,10 +90,13 @@ def main() -> None:
                 )
                 rows.append(row)
                 print(" | ".join(row), flush=True)
+    if not ratios:
+        print("no task is verified with both solvers")
+        return
     faster, later = np.exp(np.log(ratios).mean(axis=0))
     about = (
         f"{len(ratios)} of {len(rows)} are verified with both. In the geometric mean SLSQP takes {faster:.2f} times "
-        f"the processor time, and the end time of auto is {later:.5f} of its."
+        f"the processor time of auto, and the end time of auto is {later:.5f} times that of SLSQP."
     )
     print(about)
     columns = (

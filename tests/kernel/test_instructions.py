@@ -66,7 +66,7 @@ def count_instructions(folder: Path) -> int:
 
 @pytest.mark.skipif(
     shutil.which("valgrind") is None or not HEADER.exists(),
-    reason="Valgrind is not installed",
+    reason="Valgrind, or its callgrind.h, is not installed",
 )
 def test_the_kernel_takes_no_more_instructions(tmp_path):
     setting = f"{compiler()}, Python {sys.version_info.major}.{sys.version_info.minor}"

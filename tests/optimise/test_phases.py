@@ -242,8 +242,7 @@ def test_the_curvature_of_a_mean_is_that_of_its_squares(knots):
     x = point_in_two_phases(program)
     known = program.curvature(x)
     assert known is not None
-    limits = len(program.means)
-    weights = np.linspace(0.5, 2.0, limits)
+    weights = np.linspace(0.5, 2.0, len(program.means))
     multipliers = np.zeros(len(program.lower))
     multipliers[program.rows_of(program.means.limits[0])[0]] = -weights
     steps = 1e-6 * np.eye(len(x))
@@ -258,6 +257,7 @@ def test_the_curvature_of_a_mean_is_that_of_its_squares(knots):
     factors = np.outer(shares / program.end_time(x), weights).ravel()
     expected = 2.0 * slopes.T @ (factors[:, None] * slopes)
     found = known.hessian(x, multipliers)
+    # As above: the first duration is given.
     found[0] = 0.0
     found[:, 0] = 0.0
     size = np.abs(expected).max()

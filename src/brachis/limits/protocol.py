@@ -39,7 +39,7 @@ class Guarantee(Enum):
         "It holds at the collocation points of the optimiser, and is not verified."
     )
     AS_MEAN = "It holds as a mean over the whole motion."
-    """Values are squares: so their curvature is known (`brachis.optimise.means`)."""
+    """The values have to be squares f^2: the optimiser derives their curvature from that (`brachis.optimise.means`)."""
 
     @property
     def is_mean(self) -> bool:

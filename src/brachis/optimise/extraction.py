@@ -103,7 +103,7 @@ class _Part:
 
 
 def _join(solved: SolvedProgram) -> list[Motion]:
-    """Return the motions of all phases; each begins exactly as links ask for, which rows hold to a tolerance."""
+    """Return the motions of all phases. Links hold exactly where they begin; a solver holds them to its tolerance."""
     program = solved.program
     motions = program.motions(solved.x)
     for link in program.links:
@@ -116,7 +116,7 @@ def _join(solved: SolvedProgram) -> list[Motion]:
 
 
 def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> Motion:
-    """Return a motion that begins with what a link joins of curves and derivatives, (4, c); given values stay."""
+    """Return a motion that begins with the curves and derivatives that a link takes from `last`, (4, c)."""
     own = np.array(motion.at(np.zeros(1)))[:, 0]
     given = len(phase.boundary.start[-1].derivatives)
     joined = np.ix_(link.orders, link.curves)

@@ -2,8 +2,8 @@
 
 A mean is held over all phases, and over the pauses at rest between them, by their durations.
 
-Values that are held as means are squares f^2. The Hessian of their mean has the Gauss-Newton part 2 f' f'^T, which
-follows from the slopes g = 2 f f' as g g^T / (2 f^2).
+Values that are held as means are squares f^2, with the Hessian 2 f' f'^T + 2 f f''. The first term is its Gauss-Newton
+part. With the slopes g = 2 f f' it is g g^T / (2 f^2).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from brachis.limits import Limit, Moments, Partials
 from brachis.optimise.phase import Phase
 
-_NO_SQUARE = 1e-12
-"""Least square that counts: where a value is nearly zero, so are its slopes."""
+_NEARLY_ZERO = 1e-12
+"""Values below this count as not curved: their slopes are nearly zero too, and the quotient is rounding."""
 
 Parts = Sequence[tuple[Phase, np.ndarray]]
 """Phases, each with its variables."""
@@ -72,7 +72,10 @@ class Means:
         return np.hstack(columns) / _end_time(parts)
 
     def curvature(self, parts: Parts, weights: np.ndarray) -> np.ndarray:
-        """Gauss-Newton part of the Hessian, (v, v), of the values' sum with weights, (m,); see the module."""
+        """Gauss-Newton part, (v, v), of the Hessian of weights . values, weights (m,).
+
+        Pauses are left out, and so is how the shares of the phases depend on their durations.
+        """
         ends = np.cumsum([0, *(len(x) for _, x in parts)])
         total = np.zeros((ends[-1], ends[-1]))
         for (phase, x), first in zip(parts, ends, strict=False):
@@ -131,8 +134,10 @@ def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarra
     """Gauss-Newton part of the Hessian, (v, v), of the means over one phase with weights, (m,)."""
     is_mean = phase.evaluator.is_mean
     evaluation = phase.evaluate(x)
-    squares = evaluation.values[:, is_mean].clip(_NO_SQUARE)
-    factors = phase.mean_weights(x)[:, None] * weights / (2.0 * squares)
+    values = evaluation.values[:, is_mean]
+    is_curved = values > _NEARLY_ZERO
+    inverse = np.divide(0.5, values, out=np.zeros_like(values), where=is_curved)
+    factors = phase.mean_weights(x)[:, None] * weights * inverse
     slopes = phase.slopes_by_variables(evaluation.slopes, x)[:, is_mean]
     rows = phase.spread_slopes(slopes)
     return np.asarray(

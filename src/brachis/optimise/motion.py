@@ -89,7 +89,7 @@ class Motion(Summary):
         values : (1 + k, c) ndarray
             By order, per second.
         curves : sequence of int
-            Whose they are, counted among those that have control points.
+            Numbers of these c curves among those that have control points.
         """
         orders = np.arange(len(values))[:, None]
         _, basis = local_basis(self.knots, self.degree, np.zeros(1))

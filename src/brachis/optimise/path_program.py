@@ -128,9 +128,8 @@ class PathPhase:
         number = np.repeat(np.arange(len(self._steps)), len(ahead))
         self._number = np.pad(number, 1, mode="edge")
         self._ahead = np.pad(inner, 1, constant_values=(1.0, 0.0))[:, None]
-        places = (
-            self._s[self._number + 1] - self._ahead[:, 0] * self._steps[self._number]
-        )
+        behind = self._ahead[:, 0] * self._steps[self._number]
+        places = self._s[self._number + 1] - behind
         self._places = places
         times = np.interp(self._s, curves[:, 0], t)
         squares = own.course.curves(timing, times)[1][:, 0] ** 2
@@ -465,8 +464,9 @@ class PathProgram:
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError where there are none."""
+        before, after = x[self._pairs].T
         rows = [own.rows(part) for own, part in self._split(x)]
-        return np.concatenate([*rows, -np.diff(x[self._pairs])[:, 0]])
+        return np.concatenate([*rows, before - after])
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern, (nnz,); raises as `rows` does."""

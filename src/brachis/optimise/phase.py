@@ -428,7 +428,7 @@ class Phase:
         )
 
     def spread_slopes(self, slopes: np.ndarray) -> np.ndarray:
-        """Put slopes, (z, c), in their places: by point, value and variable, (K, c, v)."""
+        """Arrange slopes, (z, c), by point, value and variable, (K, c, v)."""
         columns = slopes.shape[1]
         found = np.zeros((len(self.t_norm), columns, self.variables))
         point = self._layout.point[:, None]

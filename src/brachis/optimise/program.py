@@ -287,9 +287,9 @@ class Program(Summary):
         """Return what means add to the Hessian of the Lagrangian, its Gauss-Newton part; None without means."""
         if not len(self.means):
             return None
-        # Squares of accelerations fall with the fourth power of the time: dT/d(mean) = -T/4 if the mean alone holds.
+        # Squares of accelerations fall with the fourth power of the time T: dT/d(mean) = -T/4 where the mean is 1.
         guess = np.zeros(len(self.lower))
-        guess[self._mean_rows] = -0.25 * self.end_time(x) / len(self.means)
+        guess[self._mean_rows] = -0.25 * self.objective(x) / len(self.means)
         return Curvature(self._find_hessian, guess)
 
     def _find_hessian(self, x: np.ndarray, multipliers: np.ndarray) -> np.ndarray:

@@ -182,7 +182,7 @@ def check_on_path(
 
 
 def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
-    """Say what a posture, (n,), looks like whose tool is elsewhere; None if its angles and positions are usual."""
+    """Say what implausible positions in a posture, (n,), look like, such as degrees; None if all are plausible."""
     ends = robot.limits.position_lower, robot.limits.position_upper
     joints = zip(posture.tolist(), *ends, robot.position_units, strict=True)
     hints = (position_hint(*joint) for joint in joints)

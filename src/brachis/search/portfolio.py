@@ -144,6 +144,7 @@ class Search:
         for batch in itertools.islice(starts, most):
             self._solve(batch)
             self._refine_and_verify(batch)
+        # The last solves may have been cut short.
         self.interrupted = self.interrupted or self._deadline.passed
 
     def _find_starts(

@@ -122,13 +122,18 @@ def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
     speeds = {"dwell": "at rest", "move": "as fast as the limits allow"}
     rows: list[tuple[str, ...]] = []
     for number, phase in enumerate(phases, start=1):
-        s = f"{round(phase.s_begin, 12):.4g}"
+        s = _write_s(phase.s_begin)
         if not phase.is_dwell:
-            s += f" to {round(phase.s_end, 12):.4g}"
+            s += f" to {_write_s(phase.s_end)}"
         time = f"{phase.duration:.4f} s ({phase.begin:.4f} to {phase.end:.4f} s)"
         speed = speeds.get(phase.kind, f"{phase.speed} m/s")
         rows.append((f"{number} {phase.kind}", s, time, speed))
     return rows
+
+
+def _write_s(s: float) -> str:
+    """Write a path coordinate; rounding about zero is written as 0."""
+    return f"{round(s, 12):.4g}"
 
 
 def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray]:

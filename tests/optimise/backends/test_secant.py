@@ -17,7 +17,7 @@ OPTIMUM = OPTIMUM / np.sqrt(OPTIMUM @ SQUARES @ OPTIMUM)
 
 
 class Ellipsoid(Program):
-    """Go as far along the costs as an ellipsoid allows, which knows a part of its curvature, or nothing."""
+    """Minimise a linear cost inside an ellipsoid; `known` is the part of its curvature that it states."""
 
     known: float | None = 1.0
 
@@ -65,9 +65,10 @@ def test_steps_teach_what_is_not_known():
     multipliers = np.array([-1.3])
     exact = 2.6 * SQUARES
     x = np.zeros(SIZE)
+    rng = np.random.default_rng(5)
     hessian(x, 1.0, multipliers)
     for _ in range(5):
-        step = RNG.normal(size=SIZE)
+        step = rng.normal(size=SIZE)
         x = x + step
         found = hessian(x, 1.0, multipliers)
     np.testing.assert_allclose(found @ step, exact @ step, rtol=1e-9)
@@ -78,8 +79,9 @@ def test_steps_teach_what_is_not_known():
 def test_no_eigenvalue_is_negative():
     problem = ellipsoid(3.0)  # more than there is
     hessian = SecantHessian(problem, problem.curvature(None))
+    rng = np.random.default_rng(6)
     for _ in range(4):
-        found = hessian(RNG.normal(size=SIZE), 1.0, np.array([-1.0]))
+        found = hessian(rng.normal(size=SIZE), 1.0, np.array([-1.0]))
         assert np.linalg.eigvalsh(found).min() > -1e-9 * np.abs(found).max()
 
 

@@ -49,7 +49,7 @@ class Curvature:
     hessian : callable
         ``hessian(x, multipliers)`` returns the known part, (v, v), by multipliers, (c,).
     multipliers : (c,) ndarray
-        A guess, for as long as those of a solver make the known part zero.
+        A first guess. It serves until those of a solver give the known part some size.
     """
 
     hessian: Callable[[np.ndarray, np.ndarray], np.ndarray]

@@ -1,14 +1,17 @@
 """The Hessian of the Lagrangian of a problem that knows a part of it.
 
 A mean of squares over the motion is curved in as many directions as there are variables; an approximation from the last
-few steps learns too few of them. First derivatives give its Gauss-Newton part K. The rest A follows from successive
-iterates (J. E. Dennis, D. M. Gay, R. E. Welsch, An adaptive nonlinear least-squares algorithm, ACM Transactions on
-Mathematical Software 7, 1981): if the gradient of the Lagrangian changes by y in a step s, A is scaled down to what
-that step shows, and updated so that
+few steps learns too few of them. First derivatives give its Gauss-Newton part B. A matrix A approximates the rest. Let
+the gradient of the Lagrangian change by y in a step s, and let B belong to the new point. A is first scaled by
+min(1, |s.(y - B s)| / |s.A s|), and then changed by a symmetric update of rank two, so that
 
-    A s = y - K s.
+    A s = y - B s.
 
-Negative eigenvalues of K + A change their sign: subproblems are convex, and steps along such directions short.
+Scaling and update are those of J. E. Dennis, D. M. Gay and R. E. Welsch, An adaptive nonlinear least-squares algorithm,
+ACM Transactions on Mathematical Software 7, 1981. They have residuals alone, and ask for another A s; here other rows
+are curved as well.
+
+Negative eigenvalues of A + B change their sign: subproblems are convex, and steps along such directions short.
 """
 
 from __future__ import annotations
@@ -17,10 +20,10 @@ import numpy as np
 
 from brachis.optimise.backends.protocol import Curvature, Problem
 
-_LITTLE = 0.01
-"""Part of the first guess of K, by its trace, below which K is too little."""
-_SMALL = 1e-8
-"""Cosine between s and y below which a step does not change A."""
+_ENOUGH = 0.01
+"""Trace of B, as a part of that by the first guess, from which on a solver's multipliers are used."""
+_LEAST_COSINE = 1e-8
+"""Cosine between s and y below which a step changes nothing: the update divides by s.y."""
 
 
 class SecantHessian:
@@ -36,7 +39,7 @@ class SecantHessian:
         self._problem = problem
         self._known = known
         self._multipliers = known.multipliers
-        self._least: float | None = None
+        self._least_trace: float | None = None
         count = len(problem.x_lower)
         self._rest = np.zeros((count, count))
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -60,47 +63,52 @@ class SecantHessian:
             Symmetric, without negative eigenvalues.
         """
         known = self._known.hessian(x, multipliers)
-        if self._least is None:
-            self._least = _LITTLE * np.trace(self._known.hessian(x, self._multipliers))
-        if np.trace(known) < self._least:
-            # Steps without curvature would lead far away: the last multipliers that gave some do for now.
+        if self._least_trace is None:
+            guess = self._known.hessian(x, self._multipliers)
+            self._least_trace = float(_ENOUGH * np.trace(guess))
+        if np.trace(known) < self._least_trace:
+            # Without curvature steps are too long: the last multipliers that gave enough do for now.
             multipliers = self._multipliers
             known = self._known.hessian(x, multipliers)
         if objective_multiplier > 0.0:
             self._multipliers = multipliers
-            here = (x, self._problem.gradient(x), self._problem.jacobian(x))
-            if self._last is not None:
-                factors = objective_multiplier, multipliers
-                change = self._slopes(*here[1:], *factors)
-                change = change - self._slopes(*self._last[1:], *factors)
-                self._update(x - self._last[0], change, known)
-            self._last = here
+            self._learn(x, objective_multiplier, multipliers, known)
         values, vectors = np.linalg.eigh(known + self._rest)
         return np.asarray((vectors * np.abs(values)) @ vectors.T)
 
-    def _slopes(
+    def _learn(
         self,
-        gradient: np.ndarray,
-        jacobian: np.ndarray,
+        x: np.ndarray,
         objective_multiplier: float,
         multipliers: np.ndarray,
-    ) -> np.ndarray:
-        """Gradient of the Lagrangian, (v,)."""
-        problem = self._problem
-        terms = jacobian * multipliers[problem.jacobian_rows]
-        of_rows = np.bincount(problem.jacobian_columns, terms, len(gradient))
-        return np.asarray(objective_multiplier * gradient - of_rows)
+        known: np.ndarray,
+    ) -> None:
+        """Update A by the step from the last iterate to x."""
+        gradient = self._problem.gradient(x)
+        jacobian = self._problem.jacobian(x)
+        if self._last is not None:
+            last_x, last_gradient, last_jacobian = self._last
+            by_rows = self._sum_rows(jacobian - last_jacobian, multipliers)
+            change = objective_multiplier * (gradient - last_gradient) - by_rows
+            self._update(x - last_x, change, known)
+        self._last = x, gradient, jacobian
+
+    def _sum_rows(self, jacobian: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """Add up the rows of a Jacobian, (nnz,), with multipliers: (v,)."""
+        terms = jacobian * multipliers[self._problem.jacobian_rows]
+        columns = self._problem.jacobian_columns
+        return np.bincount(columns, terms, len(self._rest))
 
     def _update(self, s: np.ndarray, y: np.ndarray, known: np.ndarray) -> None:
-        """Update A after a step."""
-        curved = s @ y
-        if not curved > _SMALL * np.linalg.norm(s) * np.linalg.norm(y):
+        """Update A, `_rest`, after a step s with a change y of the Lagrangian's gradient, (v,) each; see the module."""
+        s_y = s @ y
+        if not s_y > _LEAST_COSINE * np.linalg.norm(s) * np.linalg.norm(y):
             return
-        left = y - known @ s
-        before = abs(s @ self._rest @ s)
-        if before > 0.0:
-            self._rest = self._rest * min(1.0, abs(s @ left) / before)
-        miss = left - self._rest @ s
-        both = np.outer(miss, y) / curved
-        total = (miss @ s) * np.outer(y, y) / curved**2
-        self._rest = self._rest + both + both.T - total
+        wanted = y - known @ s
+        s_a_s = abs(s @ self._rest @ s)
+        if s_a_s > 0.0:
+            self._rest = self._rest * min(1.0, abs(s @ wanted) / s_a_s)
+        error = wanted - self._rest @ s
+        outer = np.outer(error, y) / s_y
+        correction = (error @ s) * np.outer(y, y) / s_y**2
+        self._rest = self._rest + outer + outer.T - correction
