@@ -201,7 +201,7 @@ def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
 def worst(program, x):
     """Largest ratio to a limit that holds at single points."""
     (phase,) = program.phases
-    return float(np.abs(phase.time_scaling_ratios(x, with_means=False)).max())
+    return float(np.abs(phase.time_scaling_ratios(x)).max())
 
 
 def test_a_solve_begins_within_the_limits():

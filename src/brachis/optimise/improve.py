@@ -246,7 +246,7 @@ def _slow_down(program: Program, x: np.ndarray) -> np.ndarray:
 def _worst_ratio(program: Program, x: np.ndarray) -> float:
     """Largest ratio to a limit that a longer time relieves at single points, where the time is not given."""
     ratios = [
-        np.abs(phase.time_scaling_ratios(part, with_means=False)).max(initial=0.0)
+        np.abs(phase.time_scaling_ratios(part)).max(initial=0.0)
         for phase, part in program.split(x)
         if phase.time_law is None
     ]

@@ -122,24 +122,21 @@ def _means_of(phase: Phase, x: np.ndarray) -> np.ndarray:
 def _mean_slopes_of(phase: Phase, x: np.ndarray) -> np.ndarray:
     """Slopes of the means over one phase, (m, v)."""
     is_mean = phase.evaluator.is_mean
-    evaluation = phase.evaluate(x)
-    slopes = phase.slopes_by_variables(evaluation.slopes, x)[:, is_mean]
+    slopes = phase.limit_slopes(x)[:, is_mean]
     total = phase.sum_up(slopes, phase.mean_weights(x))
     by_lengths = phase.grid.mean_slopes
-    total[:, phase.lengths] += evaluation.values[:, is_mean].T @ by_lengths.T
+    total[:, phase.lengths] += phase.evaluate(x).values[:, is_mean].T @ by_lengths.T
     return total
 
 
 def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Gauss-Newton part of the Hessian, (v, v), of the means over one phase with weights, (m,)."""
     is_mean = phase.evaluator.is_mean
-    evaluation = phase.evaluate(x)
-    values = evaluation.values[:, is_mean]
+    values = phase.evaluate(x).values[:, is_mean]
     is_curved = values > _NEARLY_ZERO
     inverse = np.divide(0.5, values, out=np.zeros_like(values), where=is_curved)
     factors = phase.mean_weights(x)[:, None] * weights * inverse
-    slopes = phase.slopes_by_variables(evaluation.slopes, x)[:, is_mean]
-    rows = phase.spread_slopes(slopes)
+    rows = phase.spread_slopes(phase.limit_slopes(x)[:, is_mean])
     return np.asarray(
         (rows * factors[:, :, None]).reshape(-1, len(x)).T @ rows.reshape(-1, len(x))
     )

@@ -218,7 +218,7 @@ def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
     breaks = phase.breaks
     samples = 24
     dense = phase.with_points(spread(breaks, samples))
-    ratios = np.abs(dense.time_scaling_ratios(x, with_means=False))
+    ratios = np.abs(dense.time_scaling_ratios(x))
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :]
     windows = np.lib.stride_tricks.sliding_window_view(slack, samples + 1, axis=0)
     swing = np.ptp(windows[::samples], axis=2).sum(axis=1)

@@ -130,6 +130,7 @@ class Phase:
         self.jacobian_columns = layout.jacobian_columns
         self._entries: tuple[LocalBasis, np.ndarray] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
+        self._slopes: tuple[Evaluation, np.ndarray] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
 
     def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
@@ -346,32 +347,34 @@ class Phase:
         )
         return evaluation.violation(_is_checked)
 
-    def time_scaling_ratios(
-        self, x: np.ndarray, *, with_means: bool = True
-    ) -> np.ndarray:
-        """Ratios, (K, c), to limits that a longer time relieves, see `Limit.ratio`; raises as `evaluate` does."""
-        every = np.zeros((len(self.t_norm), 1))
+    def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
+        """Ratios, (K, c), to limits at single points that a longer time relieves; raises as `evaluate` does.
+
+        See `Limit.ratio`. Means are left out: they are the same at all points.
+        """
         ratios = [np.empty((len(self.t_norm), 0))]
         for limit, values in zip(self.limits, self.evaluate(x).by_limit, strict=True):
-            is_left_out = limit.guarantee.is_mean and not with_means
-            if limit.longer_time != "relieves" or is_left_out:
-                continue
-            own = values
-            if limit.guarantee.is_mean:
-                own = self.mean_weights(x)[None] @ values
-            ratios.append(limit.ratio(own) + every)
+            if limit.longer_time == "relieves" and not limit.guarantee.is_mean:
+                ratios.append(limit.ratio(values))
         return np.hstack(ratios)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""
         self.evaluations["jacobians"] += 1
-        evaluation = self.evaluate(x)
         is_mean = self.evaluator.is_mean
-        slopes = self.slopes_by_variables(evaluation.slopes, x)
+        slopes = self.limit_slopes(x)
         of_limits = (slopes[:, ~is_mean] if is_mean.any() else slopes).ravel()
         of_progress = self._layout.progress.jacobian(x)
         of_total = np.ones(len(self.grid.lower))
         return np.concatenate([of_limits, of_progress, of_total])
+
+    def limit_slopes(self, x: np.ndarray) -> np.ndarray:
+        """Slopes of all limits' values by the variables, (z, c); kept, and raises, as `evaluate`."""
+        evaluation = self.evaluate(x)
+        if self._slopes is None or self._slopes[0] is not evaluation:
+            slopes = self.slopes_by_variables(evaluation.slopes, x)
+            self._slopes = (evaluation, slopes)
+        return self._slopes[1]
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
         """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `evaluate` does.

@@ -23,6 +23,7 @@ from brachis.kinematics import (
     chart_around,
     transversality,
 )
+from brachis.optimise.backends import solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, PathMap
 from brachis.optimise.least_motion import LeastMotion
 from brachis.problem.problem import Decomposition, Problem
@@ -30,7 +31,6 @@ from brachis.robot.task_map import JointSpace
 from brachis.search.candidates import SELECTABLE
 from brachis.search.schedule import has_charts
 from brachis.search.starts import FAMILY, bring_onto_path
-from brachis.search.timed import solvers_of
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
@@ -93,7 +93,7 @@ def given_guess(
         motion.t_end,
         origin,
         family,
-        solvers_of(problem)[0],
+        solvers_for(problem.task.solver.name)[0].name,
         durations=tuple(np.diff(ends).tolist()),
     )
 

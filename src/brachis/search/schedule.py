@@ -15,6 +15,7 @@ from functools import partial
 
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
+from brachis.optimise.backends import solvers_for
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
@@ -30,7 +31,6 @@ from brachis.search.starts import (
     lattice_starts,
     numeric_starts,
 )
-from brachis.search.timed import solvers_of
 
 _SIZE = 12
 """Guesses of a batch."""
@@ -105,7 +105,7 @@ def batches(
     PlanningError
         No motion along any joint path can hold a speed, or a mean of a load.
     """
-    solvers = solvers_of(problem)
+    solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
     if isinstance(problem.task_map, JointSpace):
         start = joint_space_start(problem)

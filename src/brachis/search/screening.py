@@ -117,7 +117,6 @@ def _improve(
     if deadline.passed:
         return start
     problem = start.problem
-    # Over the path no mean is held.
     backend = solvers_for(problem.task.solver.name)[0]
     options = SolverOptions(time_limit=np.inf, apart=any(problem.time_laws))
     for_large = solver_for_large(problem.task.solver.name)

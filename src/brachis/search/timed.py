@@ -15,7 +15,6 @@ from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.problem.problem import Problem
 from brachis.search.over_path import improve_guess
 
 _MORE = 1.2
@@ -24,11 +23,6 @@ _LESS = 0.9
 """Factor on an excess beyond a limit that such a longer time should bring, at least."""
 _LONGEST = 0.1
 """Part of the time by which it may."""
-
-
-def solvers_of(problem: Problem) -> list[str]:
-    """Names of the solvers for a problem, the one that is tried first at the front."""
-    return [solver.name for solver in solvers_for(problem.task.solver.name)]
 
 
 def begin_with_timing(
@@ -64,7 +58,7 @@ def solve_over_path(
     """
     problem = start.problem
     is_open = problem.task.spline.intervals == "auto"
-    is_first = start.solver == solvers_of(problem)[0]
+    is_first = start.solver == solvers_for(problem.task.solver.name)[0].name
     if not (is_open and is_first and retiming.is_timing_all(program)):
         return None
     reports: tuple[SolverReport, ...] = ()

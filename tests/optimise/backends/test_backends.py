@@ -14,7 +14,6 @@ import pytest
 import brachis
 from brachis.errors import UnknownNameError, UnreachableError
 from brachis.optimise.backends import (
-    AUTO_ORDER,
     NAMES,
     TABLE,
     SolverOptions,
@@ -31,7 +30,7 @@ OPTIONS = SolverOptions()
 MULTIPLIERS = ("uno", "ipopt")
 
 
-@pytest.fixture(params=AUTO_ORDER)
+@pytest.fixture(params=TABLE)
 def name(request):
     return request.param
 
@@ -202,8 +201,8 @@ def test_nothing_is_printed(name, make, capfd):
 
 def test_registry():
     assert NAMES == ("auto", "uno", "ipopt", "slsqp")
-    assert [backend.name for backend in solvers_for("auto")] == list(AUTO_ORDER)
-    for each in AUTO_ORDER:
+    assert [backend.name for backend in solvers_for("auto")] == list(TABLE)
+    for each in TABLE:
         assert solvers_for(each) == (TABLE[each],)
     with pytest.raises(UnknownNameError, match="Did you mean 'ipopt'") as caught:
         solvers_for("ipop")

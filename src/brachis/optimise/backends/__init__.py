@@ -15,7 +15,6 @@ from brachis.optimise.backends.protocol import (
 )
 
 __all__ = [
-    "AUTO_ORDER",
     "FEASIBLE",
     "NAMES",
     "Curvature",
@@ -34,8 +33,7 @@ TABLE = {
     backend.NAME: Solver(backend.NAME, backend.run, is_interior=backend is ipopt)
     for backend in (uno, ipopt, slsqp)
 }
-AUTO_ORDER = tuple(TABLE)
-"""The order in which ``auto`` tries them."""
+"""Backends by name, in the order in which ``auto`` tries them."""
 NAMES = ("auto", *TABLE)
 
 
@@ -51,7 +49,7 @@ def solvers_for(name: str) -> tuple[Solver, ...]:
     UnknownNameError
     """
     if name == "auto":
-        return tuple(TABLE[each] for each in AUTO_ORDER)
+        return tuple(TABLE.values())
     if name not in TABLE:
         raise UnknownNameError("solver", name, NAMES, where="solver.name")
     return (TABLE[name],)

@@ -52,6 +52,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         return objective_at(problem, point, objective_at(problem, last))
 
     def callback(point: np.ndarray) -> None:
+        """Leave the loop where the solve has to stop, or the iterates have settled."""
         last[:] = point
         value = objective(point)
         has_settled = monitor.has_settled(value, residual(problem, point))

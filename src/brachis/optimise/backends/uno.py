@@ -230,6 +230,7 @@ def _set_hessian(model: Any, hessian: SecantHessian, units: np.ndarray) -> None:
     def write(
         point: np.ndarray, multiplier: float, multipliers: np.ndarray, out: np.ndarray
     ) -> None:
+        """Write the lower triangle in the scaled variables."""
         matrix = hessian(units * point, multiplier, np.array(multipliers))
         out[:] = factors * matrix[rows, columns]
 
