@@ -54,7 +54,7 @@ from brachis.task import (
     check_keywords,
     task_with,
 )
-from brachis.timing import SlowTimingWarning, find_timing_gap
+from brachis.timing import SlowTimingWarning
 from brachis.trajectory import Motion, motion_of
 
 Given = Source | Robot | None
@@ -186,8 +186,7 @@ def plan(
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=asked.strict)
-            assert best.trajectory is not None
-            gap = find_timing_gap(best.trajectory, problem.limits)
+            gap = search.find_timing_gap()
             is_given = asked.spline.intervals != "auto"
             if gap is not None and not end_time:
                 slow = gap.issues(intervals_are_given=is_given)

@@ -368,9 +368,9 @@ def solve_without_third_order_limits(
     reports : tuple of SolverReport
         Of the solve without them.
     """
-    easier = program.without_orders_above(2)
-    if len(easier.limits) == len(program.limits):
+    if all(limit.order <= 2 for limit in program.limits):
         return x, ()
+    easier = program.without_orders_above(2)
     report = solve(easier.with_margin(margin), x)
     if report.status.usable:
         with contextlib.suppress(UnreachableError):

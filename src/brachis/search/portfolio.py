@@ -14,10 +14,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import itertools
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +24,7 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore
 from brachis.errors import write_count
 from brachis.optimise.backends import SolveStatus
-from brachis.optimise.candidate import Candidate, InitialGuess, coordinates
+from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import candidates
 from brachis.search.failure import (
@@ -39,15 +37,13 @@ from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.hopeless import explain_holding, explain_postures, explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
-from brachis.search.same_motion import is_same_motion
+from brachis.search.same_motion import SAME_MOTION, is_same_motion
 from brachis.search.schedule import Batch, batches
-from brachis.timing import find_timing_gap
+from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory
 
 NOT_TRIED = "not tried: the search ended"
 """Status of a candidate for which there was no time."""
-SAME_MOTION = "same motion as another"
-"""Status of a candidate that agrees with one that ranks before it."""
 _GAINS_MORE = 0.998
 """Factor by which another candidate may gain more by better knots than those so far."""
 _REFINED = 5e-3
@@ -102,6 +98,7 @@ class Search:
         self._known: list[Candidate] = []
         self._gain = 1.0
         self._to_beat = np.inf
+        self._gap: tuple[Candidate, TimingGap | None] | None = None
 
     @property
     def is_satisfied(self) -> bool:
@@ -180,10 +177,17 @@ class Search:
                 self._refuse_what_is_out_of_reach()
             yield batch
 
+    def find_timing_gap(self) -> TimingGap | None:
+        """Compare the best motion with the fastest timing of its own joint path; kept for as long as it is the best."""
+        assert self.best is not None and self.best.trajectory is not None
+        if self._gap is None or self._gap[0] is not self.best:
+            found = find_timing_gap(self.best.trajectory, self._problem.limits)
+            self._gap = (self.best, found)
+        return self._gap[1]
+
     def _second_opinion(self, batch: Batch) -> Iterator[Batch]:
         """Yield a fallback if the best motion is far slower than the fastest timing of its own joint path."""
-        assert self.best is not None and self.best.trajectory is not None
-        found = find_timing_gap(self.best.trajectory, self._problem.limits)
+        found = self.find_timing_gap()
         if found is not None and not found.left_out and found.gap > _FAR:
             yield batch
 
@@ -470,29 +474,3 @@ def _solve_in_time(
 def round_end_time(time: float) -> float:
     """Leave out the digits in which processes differ, so that these do not choose."""
     return float(f"{time:.6g}")
-
-
-WORDS = ("joints", "branch", "origin")
-TIMES = ("coarse [s]", "t_end [s]")
-STATUS = "status"
-"""The columns; named as in the JSON."""
-
-
-def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Return a row of text for each candidate, as `Candidate.to_dict` gives it; the same motion is listed once."""
-    rows = []
-    for candidate in candidates:
-        status = str(candidate.get("status", ""))
-        if status == SAME_MOTION:
-            continue
-        branch = str(candidate.get("branch", ""))
-        joints = coordinates(candidate.get("redundant_joints", ()), branch)
-        origin = str(candidate.get("origin", ""))
-        times = (_write_seconds(candidate.get(key)) for key in ("coarse", "t_end"))
-        rows.append((joints, branch, origin, *times, status))
-    return rows
-
-
-def _write_seconds(value: object) -> str:
-    is_known = isinstance(value, int | float) and math.isfinite(value)
-    return f"{value:.4f}" if is_known else ""

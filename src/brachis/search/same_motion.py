@@ -8,6 +8,8 @@ from brachis.common import tolerances
 from brachis.errors import UnreachableError
 from brachis.optimise.candidate import Candidate
 
+SAME_MOTION = "same motion as another"
+"""Status of a candidate that agrees with one that ranks before it."""
 _COMPARED = 49
 """Even times, or places, at which motions of a phase are compared."""
 _SAME_LATER = 4e-3

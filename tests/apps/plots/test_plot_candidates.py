@@ -9,7 +9,7 @@ import pytest
 from brachis.apps.plots import plot_candidates
 from brachis.errors import InputError
 from brachis.optimise.candidate import Candidate
-from brachis.search.portfolio import SAME_MOTION
+from brachis.search.same_motion import SAME_MOTION
 
 
 def candidate(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):

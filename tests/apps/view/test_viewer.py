@@ -17,7 +17,7 @@ from brachis.apps.view.panel import look
 from brachis.apps.view.scene import LAYERS
 from brachis.apps.view.tables import candidates_table, state_table, summary
 from brachis.robot import Robot
-from brachis.search.portfolio import SAME_MOTION
+from brachis.search.same_motion import SAME_MOTION
 from support.shown import PANDA, ROOT
 
 pytest.importorskip("viser", reason="viser is not installed")

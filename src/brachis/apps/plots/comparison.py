@@ -11,7 +11,7 @@ import numpy as np
 from brachis.apps.plots import style
 from brachis.errors import InputError
 from brachis.optimise.candidate import Candidate, coordinates
-from brachis.search.portfolio import SAME_MOTION
+from brachis.search.same_motion import SAME_MOTION
 from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:

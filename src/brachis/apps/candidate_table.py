@@ -1,0 +1,35 @@
+"""The candidates of a search as a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from brachis.optimise.candidate import coordinates
+from brachis.search.same_motion import SAME_MOTION
+
+WORDS = ("joints", "branch", "origin")
+TIMES = ("coarse [s]", "t_end [s]")
+STATUS = "status"
+"""The columns; named as in the JSON."""
+
+
+def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """Return a row of text for each candidate, as `Candidate.to_dict` gives it; the same motion is listed once."""
+    rows = []
+    for candidate in candidates:
+        status = str(candidate.get("status", ""))
+        if status == SAME_MOTION:
+            continue
+        branch = str(candidate.get("branch", ""))
+        joints = coordinates(candidate.get("redundant_joints", ()), branch)
+        origin = str(candidate.get("origin", ""))
+        times = (_write_seconds(candidate.get(key)) for key in ("coarse", "t_end"))
+        rows.append((joints, branch, origin, *times, status))
+    return rows
+
+
+def _write_seconds(value: object) -> str:
+    is_known = isinstance(value, int | float) and math.isfinite(value)
+    return f"{value:.4f}" if is_known else ""
