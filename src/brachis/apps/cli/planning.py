@@ -122,9 +122,9 @@ def _plan_task(
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
-    from brachis.apps.candidate_table import STATUS, TIMES, WORDS, candidate_rows
     from brachis.kinematics import CHART
     from brachis.optimise.candidate import describe_coordinates
+    from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
     candidate = result.candidate

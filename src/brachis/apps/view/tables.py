@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.candidate_table import STATUS, TIMES, WORDS, candidate_rows
 from brachis.apps.plots.panels import curves_of, panels_of
+from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import PHASE_COLUMNS, Samples, Trajectory, phase_rows
 
 _CELL = "padding:0 0.35em;white-space:nowrap"
