@@ -89,6 +89,7 @@ def test_a_mean_torque_along_a_path_of_joints(monkeypatch):
         brachis.PlanningError, match=r"rms torque limit of 'joint_2' is too low to hold"
     ) as caught:
         brachis.plan(task)
+    assert "joint_4" not in str(caught.value)
     low, high = map(
         float,
         re.match(
@@ -96,3 +97,11 @@ def test_a_mean_torque_along_a_path_of_joints(monkeypatch):
         ).groups(),
     )
     assert 10.0 < low < high
+    limits = {"joint_2": 10.0, "joint_4": 15.0}
+    task["robot"]["limits"]["rms_torque"] = limits
+    with pytest.raises(
+        brachis.PlanningError, match="and so is that of 'joint_4'"
+    ) as both:
+        brachis.plan(task)
+    keys = [f"robot.limits.rms_torque.{name}" for name in limits]
+    assert [remedy.key for remedy in both.value.remedies] == keys

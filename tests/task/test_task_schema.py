@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from brachis.task import json_schema, load_task
-from brachis.task.schema import unit_of
+from brachis.task.units import unit_of
 
 jsonschema = pytest.importorskip("jsonschema")
 

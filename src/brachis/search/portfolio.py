@@ -34,7 +34,8 @@ from brachis.search.failure import (
     explain_time_limit,
 )
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
-from brachis.search.hopeless import explain_holding, explain_postures, explain_speeds
+from brachis.search.holding import explain_holding, explain_postures
+from brachis.search.hopeless import explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.same_motion import SAME_MOTION, is_same_motion

@@ -32,7 +32,8 @@ from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.closed_form_lattice import ClosedFormLattice, cell_sizes
 from brachis.search.differential_ik import differential_ik_paths
-from brachis.search.hopeless import explain_beyond, refuse_hopeless
+from brachis.search.holding import explain_beyond
+from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
 from brachis.search.phase_plane import (

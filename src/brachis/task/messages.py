@@ -19,6 +19,7 @@ from brachis.task.fields import (
     describe_fields,
     plain,
 )
+from brachis.task.units import unit_of
 
 _M = TypeVar("_M", bound=Model)
 _Location = tuple[str | int, ...]
@@ -253,7 +254,17 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     words += facts.get("words", "").split()
     given = detail["input"]
     hint = _meant([given], words) if isinstance(given, str) else None
-    return problem, found, form.format(**facts) or None, hint
+    allowed = form.format(**facts)
+    if problem == _OUT_OF_RANGE:
+        allowed += _write_unit(location)
+    return problem, found, allowed or None, hint
+
+
+def _write_unit(location: _Location) -> str:
+    """Return the unit of the numbers at a location, behind a comma."""
+    names = [part for part in location if isinstance(part, str) and not _is_tag(part)]
+    unit = unit_of(".".join(names))
+    return f", in {unit}" if unit else ""
 
 
 _MAPPING = "a mapping"
@@ -269,12 +280,13 @@ _TYPES: Final = {
     "none_required": "null",
 }
 """What is expected, by pydantic's names of errors about types."""
+_OUT_OF_RANGE = "out of range"
 _PROBLEMS: Final = {
     "finite_number": ("not a finite number", "a finite number"),
-    "greater_than": ("out of range", "> {gt:g}"),
-    "greater_than_equal": ("out of range", ">= {ge:g}"),
-    "less_than": ("out of range", "< {lt:g}"),
-    "less_than_equal": ("out of range", "<= {le:g}"),
+    "greater_than": (_OUT_OF_RANGE, "> {gt:g}"),
+    "greater_than_equal": (_OUT_OF_RANGE, ">= {ge:g}"),
+    "less_than": (_OUT_OF_RANGE, "< {lt:g}"),
+    "less_than_equal": (_OUT_OF_RANGE, "<= {le:g}"),
     "literal_error": ("not one of the allowed values", "{expected}"),
     "too_short": ("too few items", "at least {min_length}"),
     "too_long": ("too many items", "at most {max_length}"),

@@ -11,7 +11,7 @@ import numpy as np
 from brachis.apps.plots import style
 from brachis.apps.sweeps.plans import VERIFIED
 from brachis.errors import InputError
-from brachis.task.schema import unit_of
+from brachis.task.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
