@@ -161,7 +161,7 @@ class Task(Model):
     brachis: Version
     """Version of the task format."""
     robot: RobotSettings = Field(default_factory=RobotSettings)
-    """The robot."""
+    """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
     """Configuration at the start of the path: {joints: ...} or free. With free, path_start is required unless the path
     begins with a waypoint. A path of joints that begins with a waypoint needs no start."""

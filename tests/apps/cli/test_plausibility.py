@@ -85,6 +85,15 @@ def test_inspect_refuses_what_a_plan_refuses(run, task, write):
     )
 
 
+def test_inspect_refuses_a_path_out_of_reach_as_plan_does(run, task, write):
+    task["path"] = [{"line": {"by": [0.0, 5.0]}}]
+    path = write(task)
+    refused = run("inspect", path)
+    assert refused == run("plan", path)
+    assert refused.code == 2
+    assert "the path is out of reach" in refused.err
+
+
 def test_inspect_says_once_that_limits_look_like_degrees(run, task, write):
     task["robot"]["limits"]["velocity"] = 180
     (line,) = re.findall("warning: .*", run("inspect", write(task)).out)

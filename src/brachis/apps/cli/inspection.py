@@ -94,6 +94,7 @@ def inspect(
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
+    from brachis.problem.plausibility import check_within_reach
     from brachis.problem.problem import Problem
     from brachis.robot import bind
     from brachis.robot.from_task import robot_from_settings
@@ -110,6 +111,7 @@ def inspect(
         with name_task_file(source, keys):
             robot = robot_from_settings(task.robot)
             problem = Problem.of(robot, task)
+            check_within_reach(problem.task_map, problem.path)
         space = space or task.task_space
     else:
         refuse_task_options({"--set": changes}, "a URDF")
