@@ -123,14 +123,14 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
             return start
         looked_at.append(start)
         return dataclasses.replace(
-            start, estimate=[1.5, 1.0, np.inf, 1.001, 1.002, 1.0][len(looked_at) - 1]
+            start, estimate=[1.5, 1.0, np.inf, 1.02, 1.001, 1.009][len(looked_at) - 1]
         )
 
     monkeypatch.setattr(screening, "_improve", quickly)
     monkeypatch.setattr(screening, "_is_same", lambda *_starts: False)
     kept = screening.screen(starts, MOST, NEVER, quiet)
     assert len(looked_at) == 6
-    assert [start.estimate for start in kept] == [1.0, 1.0]
+    assert [start.estimate for start in kept] == [1.0, 1.001]
 
 
 def test_the_better_half_of_a_coarse_search_is_searched_again(starts, monkeypatch):

@@ -27,6 +27,8 @@ from brachis.search.processes import run_in_processes
 
 _SAME_LEAST = 1.003
 """Least times that differ by less than this factor are the same."""
+_NEAR_LEAST = 1.01
+"""Times the least time that is near it: plans from there end within as much of each other, in either order."""
 _COMPARED = 49
 """Even places at which joint paths are compared."""
 _SLOW = 1.03
@@ -53,19 +55,20 @@ def screen(
         With the better joint paths, and their least times as estimates; the fastest first.
     """
     listener(f"improving {len(starts)} joint paths")
-    improve = partial(_improve_most, most=most, deadline=deadline, listener=listener)
+    improve = partial(_improve_most, deadline=deadline, listener=listener)
+    alike = max(2, most // 2)
     if len(starts) > most:
         # The half that looks worse after a coarse search is left out.
-        coarse = improve(starts, coarse_for(starts[0].joint_map.r), 1)
+        coarse = improve(starts, coarse_for(starts[0].joint_map.r), 1, alike + 1)
         count = max(most, (len(coarse) + 1) // 2)
         starts = sorted(coarse, key=lambda start: start.estimate)[:count]
-    solved = improve(starts, ROUGH, CHARTS)
+    solved = improve(starts, ROUGH, CHARTS, alike)
     kept: list[InitialGuess] = []
     for start in sorted(solved, key=lambda start: start.estimate):
         ratio = start.estimate / kept[0].estimate if kept else 1.0
         # Of many, those slower than the fastest one are left out, and so is the second half of equally fast ones.
         is_slow = ratio > _SLOW and len(solved) > most
-        is_one_too_many = ratio <= _SAME_LEAST and len(kept) >= max(2, most // 2)
+        is_one_too_many = ratio <= _SAME_LEAST and len(kept) >= alike
         is_known = any(_is_same(start, other) for other in kept)
         if not (is_slow or is_one_too_many or is_known) and len(kept) < most:
             kept.append(start)
@@ -76,12 +79,12 @@ def _improve_most(
     starts: Sequence[InitialGuess],
     effort: PathEffort,
     charts: int,
+    alike: int,
     *,
-    most: int,
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until as many as are wanted end at the least end time: others are unlikely to end below it."""
+    """Improve guesses until so many end near the least end time: others are unlikely to end below it."""
     work = run_in_processes(
         _improve,
         starts,
@@ -98,8 +101,8 @@ def _improve_most(
             solved.append(start)
             times = np.array([each.estimate for each in solved])
             times = times[np.isfinite(times)]
-            is_least = times <= _SAME_LEAST * times.min(initial=np.inf)
-            if is_least.sum() >= max(4, most):
+            is_least = times <= _NEAR_LEAST * times.min(initial=np.inf)
+            if is_least.sum() >= alike:
                 break
     return solved
 
