@@ -24,13 +24,13 @@ import numpy as np
 
 from brachis.limits import Limit
 from brachis.optimise.boundary import (
+    Boundary,
     BoundarySpline,
     FreePart,
     SparsityPattern,
     sum_powers,
 )
 from brachis.optimise.grid import FixedGrid
-from brachis.path.time_law import TimeLaw
 
 SHORTEST_TIME = 1e-4
 """Least duration of a phase, s: a motion that takes no longer is not held back by any limit."""
@@ -108,11 +108,13 @@ def _differences(part: FreePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """Variables, rows and the Jacobian's pattern; see the module.
+class VariableLayout:
+    """Where variables stand, and where they matter; see the module.
 
     Attributes
     ----------
+    splines : tuple of BoundarySpline
+        Of each curve.
     slices : tuple of slice
         Variables of each curve.
     lengths : slice
@@ -125,15 +127,10 @@ class Layout:
         Point and number of the curve of each entry between those of T and h.
     progress : Progress
         Differences of control points of s; empty without a path.
-    limit_rows : tuple of (K, c) int ndarray
-        Numbers of the rows of each limit; none, (0, c), where its means are held.
     x_lower, x_upper : (v,) ndarray
-    lower, upper : (c,) ndarray
-        Bounds of the rows.
-    jacobian_rows, jacobian_columns : (nnz,) int ndarray
-        Sparsity pattern; each place occurs once.
     """
 
+    splines: tuple[BoundarySpline, ...]
     slices: tuple[slice, ...]
     lengths: slice
     patterns: tuple[SparsityPattern, ...]
@@ -142,28 +139,19 @@ class Layout:
     curve_point: np.ndarray
     curve: np.ndarray
     progress: Progress
-    limit_rows: tuple[np.ndarray, ...]
     x_lower: np.ndarray
     x_upper: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    jacobian_rows: np.ndarray
-    jacobian_columns: np.ndarray
 
     @classmethod
     def of(
-        cls,
-        grid: FixedGrid,
-        splines: Sequence[BoundarySpline],
-        limits: Sequence[Limit],
-        *,
-        has_path: bool,
-        time_law: TimeLaw | None,
-    ) -> Layout:
-        """Lay a phase out over a grid; the first of its `splines` is s where there is a path.
+        cls, grid: FixedGrid, boundary: Boundary, *, has_path: bool
+    ) -> VariableLayout:
+        """Lay the variables of splines over a grid out; the first spline is s where there is a path.
 
         With a time law the duration is given, and none of the splines is s.
         """
+        splines = boundary.splines(grid.knots, grid.degree)
+        time_law = boundary.time_law
         ends = np.cumsum([1, *(spline.free for spline in splines)]).tolist()
         slices = tuple(itertools.starmap(slice, itertools.pairwise(ends)))
         lengths = slice(ends[-1], ends[-1] + len(grid.lower))
@@ -191,51 +179,80 @@ class Layout:
         point = np.concatenate([*points, grid.point])
         of_time = np.zeros(count, dtype=int)
         of_lengths = grid.variable + lengths.start
-        variable = np.concatenate([of_time, *of_curves, of_lengths])
         numbers = np.arange(len(splines)) + int(time_law is not None)
         curve = np.repeat(numbers, [len(pattern.point) for pattern in patterns])
-        curve_point = point[count : count + len(curve)]
+        return cls(
+            splines=splines,
+            slices=slices,
+            lengths=lengths,
+            patterns=patterns,
+            point=point,
+            variable=np.concatenate([of_time, *of_curves, of_lengths]),
+            curve_point=point[count : count + len(curve)],
+            curve=curve,
+            progress=progress,
+            x_lower=x_lower,
+            x_upper=x_upper,
+        )
 
-        limit_rows = []
+
+@dataclass(frozen=True, eq=False)
+class RowLayout:
+    """Where rows and entries of the Jacobian stand; see the module.
+
+    Attributes
+    ----------
+    of_limits : tuple of (K, c) int ndarray
+        Numbers of the rows of each limit; none, (0, c), where its means are held.
+    lower, upper : (c,) ndarray
+        Bounds of the rows.
+    jacobian_rows, jacobian_columns : (nnz,) int ndarray
+        Sparsity pattern; each place occurs once.
+    """
+
+    of_limits: tuple[np.ndarray, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+    jacobian_rows: np.ndarray
+    jacobian_columns: np.ndarray
+
+    @classmethod
+    def of(
+        cls, limits: Sequence[Limit], grid: FixedGrid, variables: VariableLayout
+    ) -> RowLayout:
+        """Lay the rows of limits out, and where they depend on variables."""
+        count = len(grid.t_norm)
+        of_limits = []
         first = 0
         for limit in limits:
             times = 0 if limit.guarantee.is_mean else count
             size = times * len(limit.lower)
             shape = (times, len(limit.lower))
-            limit_rows.append(np.arange(first, first + size).reshape(shape))
+            of_limits.append(np.arange(first, first + size).reshape(shape))
             first += size
-        pairs = list(zip(limits, limit_rows, strict=True))
-        steps = progress.given.shape[1]
+        pairs = list(zip(limits, of_limits, strict=True))
         lower = [np.tile(limit.lower, len(rows)) for limit, rows in pairs]
         upper = [np.tile(limit.upper, len(rows)) for limit, rows in pairs]
 
-        at_points = [rows for rows in limit_rows if len(rows)]
+        progress = variables.progress
+        steps = progress.given.shape[1]
+        at_points = [rows for rows in of_limits if len(rows)]
         pointwise = np.hstack([np.empty((count, 0), dtype=int), *at_points])
-        h = np.arange(lengths.start, lengths.stop)
+        h = np.arange(variables.lengths.start, variables.lengths.stop)
         jacobian_rows = [
-            pointwise[point].ravel(),
+            pointwise[variables.point].ravel(),
             first + progress.row,
             np.full(len(h), first + steps),
         ]
         jacobian_columns = [
-            np.repeat(variable, pointwise.shape[1]),
+            np.repeat(variables.variable, pointwise.shape[1]),
             progress.variable,
             h,
         ]
         return cls(
-            slices,
-            lengths,
-            patterns,
-            point,
-            variable,
-            curve_point,
-            curve,
-            progress,
-            tuple(limit_rows),
-            x_lower,
-            x_upper,
-            np.concatenate([*lower, np.zeros(steps), grid.total]),
-            np.concatenate([*upper, np.full(steps, np.inf), grid.total]),
-            np.concatenate(jacobian_rows),
-            np.concatenate(jacobian_columns),
+            of_limits=tuple(of_limits),
+            lower=np.concatenate([*lower, np.zeros(steps), grid.total]),
+            upper=np.concatenate([*upper, np.full(steps, np.inf), grid.total]),
+            jacobian_rows=np.concatenate(jacobian_rows),
+            jacobian_columns=np.concatenate(jacobian_columns),
         )

@@ -33,7 +33,7 @@ from brachis.optimise.boundary import (
 from brachis.optimise.bspline import ORDERS
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.grid import FixedGrid, FreeGrid
-from brachis.optimise.layout import Layout
+from brachis.optimise.layout import RowLayout, VariableLayout
 from brachis.optimise.motion import Motion, per_second, sample_law
 
 _is_checked = attrgetter("is_checked_at_points")
@@ -55,6 +55,8 @@ class Phase:
         added.
     pause : float, optional
         How long the arm waits at rest after the phase, s.
+    layout : VariableLayout, optional
+        That of another phase with this grid and boundary; by default it is made anew.
 
     Attributes
     ----------
@@ -92,6 +94,7 @@ class Phase:
         *,
         margin: float | None = MARGIN,
         pause: float = 0.0,
+        layout: VariableLayout | None = None,
     ) -> None:
         safeguards = () if margin is None else build_branch_margins(joint_map, margin)
         self.joint_map = joint_map
@@ -99,17 +102,12 @@ class Phase:
         self.evaluator = Evaluator(joint_map, self.limits)
         self.grid = grid
         self.boundary = boundary
-        self.splines = boundary.splines(grid.knots, grid.degree)
         self.pause = pause
         self.time_law = boundary.time_law
-        layout = Layout.of(
-            grid,
-            self.splines,
-            self.limits,
-            has_path=joint_map.path is not None,
-            time_law=self.time_law,
-        )
+        has_path = joint_map.path is not None
+        layout = layout or VariableLayout.of(grid, boundary, has_path=has_path)
         self._layout = layout
+        self.splines = layout.splines
         self._ends_by_duration = any(own.given[1:].any() for own in self.splines)
         self.slices = layout.slices
         self.degree = grid.degree
@@ -124,10 +122,12 @@ class Phase:
         )
         self.x_lower = layout.x_lower
         self.x_upper = layout.x_upper
-        self.lower = layout.lower
-        self.upper = layout.upper
-        self.jacobian_rows = layout.jacobian_rows
-        self.jacobian_columns = layout.jacobian_columns
+        rows = RowLayout.of(self.limits, grid, layout)
+        self._rows_of_limits = rows.of_limits
+        self.lower = rows.lower
+        self.upper = rows.upper
+        self.jacobian_rows = rows.jacobian_rows
+        self.jacobian_columns = rows.jacobian_columns
         self._entries: tuple[LocalBasis, np.ndarray] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
         self._slopes: tuple[Evaluation, np.ndarray] | None = None
@@ -176,6 +176,7 @@ class Phase:
             self.boundary,
             margin=None,
             pause=self.pause,
+            layout=self._layout,
         )
 
     def limits_near(self, curves: np.ndarray) -> list[Limit]:
@@ -320,7 +321,7 @@ class Phase:
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of one of the limits, (K, c); none, (0, c), where its means are held."""
         number = next(i for i, own in enumerate(self.limits) if own is limit)
-        return self._layout.limit_rows[number]
+        return self._rows_of_limits[number]
 
     def mean_weights(self, x: np.ndarray) -> np.ndarray:
         """Weights of the collocation points in a mean over the phase's time, (K,)."""
