@@ -57,17 +57,18 @@ def screen(
     listener(f"improving {len(starts)} joint paths")
     improve = partial(_improve_most, deadline=deadline, listener=listener)
     alike = max(2, most // 2)
-    if len(starts) > most:
+    is_many = len(starts) > most
+    if is_many:
         # The half that looks worse after a coarse search is left out.
         coarse = improve(starts, coarse_for(starts[0].joint_map.r), 1, alike + 1)
         count = max(most, (len(coarse) + 1) // 2)
         starts = sorted(coarse, key=lambda start: start.estimate)[:count]
-    solved = improve(starts, ROUGH, CHARTS, alike)
+    solved = improve(starts, ROUGH, CHARTS, alike if is_many else len(starts))
     kept: list[InitialGuess] = []
     for start in sorted(solved, key=lambda start: start.estimate):
         ratio = start.estimate / kept[0].estimate if kept else 1.0
         # Of many, those slower than the fastest one are left out, and so is the second half of equally fast ones.
-        is_slow = ratio > _SLOW and len(solved) > most
+        is_slow = ratio > _SLOW and is_many
         is_one_too_many = ratio <= _SAME_LEAST and len(kept) >= alike
         is_known = any(_is_same(start, other) for other in kept)
         if not (is_slow or is_one_too_many or is_known) and len(kept) < most:
