@@ -119,7 +119,7 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
     looked_at = []
 
     def quickly(start, _deadline, effort, _charts, _listener):
-        if effort is ROUGH:
+        if effort.places == ROUGH.places:
             return start
         looked_at.append(start)
         return dataclasses.replace(
@@ -134,18 +134,18 @@ def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
 
 
 def test_the_better_half_of_a_coarse_search_is_searched_again(starts, monkeypatch):
-    searched = {COARSE: [], ROUGH: []}
+    searched = {COARSE.places: [], ROUGH.places: []}
 
     def ranked(start, _deadline, effort, _charts, _listener):
-        searched[effort].append(start.origin)
+        searched[effort.places].append(start.origin)
         number = [own.origin for own in starts].index(start.origin)
         return dataclasses.replace(start, estimate=2.0 - 0.1 * number)
 
     monkeypatch.setattr(screening, "_improve", ranked)
     screening.screen(starts, MOST, NEVER, quiet)
     origins = [start.origin for start in starts]
-    assert searched[COARSE] == origins
-    assert searched[ROUGH] == origins[::-1][: (len(starts) + 1) // 2]
+    assert searched[COARSE.places] == origins
+    assert searched[ROUGH.places] == origins[::-1][: (len(starts) + 1) // 2]
 
 
 def test_joint_paths_of_several_redundant_joints_are_screened_with_closed_forms(
@@ -197,3 +197,17 @@ def test_large_programs_over_the_path_go_to_an_interior_point_first(
     again = screening.screen(starts[:2], MOST, NEVER, quiet)
     assert set(solvers) == {"uno"}
     assert again[0].estimate == pytest.approx(plain[0].estimate, rel=1e-2)
+
+
+def test_a_solve_has_to_beat_the_fastest_guess(starts, monkeypatch):
+    asked = []
+
+    def note(start, _deadline, effort, _charts, _listener):
+        asked.append(effort.options.to_beat)
+        return dataclasses.replace(start, estimate=0.9 * start.estimate)
+
+    monkeypatch.setattr(screening, "_improve", note)
+    screening.screen(starts, MOST, NEVER, quiet)
+    least = min(start.estimate for start in starts)
+    assert asked[0] == least
+    assert asked[-1] == pytest.approx(0.9 * least)

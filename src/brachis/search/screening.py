@@ -85,7 +85,13 @@ def _improve_most(
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until so many end near the least end time: others are unlikely to end below it."""
+    """Improve guesses until so many end near the least end time: others are unlikely to end below it.
+
+    A guess that stays slower than the fastest one was at first is given up.
+    """
+    least = min(start.estimate for start in starts)
+    options = dataclasses.replace(effort.options, to_beat=least)
+    effort = dataclasses.replace(effort, options=options)
     work = run_in_processes(
         _improve,
         starts,

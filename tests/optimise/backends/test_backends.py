@@ -143,6 +143,14 @@ def test_iteration_limit(name):
     assert "max_iterations" in report.status.value
 
 
+def test_a_solve_that_does_not_beat_what_it_has_to_ends(name, monkeypatch):
+    monkeypatch.setattr("brachis.optimise.backends.monitor._TRIAL", 2)
+    report = solve(name, disc(), [40.0, -30.0], SolverOptions(to_beat=-1e9))
+    assert not report.status.usable
+    assert report.iterations <= 3
+    assert solve(name, disc(), [40.0, -30.0], SolverOptions(to_beat=1e9)).status.usable
+
+
 @pytest.mark.usefixtures("wall_clock")
 def test_time_limit(name):
     problem = disc(pause=0.03)

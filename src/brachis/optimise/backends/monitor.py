@@ -24,6 +24,8 @@ _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 
 
+_TRIAL = 10
+"""Iterations after which a solve has to be faster than what it has to beat."""
 _NEARLY_FEASIBLE = 1e-3
 """Violation of rows up to which an iterate counts."""
 
@@ -97,7 +99,8 @@ class SolveMonitor:
                 self._progress(self.iterations, objective)
             except KeyboardInterrupt as interrupt:
                 self.interrupt = interrupt
-        return self.must_stop()
+        is_beaten = self.iterations >= _TRIAL and objective > self.options.to_beat
+        return is_beaten or self.must_stop()
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
         """Tell whether iterates have been no better for long; kept in `stagnated`.

@@ -116,6 +116,8 @@ class SolverOptions:
     anywhere : bool
         Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
         asks; IPOPT counts all iterates in any case.
+    to_beat : float
+        A solve ends whose iterates have a larger objective after 10 iterations.
     apart : bool
         Whether the solve runs in a process of its own, which is ended when nothing is heard of it for long. That takes
         some 0.07 s more.
@@ -128,6 +130,7 @@ class SolverOptions:
     patience: int = 15
     first_step: float = 1.0
     anywhere: bool = False
+    to_beat: float = np.inf
     apart: bool = False
 
 
