@@ -22,6 +22,7 @@ from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.retiming import ROUGH, PathEffort, coarse_for
 from brachis.optimise.transcription import breaks_of, program_of
+from brachis.search.lattice import farthest
 from brachis.search.over_path import CHARTS, improve_guess
 from brachis.search.processes import run_in_processes
 
@@ -60,7 +61,8 @@ def screen(
     is_many = len(starts) > most
     if is_many:
         # The half that looks worse after a coarse search is left out.
-        coarse = improve(starts, coarse_for(starts[0].joint_map.r), 1, alike + 1)
+        effort = coarse_for(starts[0].joint_map.r)
+        coarse = improve(_spread_out(starts), effort, 1, alike + 1)
         count = max(most, (len(coarse) + 1) // 2)
         starts = sorted(coarse, key=lambda start: start.estimate)[:count]
     solved = improve(starts, ROUGH, CHARTS, alike if is_many else len(starts))
@@ -74,6 +76,17 @@ def screen(
         if not (is_slow or is_one_too_many or is_known) and len(kept) < most:
             kept.append(start)
     return kept
+
+
+def _spread_out(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
+    """Order guesses so that each is the farthest from all before it; of equal ones the first is kept.
+
+    Neighbours end in the same optimum. Where some that are far apart do, others do too.
+    """
+    paths = [start.postures_at_places(_COMPARED).ravel() for start in starts]
+    points = np.nan_to_num(paths)
+    order = [0, *farthest(points, points[:1], len(points) - 1)]
+    return [starts[number] for number in dict.fromkeys(order)]
 
 
 def _improve_most(
