@@ -144,7 +144,8 @@ def test_the_better_half_of_a_coarse_search_is_searched_again(starts, monkeypatc
     monkeypatch.setattr(screening, "_improve", ranked)
     screening.screen(starts, MOST, NEVER, quiet)
     origins = [start.origin for start in starts]
-    assert searched[COARSE.places] == origins
+    assert searched[COARSE.places][0] == origins[0]
+    assert sorted(searched[COARSE.places]) == sorted(origins)
     assert searched[ROUGH.places] == origins[::-1][: (len(starts) + 1) // 2]
 
 
@@ -211,3 +212,15 @@ def test_a_solve_has_to_beat_the_fastest_guess(starts, monkeypatch):
     least = min(start.estimate for start in starts)
     assert asked[0] == least
     assert asked[-1] == pytest.approx(0.9 * least)
+
+
+def test_guesses_are_looked_at_the_farthest_from_each_other_first(starts):
+    first, second, *others = screening._spread_out([*starts, starts[0]])
+    assert first is starts[0]
+    assert {start.origin for start in (first, second, *others)} <= {
+        start.origin for start in starts
+    }
+    paths = [start.postures_at_places(49) for start in starts]
+    distances = [np.abs(path - paths[0]).max() for path in paths]
+    assert second is starts[int(np.argmax(distances))]
+    assert len(others) + 2 <= len(starts)

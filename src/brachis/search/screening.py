@@ -64,7 +64,9 @@ def screen(
         effort = coarse_for(starts[0].joint_map.r)
         coarse = improve(_spread_out(starts), effort, 1, alike + 1)
         count = max(most, (len(coarse) + 1) // 2)
-        starts = sorted(coarse, key=lambda start: start.estimate)[:count]
+        place = {start.origin: number for number, start in enumerate(starts)}
+        coarse.sort(key=lambda start: (start.estimate, place[start.origin]))
+        starts = coarse[:count]
     solved = improve(starts, ROUGH, CHARTS, alike if is_many else len(starts))
     kept: list[InitialGuess] = []
     for start in sorted(solved, key=lambda start: start.estimate):
