@@ -56,6 +56,7 @@ _RAMP = 2.0
 """Places over which the narrowing grows from nothing, beside a given end posture."""
 _MORE = 1.2
 """Factor on a violation by which limits are narrowed."""
+_Evaluated = tuple[tuple[np.ndarray, ...], Evaluation]
 _STATIONS_A_PIECE = 4
 """Stations in every piece of a path, at most as far apart as others."""
 
@@ -69,8 +70,10 @@ def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
 
 
 def _moments_along(phase: Phase, curves: np.ndarray) -> Moments:
-    """Stand still in postures along curves, (S, c)."""
+    """Stand still in postures along curves, (S, c); raise UnreachableError where there is none."""
     q = phase.joint_map.postures(curves)
+    if not np.isfinite(q).all():
+        raise UnreachableError("the joint path leaves the joint map")
     still = np.zeros_like(q)
     return Moments(q, still, still, still, curves[:, 0])
 
@@ -158,9 +161,7 @@ class PathPhase:
             self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(self._basis.columns)
         self._set_constants()
-        self._last: tuple[bytes, tuple[tuple[np.ndarray, ...], Evaluation]] | None = (
-            None
-        )
+        self._last: tuple[bytes, _Evaluated] | None = None
 
     def _set_pattern(self, columns: np.ndarray) -> None:
         """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
@@ -261,7 +262,7 @@ class PathPhase:
         """Joint motion and limits where these hold; raises UnreachableError where there is none."""
         return self._evaluate(x)[1]
 
-    def _evaluate(self, x: np.ndarray) -> tuple[tuple[np.ndarray, ...], Evaluation]:
+    def _evaluate(self, x: np.ndarray) -> _Evaluated:
         """Return `_motion` and `evaluate`, kept until x changes."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:

@@ -37,6 +37,8 @@ DEGREE = 5
 """Of all fitted curves: C4 at their knots."""
 _NOISY_POINTS = 10
 """Least number of points in an interval where points scatter: with fewer a curve would follow the scatter."""
+_SMALL = 0.3
+"""Part of the tolerance up to which scatter is small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,28 +204,42 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
         return _interpolate(points, sigma)
     every = -(-len(points) // 8_000)  # points that are looked at while knots are added
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
-    noisy = scatter.noisy(tolerance)
-    rough = _add_knots(
-        points.only(chosen),
-        sigma[chosen],
-        _first_breaks(points, sigma),
-        tolerance,
-        noisy=noisy,
-    )
-    if rough is None:
-        return _interpolate(points, sigma)
-    places, breaks = _over_arc_length(rough, points)
-    sigma = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
-    fit = _add_knots(points, sigma, breaks, tolerance, noisy=noisy)
-    if fit is not None and fit.ratios(tolerance).max() <= 1.0:
-        return _use_fewest_knots(
-            points, _remove_knots(points, fit, tolerance), tolerance
+    fits = []
+    for least in _least_points(tolerance, scatter):
+        rough = _add_knots(
+            points.only(chosen),
+            sigma[chosen],
+            _first_breaks(points, sigma),
+            tolerance,
+            least,
         )
-    return (
-        _interpolate(points, sigma)
-        if fit is None or (not noisy and len(points) <= 2_000)
-        else fit
+        if rough is None:
+            return _interpolate(points, sigma)
+        places, breaks = _over_arc_length(rough, points)
+        along = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
+        fit = _add_knots(points, along, breaks, tolerance, least)
+        if fit is not None and fit.ratios(tolerance).max() <= 1.0:
+            return _use_fewest_knots(
+                points, _remove_knots(points, fit, tolerance), tolerance
+            )
+        fits.append(fit)
+    if fits[0] is None or (least == 1 and len(points) <= 2_000):
+        return _interpolate(points, along)
+    return fits[0]
+
+
+def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
+    """List how many points an interval may have, no fewer; smaller numbers where the one before will not do.
+
+    Scatter that is small beside the tolerance may be followed where the path bends.
+    """
+    if not scatter.noisy(tolerance):
+        return (1,)
+    is_small = (
+        scatter.deviation <= _SMALL * tolerance.position
+        and scatter.turning <= _SMALL * tolerance.orientation
     )
+    return (_NOISY_POINTS, _NOISY_POINTS // 2, 2, 1) if is_small else (_NOISY_POINTS,)
 
 
 def _first_breaks(points: Points, sigma: Array) -> Array:
@@ -234,10 +250,12 @@ def _first_breaks(points: Points, sigma: Array) -> Array:
 
 
 def _add_knots(
-    points: Points, sigma: Array, breaks: Array, tolerance: FitTolerance, *, noisy: bool
+    points: Points, sigma: Array, breaks: Array, tolerance: FitTolerance, least: int
 ) -> Fit | None:
-    """Halve the intervals in which the tolerance is exceeded, until none is or none can be; None where no fit is."""
-    least = _NOISY_POINTS if noisy else 1
+    """Halve the intervals in which the tolerance is exceeded, until none is or none can be; None where no fit is.
+
+    No interval gets fewer points than `least`.
+    """
     fit = None
     for _ in range(40):
         try:
