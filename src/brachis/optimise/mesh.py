@@ -36,12 +36,21 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
+_FEW_INTERVALS = 12
+"""Intervals of a phase over which a solve begins, no fewer,"""
+_FEWEST_INTERVALS = 6
+"""or this many, if there are more variables than"""
+_COARSE_VARIABLES = 100
+"""these: from far away such solves take hundreds of iterations, and each of them the longer the more variables."""
 _SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
 
 
 def coarsest(program: Program) -> Program:
-    """Return the program over every 2^k-th of its knots, k as large as leaves a dozen intervals."""
+    """Return the program over every 2^k-th of its knots, k as large as leaves a dozen intervals.
+
+    Half a dozen is enough where a solve would have many variables: several phases, several redundant joints.
+    """
     return next(_levels(program))
 
 
@@ -108,7 +117,11 @@ def _transfer(
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    halvings = [int(np.log2(max(own.intervals / 12, 1))) for own in program.phases]
+    for least in (_FEW_INTERVALS, _FEWEST_INTERVALS):
+        counts = [own.intervals / least for own in program.phases]
+        halvings = [int(np.log2(max(count, 1.0))) for count in counts]
+        if program.variables <= _COARSE_VARIABLES * 2 ** max(halvings):
+            break
     for k in range(max(halvings), 0, -1):
         pairs = zip(program.phases, halvings, strict=True)
         yield program.with_phases(
