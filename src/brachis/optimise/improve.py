@@ -26,6 +26,7 @@ from brachis.optimise.backends import (
     SolverReport,
     SolveStatus,
     objective_at,
+    residual,
     solver_for_large,
 )
 from brachis.optimise.near_rows import NearRows, solve_near_rows
@@ -200,6 +201,29 @@ def judge_early_end(report: SolverReport, before: float) -> SolverReport:
     if is_better and report.status in _EARLY:
         return replace(report, status=SolveStatus.ACCEPTABLE)
     return report
+
+
+def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
+    """Keep the answer of a solve that ran out of time, or the point x from which it began, if that is feasible.
+
+    Any motion within the limits is better than none.
+    """
+    report = solved.report
+    if report.status is not SolveStatus.TIME_LIMIT:
+        return solved
+    program = solved.program
+    if not report.feasible:
+        report = replace(
+            report,
+            x=x,
+            objective=objective_at(program, x),
+            violation=residual(program, x),
+            multipliers=np.zeros_like(report.multipliers),
+        )
+    if not report.feasible:
+        return solved
+    report = replace(report, status=SolveStatus.ACCEPTABLE)
+    return replace(solved, reports=(*solved.reports[:-1], report))
 
 
 def with_last(

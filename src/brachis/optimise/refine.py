@@ -273,8 +273,10 @@ def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
 
 _LONGEST = 0.01
 """Fraction by which a motion may get slower where nothing else makes the limits hold."""
-_LONGEST_IF_LATE = 0.1
+_LONGEST_IF_LATE = 1.0
 """The same where the time is up: a slower motion within the limits is better than none."""
+_CLOSE = 1.01
+"""Factor between a time that is too short and one that is long enough, from which on they are close."""
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 
@@ -385,9 +387,11 @@ def _lengthen(
     goal = options.tolerance * _GOAL
     longest = min(dense.end_time(x) * (1.0 + by), options.longest)
     factor = 1.0
+    too_short = factor
     best = (factor, violation)
     while goal < violation:
         before = violation
+        too_short = factor
         factor *= 1.0 + violation - 0.5 * goal
         if not dense.end_time(x) * factor <= longest:
             break
@@ -396,4 +400,12 @@ def _lengthen(
             best = (factor, violation)
         if violation > 0.99 * before:
             break
+    # Jerks fall with the third power of the time: less may be enough.
+    while best[1] <= goal and best[0] > _CLOSE * too_short:
+        factor = np.sqrt(best[0] * too_short)
+        violation, _ = violations(dense, dense.with_time_scaled(x, factor), goal)
+        if violation <= goal:
+            best = (factor, violation)
+        else:
+            too_short = factor
     return best

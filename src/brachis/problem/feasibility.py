@@ -270,8 +270,34 @@ def check_regular(
 
 def lacks_a_direction(task_map: TaskMap) -> bool:
     """Tell whether the arm can nowhere move its tool in all directions of the task space."""
-    postures = np.random.default_rng(0).uniform(-1.0, 1.0, (20, task_map.robot.n))
-    return bool(_least_singular_values(task_map, postures).max() < _REGULAR)
+    sizes = _least_singular_values(task_map, _some_postures(task_map))
+    return bool(sizes.max() < _REGULAR)
+
+
+def check_movable(task_map: TaskMap) -> None:
+    """Refuse a coordinate of the task space that no joint changes, such as z of an arm in a plane.
+
+    Raises
+    ------
+    InputError
+    """
+    jacobian = task_map.jacobian(task_map.twists(_some_postures(task_map)))
+    moves = np.abs(jacobian).max(axis=(0, 2)) > _REGULAR
+    if moves.all():
+        return
+    fixed = [row for row, own in zip(task_map.rows, moves, strict=True) if not own]
+    others = [row for row, own in zip(task_map.rows, moves, strict=True) if own]
+    raise InputError(
+        f"no joint changes {', '.join(fixed)} of the tool",
+        where="task_space",
+        found=f"[{', '.join(task_map.rows)}]",
+        allowed=f"[{', '.join(others)}]" if others else None,
+    )
+
+
+def _some_postures(task_map: TaskMap) -> np.ndarray:
+    """Draw postures, (20, n)."""
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (20, task_map.robot.n))
 
 
 def _least_singular_values(task_map: TaskMap, postures: np.ndarray) -> np.ndarray:

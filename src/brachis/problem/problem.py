@@ -28,6 +28,7 @@ from brachis.path import (
 )
 from brachis.problem.feasibility import (
     branch_of,
+    check_movable,
     check_postures,
     check_regular,
     check_smoothness,
@@ -309,6 +310,8 @@ def decompositions_of(
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     asked = task.branch != "auto" or task.search.guesses != "lattice"
+    if not matches:
+        check_movable(task_map)
     if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
         if len(found) <= 1:
             # Nothing to choose: the reasons of the only choice, or the wrong number of joints.

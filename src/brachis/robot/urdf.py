@@ -66,7 +66,7 @@ def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
                 where=where,
                 found="a mimic joint that moves with the chain",
                 allowed="independent joints",
-                hint="Remove the mimic element, or lock the joint that it follows with robot.locked_joints",
+                hint=f"Remove the mimic element, or lock {name} and {leader} with robot.locked_joints",
             )
 
 
@@ -192,6 +192,15 @@ def read_chain(
                 found=position,
                 allowed=f"finite, within {FARTHEST:g} rad or m of zero",
             )
+        nearest = _clip_to_range(tree.joints[name], position)
+        if abs(nearest - position) > tolerances.ANGLE:
+            unit = "m" if tree.joints[name].get("type") == "prismatic" else "rad"
+            raise UrdfError(
+                "the position of a locked joint is out of its range",
+                where=f"robot.locked_joints.{name}",
+                found=f"{position:g} {unit}",
+                allowed=f"{'at most' if nearest < position else 'at least'} {nearest:g} {unit}",
+            )
     chain = tuple(
         name for name in path if name in movable and name not in locked_joints
     )
@@ -267,11 +276,16 @@ def _joints_between(tree: UrdfTree, base: str, tool: str, where: str) -> list[st
 
 def _rest_position(joint: Element) -> float:
     """Position at which a joint off the chain is held: zero, or the nearest end of its range."""
+    return _clip_to_range(joint, 0.0)
+
+
+def _clip_to_range(joint: Element, position: float) -> float:
+    """Return a position, or the end of the joint's range that is next to it."""
     if joint.get("type") == "continuous":
-        return 0.0
+        return position
     lower = number_of(joint, "limit", "lower", -np.inf)
     upper = number_of(joint, "limit", "upper", np.inf)
-    return float(np.clip(0.0, lower, upper)) if lower <= upper else 0.0
+    return float(np.clip(position, lower, upper)) if lower <= upper else position
 
 
 def _read_limit(joint: Element) -> UrdfLimit:

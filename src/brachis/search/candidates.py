@@ -48,6 +48,7 @@ from brachis.optimise.improve import (
     SolverSession,
     attempt_once,
     improve,
+    keep_feasible,
 )
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.phase_timing import time_phases
@@ -134,6 +135,7 @@ def _solve_over_time(
         target = program
     x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
     solved = solve_by_margin_continuation(program, x, session, MARGINS)
+    solved = keep_feasible(solved, x)
     status = solved.report.status
     words = status.name.lower().replace("_", " ")
     if status is SolveStatus.OPTIMAL:

@@ -26,7 +26,7 @@ from brachis.errors import (
 
 EXIT_CODES = (
     "0    done; of a plan: planned and verified",
-    "1    no verified plan; a bug in brachis; output that cannot be written",
+    "1    no verified plan; a bug in brachis; standard output that cannot be written",
     "2    wrong input: a file, a key, an option",
     "3    planned and verified, but a figure could not be written",
     "130  interrupted (Ctrl-C) before there was a motion",
