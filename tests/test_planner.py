@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import sys
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.common.deadline import Deadline
 from brachis.errors import StartError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
@@ -58,6 +60,16 @@ def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
         )
 
 
+def test_a_coordinate_that_no_joint_changes_is_named():
+    with pytest.raises(brachis.InputError, match="no joint changes z of the tool"):
+        brachis.plan(
+            "scara3",
+            start=[0.5, -2.0, 2.0],
+            path=brachis.Line(by=[0.1, 0.1]),
+            task_space=["x", "z"],
+        )
+
+
 def test_task_of_the_result_repeats_the_plan():
     result = brachis.plan(robot(12.0), task())
     assert brachis.plan(result.task).t_end == pytest.approx(result.t_end, rel=1e-6)
@@ -75,6 +87,18 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
     refined = refine(program, first, solve_with_uno, RefinementOptions())
     assert dense.violation(refined.x).max() <= 1e-4
     assert refined.t_end > first.objective
+
+
+def test_if_the_time_is_up_a_motion_gets_as_slow_as_it_has_to_and_hardly_more():
+    program, _ = brachis.transcribe(
+        robot(), brachis.load_task(task(redundant_joints=["j1"]))
+    )
+    first = solve_with_uno(program, next(starting_points(program)))
+    fast = dataclasses.replace(first, x=program.with_time_scaled(first.x, 0.8))
+    late = RefinementOptions(deadline=Deadline(0.0))
+    found = refine(program, fast, solve_with_uno, late)
+    assert found.violation <= 1e-4
+    assert found.t_end < 1.1 * first.objective
 
 
 def test_without_refinement_the_answer_is_left_as_it_is():

@@ -22,6 +22,7 @@ from brachis.optimise.improve import (
     SolverSession,
     attempt_once,
     improve,
+    keep_feasible,
 )
 from brachis.optimise.near_rows import NearRows
 from brachis.optimise.program import Program
@@ -214,6 +215,29 @@ def test_a_solve_begins_within_the_limits():
     begun = begin(program, fast)
     assert begun[0] > fast[0]
     assert worst(program, begun) <= 1.0 + 1e-6
+
+
+def test_if_the_time_is_up_a_feasible_start_is_the_answer():
+    program = Program([phase_of("r1")])
+    begun = shortest_time(program, next(starting_points(program)))
+    far = program.with_time_scaled(begun, 0.5)
+    late = SolverReport(
+        "uno",
+        SolveStatus.TIME_LIMIT,
+        far,
+        1.0,
+        1.0,
+        np.zeros(len(program.lower)),
+        3,
+        1.0,
+        "",
+    )
+    kept = keep_feasible(SolvedProgram(program, (late,)), begun)
+    assert kept.usable
+    np.testing.assert_array_equal(kept.report.x, begun)
+    assert kept.t_end == program.end_time(begun)
+    none = keep_feasible(SolvedProgram(program, (late,)), far)
+    assert none.report is late
 
 
 def test_a_start_is_not_made_longer_than_it_may_be():

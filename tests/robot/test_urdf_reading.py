@@ -284,6 +284,13 @@ def test_locked_joint_on_the_chain():
         )
 
 
+def test_a_locked_joint_has_to_be_within_its_range():
+    with pytest.raises(
+        UrdfError, match=r"locked_joints.j2: .*out of its range; found 7 rad"
+    ):
+        load([TURN, TURN], locked_joints={"j2": 7.0})
+
+
 def test_chain_without_moving_joints():
     with pytest.raises(UrdfError, match="no joint moves the tool"):
         load([TURN], locked_joints={"j1": 0.0})

@@ -131,7 +131,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
-    name = _FOR_MANY if most > _MANY else solvers_for(task.solver.name)[0].name
+    name = _FOR_MANY if most > _MANY else start.solver
     solve = _session(name, soon, listener, patience=5)
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)

@@ -266,11 +266,13 @@ def _refine_if_fast(
     first = solvers_for(candidate.start.problem.task.solver.name)[0]
     for backend in dict.fromkeys((first, session.backend)):
         own = dataclasses.replace(session, backend=backend)
-        done = refine_and_verify(
-            candidate, adapted.program, adapted.reports, own, options
-        )
-        if done.is_settled:
-            break
+        # The first one may not be installed.
+        with contextlib.suppress(ImportError):
+            done = refine_and_verify(
+                candidate, adapted.program, adapted.reports, own, options
+            )
+            if done.is_settled:
+                break
     return done
 
 
