@@ -127,8 +127,8 @@ class PointFile(Model):
     units: FileUnits = Field(default_factory=FileUnits)
     """Units of the numbers in the file."""
     tolerance: FitTolerance | None = None
-    """Largest distance of the points from the path. The path is then a fit with few knots, suitable for many or noisy
-    points. Null: the path passes through all points."""
+    """Largest distances of the points from the path, for example {position: 0.1 mm, orientation: 0.5 deg}. The path is
+    then a fit with few knots, suitable for many or noisy points. Null: the path passes through all points."""
     corner: CornerMode = "blend"
     """What happens to corners. stop: the tool stops there. blend: they are rounded within the tolerance. refuse: they
     are listed in an error. Without a tolerance only stop finds corners."""
