@@ -204,26 +204,32 @@ def judge_early_end(report: SolverReport, before: float) -> SolverReport:
 
 
 def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
-    """Keep the answer of a solve that ran out of time, or the point x from which it began, if that is feasible.
+    """Keep the answer of a solve that ran out of time, or the point x from which it began, whichever is feasible.
 
-    Any motion within the limits is better than none.
+    Any motion within the limits is better than none. Of two the faster one is kept.
     """
     report = solved.report
     if report.status is not SolveStatus.TIME_LIMIT:
         return solved
     program = solved.program
-    if not report.feasible:
-        report = replace(
-            report,
-            x=x,
-            objective=objective_at(program, x),
-            violation=residual(program, x),
-            multipliers=np.zeros_like(report.multipliers),
-        )
-    if not report.feasible:
+    begun = replace(
+        report,
+        x=x,
+        objective=objective_at(program, x),
+        violation=residual(program, x),
+        multipliers=np.zeros_like(report.multipliers),
+    )
+    feasible = [own for own in (report, begun) if own.feasible]
+    if not feasible:
         return solved
-    report = replace(report, status=SolveStatus.ACCEPTABLE)
-    return replace(solved, reports=(*solved.reports[:-1], report))
+    fastest = min(feasible, key=lambda own: own.objective)
+    kept = replace(fastest, status=SolveStatus.ACCEPTABLE)
+    reports = (*solved.reports[:-1], kept)
+    return replace(
+        solved,
+        reports=reports,
+        not_completed="a solve ran out of time, and its motion may be far from the fastest",
+    )
 
 
 def with_last(

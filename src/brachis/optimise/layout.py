@@ -109,12 +109,12 @@ def _differences(part: FreePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class VariableLayout:
-    """Where variables stand, and where they matter; see the module.
+    """Places of the variables in x, and the collocation points at which they matter; see the module.
 
     Attributes
     ----------
     splines : tuple of BoundarySpline
-        Of each curve.
+        One for each curve.
     slices : tuple of slice
         Variables of each curve.
     lengths : slice
@@ -220,7 +220,7 @@ class RowLayout:
     def of(
         cls, limits: Sequence[Limit], grid: FixedGrid, variables: VariableLayout
     ) -> RowLayout:
-        """Lay the rows of limits out, and where they depend on variables."""
+        """Give every row of the limits its number, and list on which variables it depends."""
         count = len(grid.t_norm)
         of_limits = []
         first = 0

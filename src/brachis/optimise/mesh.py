@@ -37,11 +37,12 @@ from brachis.optimise.refine import RefinementOptions, merge_points, refine
 from brachis.task import SplineSettings
 
 _FEW_INTERVALS = 12
-"""Intervals of a phase over which a solve begins, no fewer,"""
+"""Least number of intervals of a phase over which a solve begins."""
 _FEWEST_INTERVALS = 6
-"""or this many, if there are more variables than"""
+"""The same for programs of many variables."""
 _COARSE_VARIABLES = 100
-"""these: from far away such solves take hundreds of iterations, and each of them the longer the more variables."""
+"""Variables, about, above which these are many. From far away a solve takes hundreds of iterations, and each of them
+the longer the more variables there are."""
 _SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
 

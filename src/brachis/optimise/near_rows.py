@@ -140,7 +140,7 @@ def solve_near_rows(
         reports.append(report)
         slack = _slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
-        is_over = report.status is SolveStatus.TIME_LIMIT
+        is_over = report.status in (SolveStatus.TIME_LIMIT, SolveStatus.BEATEN)
         # With all rows the solve would use up its iterations too.
         is_spent = report.status is SolveStatus.ITERATION_LIMIT and report.feasible
         is_good = is_spent and report.objective <= first + _LOSS * abs(first)

@@ -56,9 +56,10 @@ _RAMP = 2.0
 """Places over which the narrowing grows from nothing, beside a given end posture."""
 _MORE = 1.2
 """Factor on a violation by which limits are narrowed."""
-_Evaluated = tuple[tuple[np.ndarray, ...], Evaluation]
 _STATIONS_A_PIECE = 4
 """Stations in every piece of a path, at most as far apart as others."""
+_Evaluated = tuple[tuple[np.ndarray, ...], Evaluation]
+"""The motion at the places where limits hold, and the limits there."""
 
 
 def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
@@ -132,30 +133,28 @@ class PathPhase:
         self._number = np.pad(number, 1, mode="edge")
         self._ahead = np.pad(inner, 1, constant_values=(1.0, 0.0))[:, None]
         behind = self._ahead[:, 0] * self._steps[self._number]
-        places = self._s[self._number + 1] - behind
-        self._places = places
-        times = np.interp(self._s, curves[:, 0], t)
-        squares = own.course.curves(timing, times)[1][:, 0] ** 2
-        if phase.time_law is not None:
-            squares = _follow(phase.time_law, self._s) ** 2
+        self._places = self._s[self._number + 1] - behind
+        law = phase.time_law
+        rates = own.course.curves(timing, np.interp(self._s, curves[:, 0], t))[1][:, 0]
+        squares = (rates if law is None else _follow(law, self._s)) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
-        evenly = np.linspace(0.0, timing.t_end, intervals + 1)
-        self.breaks = self._part(np.interp(evenly, t, curves[:, 0]))
+        edges = np.linspace(0.0, timing.t_end, intervals + 1)
+        self.breaks = self._part(np.interp(edges, t, curves[:, 0]))
         self._knots = clamped_knots(_DEGREE, self.breaks)
-        self._basis = self._basis_at(places)
+        self._basis = self._basis_at(self._places)
         self._count = intervals + _DEGREE
         matrix = basis_matrix(self._knots, _DEGREE, self._part(curves[:, 0]))
         points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
         self.curves_count = len(points)
         self.ends = float(self._begin), float(self._begin + self._way)
         self._set_variables(squares, points)
-        if phase.time_law is None:
+        if law is None:
             self._begin_within_limits()
         self._limits = phase.limits_near(curves)
         self._evaluator = Evaluator(phase.joint_map, self._limits)
         ends = [(limit.lower, limit.upper) for limit in self._limits]
         lower_and_upper = np.concatenate(ends, axis=1)
-        self._bounds = np.repeat(lower_and_upper[:, None], len(places), axis=1)
+        self._bounds = np.repeat(lower_and_upper[:, None], len(self._places), axis=1)
         # Splines over time leave a joint path by a little.
         for values, limit in self._posture_limits():
             self._narrow(values, limit.inset / limit.violation_scale)

@@ -276,7 +276,7 @@ _LONGEST = 0.01
 _LONGEST_IF_LATE = 1.0
 """The same where the time is up: a slower motion within the limits is better than none."""
 _CLOSE = 1.01
-"""Factor between a time that is too short and one that is long enough, from which on they are close."""
+"""Ratio of a time that is long enough to one that is too short, at which no shorter one is looked for."""
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 
@@ -385,18 +385,16 @@ def _lengthen(
     gravity or friction add to by less, and where the time is given nothing. So this is tried, and the best is kept.
     """
     goal = options.tolerance * _GOAL
-    longest = min(dense.end_time(x) * (1.0 + by), options.longest)
+    most = min(1.0 + by, options.longest / dense.end_time(x))
     factor = 1.0
     too_short = factor
     best = (factor, violation)
-    while goal < violation:
+    while goal < violation and factor < most:
         before = violation
         too_short = factor
-        factor *= 1.0 + violation - 0.5 * goal
-        if not dense.end_time(x) * factor <= longest:
-            break
+        factor = min(factor * (1.0 + violation - 0.5 * goal), most)
         violation, _ = violations(dense, dense.with_time_scaled(x, factor), goal)
-        if violation < best[1]:
+        if violation <= goal or (violation < best[1] and factor < most):
             best = (factor, violation)
         if violation > 0.99 * before:
             break

@@ -287,16 +287,17 @@ def check_movable(task_map: TaskMap) -> None:
         return
     fixed = [row for row, own in zip(task_map.rows, moves, strict=True) if not own]
     others = [row for row, own in zip(task_map.rows, moves, strict=True) if own]
+    is_usual = set(others) <= {"x", "y", "z"}
     raise InputError(
         f"no joint changes {', '.join(fixed)} of the tool",
         where="task_space",
         found=f"[{', '.join(task_map.rows)}]",
-        allowed=f"[{', '.join(others)}]" if others else None,
+        allowed=f"[{', '.join(others)}]" if others and is_usual else None,
     )
 
 
 def _some_postures(task_map: TaskMap) -> np.ndarray:
-    """Draw postures, (20, n)."""
+    """Draw postures from -1 to 1 rad or m, (20, n), the same ones each time."""
     return np.random.default_rng(0).uniform(-1.0, 1.0, (20, task_map.robot.n))
 
 

@@ -310,7 +310,7 @@ def decompositions_of(
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     asked = task.branch != "auto" or task.search.guesses != "lattice"
-    if not matches:
+    if not matches and robot.n >= task_map.m:
         check_movable(task_map)
     if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
         if len(found) <= 1:

@@ -192,14 +192,17 @@ def read_chain(
                 found=position,
                 allowed=f"finite, within {FARTHEST:g} rad or m of zero",
             )
-        nearest = _clip_to_range(tree.joints[name], position)
-        if abs(nearest - position) > tolerances.ANGLE:
-            unit = "m" if tree.joints[name].get("type") == "prismatic" else "rad"
+        joint = tree.joints[name]
+        if abs(_clip_to_range(joint, position) - position) > tolerances.ANGLE:
+            unit = "m" if joint.get("type") == "prismatic" else "rad"
+            lowest, highest = (
+                _clip_to_range(joint, end) for end in (-FARTHEST, FARTHEST)
+            )
             raise UrdfError(
                 "the position of a locked joint is out of its range",
                 where=f"robot.locked_joints.{name}",
                 found=f"{position:g} {unit}",
-                allowed=f"{'at most' if nearest < position else 'at least'} {nearest:g} {unit}",
+                allowed=f"{lowest:g} to {highest:g} {unit}",
             )
     chain = tuple(
         name for name in path if name in movable and name not in locked_joints

@@ -150,6 +150,7 @@ def _solve_over_time(
         target=target,
         reports=(*before, *solved.reports),
         coarse=coarse,
+        not_completed=solved.not_completed,
     )
 
 
@@ -241,7 +242,8 @@ def _finish_over_time(
     spline = start.problem.task.spline
     soon = dataclasses.replace(options, deadline=session.deadline)
     adapted = adapt_mesh(solved, session, spline, soon, target=target)
-    named = dataclasses.replace(candidate, not_completed=adapted.not_completed)
+    undone = filter(None, (candidate.not_completed, adapted.not_completed))
+    named = dataclasses.replace(candidate, not_completed="; ".join(undone))
     return _refine_if_fast(named, adapted, session, options)
 
 
@@ -253,7 +255,8 @@ def _refine_if_fast(
 ) -> Candidate:
     """Refine and verify a motion over all its knots, if it is faster than what it has to beat.
 
-    Rounds of refinement begin near their answer. That helps the task's first solver, and an interior point not at all.
+    Rounds begin near their answer, which helps an active-set method, and an interior point not at all. So the task's
+    first solver refines, and the one that found the motion if that fails.
     """
     if adapted.usable:
         candidate = dataclasses.replace(candidate, adapted=adapted.t_end)
@@ -264,23 +267,23 @@ def _refine_if_fast(
     session = dataclasses.replace(session, deadline=options.deadline, pull=pull)
     assert candidate.start is not None
     first = solvers_for(candidate.start.problem.task.solver.name)[0]
+    done = None
     for backend in dict.fromkeys((first, session.backend)):
         own = dataclasses.replace(session, backend=backend)
-        # The first one may not be installed.
-        with contextlib.suppress(ImportError):
-            done = refine_and_verify(
+        try:
+            tried = refine_and_verify(
                 candidate, adapted.program, adapted.reports, own, options
             )
-            if done.is_settled:
-                break
+        except ImportError:
+            if backend is session.backend:
+                raise
+            continue
+        if done is None or tried.is_settled:
+            done = tried
+        if done.is_settled or options.deadline.passed:
+            break
+    assert done is not None
     return done
-
-
-def drop_if_slow(candidate: Candidate, done: Candidate, to_beat: float) -> Candidate:
-    """Return what was finished, or the candidate before that if its end time over all knots reaches `to_beat`, s."""
-    if not to_beat <= done.adapted < np.inf:
-        return done
-    return dataclasses.replace(candidate, adapted=done.adapted, status=SLOW)
 
 
 def _is_free_chart(start: InitialGuess) -> bool:

@@ -1,4 +1,4 @@
-"""What holding the arm takes of limits on postures, and of limits on means, along the joint paths that are known."""
+"""Loads of the arm at rest along the joint paths that are known, beside limits on postures and on means."""
 
 from __future__ import annotations
 
@@ -131,9 +131,14 @@ def explain_holding(
     is_redundant = starts[0].joint_map.r > 0
     # Before a plan is tried it has to be out of the question; afterwards it is the most likely reason.
     hopeless = _FAR_TOO_HEAVY if is_redundant else _TOO_HEAVY
-    if measure(worst) < (hopeless if everywhere else _HEAVY):
+    needed = hopeless if everywhere else _HEAVY
+    if measure(worst) < needed:
         return None
-    others = [own for own in loads if own is not worst and own.mean >= _HEAVY]
+    others = [
+        own
+        for own in loads
+        if own is not worst and own.limit is worst.limit and measure(own) >= needed
+    ]
     where = "the best joint path that was found" if is_redundant else "the path"
     return _explain_loads(starts[0].problem.robot, worst, others, where)
 
@@ -154,7 +159,8 @@ def _explain_loads(
     remedies: dict[str, Remedy] = {}
     for own in (worst, *others):
         for remedy in load_remedies(robot, own.limit, own.column, own.mean):
-            remedies.setdefault(remedy.key, remedy)
+            known = remedies.get(remedy.key, remedy)
+            remedies[remedy.key] = max(known, remedy, key=_change)
     return Failure(
         cause,
         where=label.key or worst.limit.name,
@@ -163,6 +169,11 @@ def _explain_loads(
         hint="Move the path so that its postures need less, or change the mounting of the robot",
         remedies=tuple(remedies.values()),
     )
+
+
+def _change(remedy: Remedy) -> float:
+    """By how much a number changes."""
+    return abs(remedy.guess - remedy.asked)
 
 
 def _loads_along(start: InitialGuess) -> list[_Load] | None:

@@ -254,7 +254,7 @@ class Search:
                     if number != numbers[0] and not self._goes_on(left):
                         return
                     left -= 1
-                    candidate = candidates.drop_if_slow(
+                    candidate = _drop_if_slow(
                         self._solved[number], outcome, self._to_beat
                     )
                     self._finish(number, candidate)
@@ -470,6 +470,13 @@ def _solve_in_time(
     if deadline.passed:
         return Candidate.of(start, NOT_TRIED)
     return candidates.solve_candidate(start, deadline, listener)
+
+
+def _drop_if_slow(candidate: Candidate, done: Candidate, to_beat: float) -> Candidate:
+    """Return what was finished, or the candidate before that if its end time over all knots reaches `to_beat`, s."""
+    if not to_beat <= done.adapted < np.inf:
+        return done
+    return dataclasses.replace(candidate, adapted=done.adapted, status=candidates.SLOW)
 
 
 def round_end_time(time: float) -> float:

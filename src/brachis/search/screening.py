@@ -29,7 +29,7 @@ from brachis.search.processes import run_in_processes
 _SAME_LEAST = 1.003
 """Least times that differ by less than this factor are the same."""
 _NEAR_LEAST = 1.01
-"""Times the least time that is near it: plans from there end within as much of each other, in either order."""
+"""Factor on the least time up to which others are near it: plans from there may end in either order."""
 _COMPARED = 49
 """Even places at which joint paths are compared."""
 _SLOW = 1.03
@@ -81,13 +81,18 @@ def screen(
 
 
 def _spread_out(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
-    """Order guesses so that each is the farthest from all before it; of equal ones the first is kept.
+    """Order guesses so that each differs most from all before it; of equal ones the first is kept.
 
-    Neighbours end in the same optimum. Where some that are far apart do, others do too.
+    Neighbours end in the same optimum. Where some that are far apart do, others do too. Guesses without some of their
+    postures come last.
     """
-    paths = [start.postures_at_places(_COMPARED).ravel() for start in starts]
-    points = np.nan_to_num(paths)
-    order = [0, *farthest(points, points[:1], len(points) - 1)]
+    paths = np.array([start.postures_at_places(_COMPARED).ravel() for start in starts])
+    (known,) = np.isfinite(paths).all(axis=1).nonzero()
+    order = known[:1].tolist()
+    if len(known) > 1:
+        points = paths[known]
+        order += known[farthest(points, points[:1], len(points) - 1)].tolist()
+    order += np.setdiff1d(np.arange(len(starts)), known).tolist()
     return [starts[number] for number in dict.fromkeys(order)]
 
 
@@ -100,12 +105,14 @@ def _improve_most(
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until so many end near the least end time: others are unlikely to end below it.
+    """Improve guesses until `alike` of them end near the least end time: others are unlikely to end below it.
 
     A guess that stays slower than the fastest one was at first is given up.
     """
-    least = min(start.estimate for start in starts)
-    options = dataclasses.replace(effort.options, to_beat=least)
+    # A program over the path knows no pauses, and its time differs a little from that of a timing.
+    waiting = sum(leg.dwell for leg in starts[0].problem.legs)
+    least = min(start.estimate for start in starts) - waiting
+    options = dataclasses.replace(effort.options, to_beat=_NEAR_LEAST * least)
     effort = dataclasses.replace(effort, options=options)
     work = run_in_processes(
         _improve,

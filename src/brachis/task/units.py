@@ -66,8 +66,7 @@ def unit_of(key: str) -> str:
     >>> unit_of("robot.payload.mass"), unit_of("path.0.line.angle_deg"), unit_of("spline.intervals")
     ('kg', 'deg', '')
     """
-    if key.endswith("_deg"):
-        return "deg"
     names = [part for part in key.split(".") if not part.isdecimal()]
     units = (_UNITS.get(".".join(pair)) for pair in reversed([*pairwise(names)]))
-    return next((unit for unit in units if unit is not None), "")
+    other = "deg" if key.endswith("_deg") else ""
+    return next((unit for unit in units if unit is not None), other)

@@ -24,8 +24,8 @@ _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 
 
-_TRIAL = 10
-"""Iterations after which a solve has to be faster than what it has to beat."""
+_TRIAL_ITERATIONS = 10
+"""Iterations before a solve is compared with `SolverOptions.to_beat`."""
 _NEARLY_FEASIBLE = 1e-3
 """Violation of rows up to which an iterate counts."""
 
@@ -58,6 +58,7 @@ class SolveMonitor:
         self.exhausted = False
         self._evaluations = 0
         self.stagnated = False
+        self.is_beaten = False
         self._recent: list[float] = []
         self._feasible_below = 10.0 * options.tolerance
         self._progress = progress
@@ -99,8 +100,13 @@ class SolveMonitor:
                 self._progress(self.iterations, objective)
             except KeyboardInterrupt as interrupt:
                 self.interrupt = interrupt
-        is_beaten = self.iterations >= _TRIAL and objective > self.options.to_beat
-        return is_beaten or self.must_stop()
+        return self.must_stop()
+
+    def has_lost(self, objective: float) -> bool:
+        """Tell whether an iterate is still worse than what the solve has to beat; kept in `is_beaten`."""
+        is_tried = self.iterations >= _TRIAL_ITERATIONS
+        self.is_beaten = is_tried and objective > self.options.to_beat
+        return self.is_beaten
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
         """Tell whether iterates have been no better for long; kept in `stagnated`.
@@ -187,7 +193,9 @@ class SolveMonitor:
         if self.stagnated and not status.usable:
             status = SolveStatus.STAGNATED
         feasible = violation <= self._feasible_below
-        if status.usable and not feasible:
+        if self.is_beaten:
+            status = SolveStatus.BEATEN
+        elif status.usable and not feasible:
             status = SolveStatus.INFEASIBLE
         elif self.timed_out and not status.usable:
             status = SolveStatus.TIME_LIMIT

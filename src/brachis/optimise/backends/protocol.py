@@ -25,6 +25,7 @@ class SolveStatus(enum.Enum):
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
     STALLED = "the solver made no progress; another start or solver may do better"
     TIME_LIMIT = "time limit reached"
+    BEATEN = "given up: slower than another motion"
     INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
     EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"
     FAILED = "the solver failed; choose another solver"
@@ -117,7 +118,7 @@ class SolverOptions:
         Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
         asks; IPOPT counts all iterates in any case.
     to_beat : float
-        A solve ends whose iterates have a larger objective after 10 iterations.
+        Objective. A solve that is not below it after 10 iterations ends. Uno asks.
     apart : bool
         Whether the solve runs in a process of its own, which is ended when nothing is heard of it for long. That takes
         some 0.07 s more.

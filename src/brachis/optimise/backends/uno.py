@@ -62,7 +62,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
                 monitor.interrupt = KeyboardInterrupt()
             small = found == "FEASIBLE_SMALL_STEP"
             has_failed = stall.seen or small or ending == "ALGORITHMIC_ERROR"
-            if not has_failed or monitor.must_stop():
+            if not has_failed or monitor.is_beaten or monitor.must_stop():
                 break
     status = _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
     if stall.seen:
@@ -150,7 +150,7 @@ class _Stall:
         stop = stop or monitor.iterations >= monitor.options.max_iterations
         counts = is_near or (monitor.options.anywhere and not restores)
         is_done = monitor.has_settled(objective, infeasibility if counts else np.inf)
-        stop = stop or is_done
+        stop = stop or is_done or (not restores and monitor.has_lost(objective))
         recent = self._objectives[-7:]
         creeps = len(recent) == 7 and max(recent) - min(recent) < 1e-3 * abs(objective)
         self.seen = creeps and infeasibility < 1e-3 and not is_near and not stop

@@ -214,22 +214,24 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
             least,
         )
         if rough is None:
-            return _interpolate(points, sigma)
+            break
         places, breaks = _over_arc_length(rough, points)
         along = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
         fit = _add_knots(points, along, breaks, tolerance, least)
-        if fit is not None and fit.ratios(tolerance).max() <= 1.0:
+        if fit is None:
+            break
+        if fit.ratios(tolerance).max() <= 1.0:
             return _use_fewest_knots(
                 points, _remove_knots(points, fit, tolerance), tolerance
             )
         fits.append(fit)
-    if fits[0] is None or (least == 1 and len(points) <= 2_000):
-        return _interpolate(points, along)
-    return fits[0]
+    if not fits or (not scatter.noisy(tolerance) and len(points) <= 2_000):
+        return _interpolate(points, fits[-1].sigma if fits else sigma)
+    return min(fits, key=lambda fit: float(fit.ratios(tolerance).max()))
 
 
 def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
-    """List how many points an interval may have, no fewer; smaller numbers where the one before will not do.
+    """List the least numbers of points an interval may have, in the order in which they are tried.
 
     Scatter that is small beside the tolerance may be followed where the path bends.
     """
