@@ -224,3 +224,11 @@ def test_guesses_are_looked_at_the_farthest_from_each_other_first(starts):
     distances = [np.abs(path - paths[0]).max() for path in paths]
     assert second is starts[int(np.argmax(distances))]
     assert len(others) + 2 == len({path.tobytes() for path in map(np.array, paths)})
+
+
+def test_the_same_joint_path_counts_once_where_guesses_lie_side_by_side(starts):
+    fast = [dataclasses.replace(start, estimate=1.0) for start in starts[:1]]
+    twice = [*fast, *fast]
+    slow = dataclasses.replace(starts[1], estimate=1.02)
+    assert screening._count_near_least([*twice, slow], apart=False) == 2
+    assert screening._count_near_least([*twice, slow], apart=True) == 1

@@ -128,12 +128,21 @@ def _improve_most(
     with closing(work) as outcomes:
         for start in outcomes:
             solved.append(start)
-            times = np.array([each.estimate for each in solved])
-            times = times[np.isfinite(times)]
-            is_least = times <= _NEAR_LEAST * times.min(initial=np.inf)
-            if is_least.sum() >= alike:
+            if _count_near_least(solved, apart=charts > 1) >= alike:
                 break
     return solved
+
+
+def _count_near_least(solved: Sequence[InitialGuess], *, apart: bool) -> int:
+    """Count the guesses near the least end time; with `apart` those of the same joint path once."""
+    known = [start for start in solved if np.isfinite(start.estimate)]
+    least = min((start.estimate for start in known), default=np.inf)
+    near: list[InitialGuess] = []
+    for start in known:
+        is_near = start.estimate <= _NEAR_LEAST * least
+        if is_near and not (apart and any(_is_same(start, each) for each in near)):
+            near.append(start)
+    return len(near)
 
 
 def _improve(
