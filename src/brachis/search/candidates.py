@@ -71,6 +71,8 @@ from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
 _FAR = 0.5
 """Violation, as a part of a limit, that a smaller branch margin does not mend."""
+_LIGHT = 3_000_000
+"""Variables times rows up to which a solve over all knots takes a second or two from the timing of a joint path."""
 _FOR_KNOTS = 0.8
 """Part of the time left after which the knots are not refined further."""
 _PULL = 0.001
@@ -120,7 +122,8 @@ def _solve_over_time(
     begun = begin_with_timing(start, target)
     if begun is None:
         # From the timing of a joint path a solve takes few iterations over any number of knots; else many take seconds.
-        is_near = start.joint_map.r <= 1 and is_timing_all(target)
+        is_light = target.variables * len(target.lower) <= _LIGHT
+        is_near = is_light and start.joint_map.r <= 1 and is_timing_all(target)
         is_small = target.variables <= FEW_VARIABLES
         program = target if is_near or is_small else coarsest(target)
         first = initial_guess(program, start)
