@@ -55,7 +55,7 @@ from brachis.task import (
     task_with,
 )
 from brachis.timing import SlowTimingWarning
-from brachis.trajectory import Motion, motion_of
+from brachis.trajectory import Motion, Trajectory, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
@@ -166,15 +166,9 @@ def plan(
             _report_plan(robot, asked, report)
             problem = Problem.of(robot, asked, own_limits)
             remarks += report_issues(of_places(problem), strict=asked.strict)
-            search = _open_search(problem, families, deadline, report)
-            exact = None
-            if known is None and asked.tolerances != Tolerances():
-                exact = _plan_exactly(problem, robot, families, deadline, report)
-            with search.end_early():
-                search.run(known, exact)
+            search = _search(problem, robot, known, families, deadline, report)
             best = search.best
-            if best is None:
-                raise search.explain().error()
+            assert best is not None
             searched = time.perf_counter()
             known_after = searched - began
             report(
@@ -186,9 +180,9 @@ def plan(
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=asked.strict)
-            gap = search.find_timing_gap()
-            is_given = asked.spline.intervals != "auto"
+            gap = search.find_gap_of_best()
             if gap is not None and not end_time:
+                is_given = asked.spline.intervals != "auto"
                 slow = gap.issues(intervals_are_given=is_given)
                 for issue in slow:
                     warnings.warn(str(issue), SlowTimingWarning, stacklevel=2)
@@ -221,6 +215,26 @@ def plan(
             warnings=remarks,
             timing_gap=gap,
         )
+
+
+def _search(
+    problem: Problem,
+    robot: Robot,
+    known: Trajectory | None,
+    families: Sequence[ik.Family],
+    deadline: Deadline,
+    report: Listener,
+) -> Search:
+    """Search for the fastest motion, from a known one if there is one; raise what explains it if there is none."""
+    search = _open_search(problem, families, deadline, report)
+    exact = None
+    if known is None and problem.task.tolerances != Tolerances():
+        exact = _plan_exactly(problem, robot, families, deadline, report)
+    with search.end_early():
+        search.run(known, exact)
+    if search.best is None:
+        raise search.explain().error()
+    return search
 
 
 def _open_search(

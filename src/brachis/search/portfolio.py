@@ -178,7 +178,7 @@ class Search:
                 self._refuse_what_is_out_of_reach()
             yield batch
 
-    def find_timing_gap(self) -> TimingGap | None:
+    def find_gap_of_best(self) -> TimingGap | None:
         """Compare the best motion with the fastest timing of its own joint path; kept for as long as it is the best."""
         assert self.best is not None and self.best.trajectory is not None
         if self._gap is None or self._gap[0] is not self.best:
@@ -188,7 +188,7 @@ class Search:
 
     def _second_opinion(self, batch: Batch) -> Iterator[Batch]:
         """Yield a fallback if the best motion is far slower than the fastest timing of its own joint path."""
-        found = self.find_timing_gap()
+        found = self.find_gap_of_best()
         if found is not None and not found.left_out and found.gap > _FAR:
             yield batch
 

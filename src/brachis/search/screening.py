@@ -26,10 +26,8 @@ from brachis.search.lattice import farthest
 from brachis.search.over_path import CHARTS, improve_guess
 from brachis.search.processes import run_in_processes
 
-_SAME_LEAST = 1.003
-"""Least times that differ by less than this factor are the same."""
 _NEAR_LEAST = 1.01
-"""Factor on the least time up to which others are near it: plans from there may end in either order."""
+"""Factor on the least time up to which others are as fast, about: plans from there may end in either order."""
 _COMPARED = 49
 """Even places at which joint paths are compared."""
 _SLOW = 1.03
@@ -73,7 +71,7 @@ def screen(
         ratio = start.estimate / kept[0].estimate if kept else 1.0
         # Of many, those slower than the fastest one are left out, and so is the second half of equally fast ones.
         is_slow = ratio > _SLOW and is_many
-        is_one_too_many = ratio <= _SAME_LEAST and len(kept) >= alike
+        is_one_too_many = ratio <= _NEAR_LEAST and len(kept) >= alike
         is_known = any(_is_same(start, other) for other in kept)
         if not (is_slow or is_one_too_many or is_known) and len(kept) < most:
             kept.append(start)
