@@ -31,6 +31,32 @@ def test_gradient_of_least_acceleration_equals_differences(case, knots):
         np.testing.assert_allclose(exact, expected, atol=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("knots", ["uniform", "free"])
+def test_curvature_of_least_acceleration_is_that_of_its_squares(knots):
+    phase = phase_of("r2")
+    if knots == "free":
+        phase = phase.with_free_knots(0.1)
+    weights = weights_of("r2")
+    program = Program([phase]).with_objective(
+        LeastAcceleration(weights, np.array([5.0]))
+    )
+    (x,) = reachable_points(phase, 1)
+    gaps = np.diff(phase.t_norm)
+    shares = 0.5 * (np.append(0.0, gaps) + np.append(gaps, 0.0))
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        """Terms whose squares the objective adds up."""
+        return (np.sqrt(shares)[:, None] * phase.state(x).qddot * weights).ravel()
+
+    slopes = differences_of(residuals, x, 1e-5)
+    known = program.curvature(x)
+    assert known is not None
+    found = known.hessian(x, 0.5, np.zeros(len(program.lower)))
+    expected = slopes.T @ slopes
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, atol=1e-6 * size)
+
+
 def test_phases_add_up():
     phase = phase_of("r1")
     first, second = reachable_points(phase, 2)

@@ -256,14 +256,40 @@ def test_the_curvature_of_a_mean_is_that_of_its_squares(knots):
     )
     factors = np.outer(shares / program.end_time(x), weights).ravel()
     expected = 2.0 * slopes.T @ (factors[:, None] * slopes)
-    found = known.hessian(x, multipliers)
+    found = known.hessian(x, 0.0, multipliers)
     # As above: the first duration is given.
     found[0] = 0.0
     found[:, 0] = 0.0
     size = np.abs(expected).max()
     np.testing.assert_allclose(found, expected, atol=1e-6 * size)
-    assert not known.hessian(x, np.zeros(len(program.lower))).any()
-    assert known.hessian(x, known.multipliers).any()
+    assert not known.hessian(x, 0.0, np.zeros(len(program.lower))).any()
+    assert known.hessian(x, 0.0, known.multipliers).any()
+
+
+@pytest.mark.parametrize("case", ["r1", "r2"])
+def test_the_hessian_at_a_given_speed_is_that_of_the_objective(case):
+    phase = at_given_speed(case, "bent")
+    program = Program([phase])
+    (x,) = points_at_given_speed(phase, 1)
+    known = program.curvature(x)
+    assert known is not None
+    no_rows = np.zeros(len(program.lower))
+    found = known.hessian(x, 2.0, no_rows)
+    steps = 1e-4 * np.eye(len(x))[1:]  # the duration is given
+    ends = [program.gradient(x + h) - program.gradient(x - h) for h in steps]
+    expected = 2.0 * np.array(ends)[:, 1:] / 2e-4
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(found[1:, 1:], expected, atol=1e-6 * size)
+    assert not found[0].any()
+    assert not known.hessian(x, 0.0, no_rows).any()
+
+
+def test_of_an_end_time_that_is_free_no_curvature_is_known():
+    phase = phase_of("r2")
+    program = Program(
+        [phase.with_limits([own for own in phase.limits if not own.guarantee.is_mean])]
+    )
+    assert program.curvature(program.x_lower) is None
 
 
 def test_a_bent_time_law_is_a_spline():

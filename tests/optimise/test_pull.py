@@ -50,3 +50,10 @@ def test_the_gradient_is_that_of_the_objective():
     steps = 1e-6 * np.eye(2)
     slopes = [pulled.objective(x + own) - pulled.objective(x - own) for own in steps]
     np.testing.assert_allclose(pulled.gradient(x), np.array(slopes) / 2e-6, rtol=1e-8)
+
+
+def test_the_curvature_is_that_of_the_pull():
+    pulled = Pulled(HalfPlane(), START, 0.3)
+    known = pulled.curvature(START)
+    hessian = known.hessian(START, 2.0, np.zeros(1))
+    np.testing.assert_allclose(hessian, 0.6 * np.eye(2))

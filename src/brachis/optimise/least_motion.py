@@ -131,7 +131,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
-    name = _FOR_MANY if most > _MANY else start.solver
+    name = _FOR_MANY if most > _MANY else task.solver.name
     solve = _session(name, soon, listener, patience=5)
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)
@@ -217,7 +217,7 @@ def _session(
     name: str, deadline: Deadline, listener: Listener, patience: int
 ) -> SolverSession:
     """Make a session of a backend; any feasible motion will do, however the solve ended."""
-    (backend,) = solvers_for(name)
+    backend = solvers_for(name)[0]
     options = SolverOptions(
         tolerance=1e-6,
         max_iterations=60,

@@ -136,10 +136,7 @@ def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarra
     is_curved = values > _NEARLY_ZERO
     inverse = np.divide(0.5, values, out=np.zeros_like(values), where=is_curved)
     factors = phase.mean_weights(x)[:, None] * weights * inverse
-    rows = phase.spread_slopes(phase.limit_slopes(x)[:, is_mean])
-    return np.asarray(
-        (rows * factors[:, :, None]).reshape(-1, len(x)).T @ rows.reshape(-1, len(x))
-    )
+    return phase.sum_squares(phase.limit_slopes(x)[:, is_mean], factors)
 
 
 def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:

@@ -32,18 +32,18 @@ _LEAST_KEPT = 0.2
 """Part of the rows, the nearest ones, that is kept whatever their distance: too few let the end time collapse."""
 _MOST_KEPT = 0.6
 """Part of the rows: if more are near, leaving out the others gains nothing."""
-_FIRST_VIOLATION = 0.15
+_FIRST_VIOLATION = 0.5
 """Largest violation of a first point that counts as a fast motion."""
 _LAST_VIOLATION = 0.5
 """Violation of other rows above which an answer is another motion: then all rows are needed."""
-_LOSS = 1e-3
-"""Part of the objective by which a motion may be worse than the first one, which exceeds limits by a little."""
 _WIDENING = 1e-6
 """Largest widening of a bound, as a part of it."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """Multiples of this, modulo 1, are spread evenly."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
+_OVER = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT, SolveStatus.BEATEN)
+"""How solves end after which nothing is solved."""
 
 
 class NearRows:
@@ -94,11 +94,13 @@ class NearRows:
         if whole is None:
             return None
 
-        def find_hessian(x: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        def find_hessian(
+            x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
+        ) -> np.ndarray:
             """Return the known part by the multipliers of the rows that are left."""
             every = np.zeros_like(whole.multipliers)
             every[self._kept] = multipliers
-            return whole.hessian(x, every)
+            return whole.hessian(x, objective_multiplier, every)
 
         return Curvature(find_hessian, whole.multipliers[self._kept])
 
@@ -133,19 +135,15 @@ def solve_near_rows(
     kept = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
     if len(kept) > _MOST_KEPT * len(slack):
         return solve(program, x)
-    first = program.objective(x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
         report = solve(NearRows(program, kept, tolerance), x)
         reports.append(report)
         slack = _slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
-        is_over = report.status in (SolveStatus.TIME_LIMIT, SolveStatus.BEATEN)
-        # With all rows the solve would use up its iterations too.
-        is_spent = report.status is SolveStatus.ITERATION_LIMIT and report.feasible
-        is_good = is_spent and report.objective <= first + _LOSS * abs(first)
-        is_done = report.status.usable or is_good
-        if is_over or (is_done and not len(missing)):
+        # With all rows the solve would use up time and iterations too.
+        is_over = report.status in _OVER
+        if is_over or (report.status.usable and not len(missing)):
             return _complete(program, kept, reports)
         if not report.status.usable or slack.min() < -_LAST_VIOLATION:
             break

@@ -37,6 +37,14 @@ class Objective(Protocol):
         """Gradient of the share, (v,)."""
         ...
 
+    def is_curved(self, phase: Phase) -> bool:
+        """Tell whether the share is a sum of squares, or has one."""
+        ...
+
+    def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Gauss-Newton part of the share's Hessian, (v, v)."""
+        ...
+
 
 @dataclass(frozen=True)
 class EndTime:
@@ -69,6 +77,21 @@ class EndTime:
         gradient[0] = 1.0  # the duration does not change
         return gradient
 
+    def is_curved(self, phase: Phase) -> bool:
+        """Tell whether the duration is given."""
+        return phase.time_law is not None
+
+    def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Hessian of the mean square, (v, v)."""
+        points, curves = phase.state(x).yddot.shape
+        by_curves = np.zeros((3, points, curves - 1, curves))
+        by_curves[2, :, :, 1:] = np.eye(curves - 1)
+        slopes = phase.slopes_by_variables(by_curves, x)
+        hessian = phase.sum_squares(slopes, 2.0 * _CALM * _shares(phase))
+        hessian[0] = 0.0  # the duration does not change
+        hessian[:, 0] = 0.0
+        return hessian
+
 
 @dataclass(frozen=True, eq=False)
 class LeastAcceleration:
@@ -94,6 +117,17 @@ class LeastAcceleration:
         """Gradient of the mean, (v,); raises UnreachableError as `Phase.evaluate` does."""
         slopes = 2.0 * _shares(phase)[:, None] * self.weights**2 * phase.state(x).qddot
         return phase.gradient(Partials(qddot=slopes[:, None]), x)
+
+    def is_curved(self, _phase: Phase) -> bool:
+        """Tell that it is."""
+        return True
+
+    def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+        """Gauss-Newton part of the mean's Hessian, (v, v)."""
+        by_joints = np.tile(np.diag(self.weights), (len(phase.t_norm), 1, 1))
+        by_curves = phase.evaluate(x).chain([Partials(qddot=by_joints)])
+        slopes = phase.slopes_by_variables(by_curves, x)
+        return phase.sum_squares(slopes, 2.0 * _shares(phase))
 
 
 def _shares(phase: Phase) -> np.ndarray:

@@ -431,14 +431,16 @@ class Phase:
             [np.bincount(variable, term, self.variables) for term in terms.T]
         )
 
-    def spread_slopes(self, slopes: np.ndarray) -> np.ndarray:
-        """Arrange slopes, (z, c), by point, value and variable, (K, c, v)."""
+    def sum_squares(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Add up g g^T, (v, v), of the slopes g of all values at all points, (z, c), with weights (K,) or (K, c)."""
         columns = slopes.shape[1]
-        found = np.zeros((len(self.t_norm), columns, self.variables))
+        rows = np.zeros((len(self.t_norm), columns, self.variables))
         point = self._layout.point[:, None]
         variable = self._layout.variable[:, None]
-        found[point, np.arange(columns), variable] = slopes
-        return found
+        rows[point, np.arange(columns), variable] = slopes
+        factors = np.broadcast_to(weights.T, rows.shape[1::-1]).T
+        flat = rows.reshape(-1, self.variables)
+        return np.asarray((rows * factors[:, :, None]).reshape(flat.shape).T @ flat)
 
     def slopes_by_variables(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""

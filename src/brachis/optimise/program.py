@@ -284,18 +284,26 @@ class Program(Summary):
         return np.concatenate(entries)
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
-        """Return what means add to the Hessian of the Lagrangian, its Gauss-Newton part; None without means."""
-        if not len(self.means):
+        """Return what squares in the objective and in means add to the Hessian of the Lagrangian; None without any."""
+        is_curved = any(map(self.minimised.is_curved, self.phases))
+        if not (is_curved or len(self.means)):
             return None
         # Squares of accelerations fall with the fourth power of the time T: dT/d(mean) = -T/4 where the mean is 1.
         guess = np.zeros(len(self.lower))
-        guess[self._mean_rows] = -0.25 * self.objective(x) / len(self.means)
+        guess[self._mean_rows] = -0.25 * self.objective(x) / max(len(self.means), 1)
         return Curvature(self._find_hessian, guess)
 
-    def _find_hessian(self, x: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Return that part by the multipliers of all rows."""
+    def _find_hessian(
+        self, x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
+    ) -> np.ndarray:
+        """Return that Gauss-Newton part by the multipliers of objective and rows."""
         weights = -multipliers[self._mean_rows].clip(max=0.0)
-        return self.means.curvature(self.split(x), weights)
+        hessian = self.means.curvature(self.split(x), weights)
+        for (phase, part), own in zip(self.split(x), self._parts, strict=True):
+            if self.minimised.is_curved(phase):
+                curved = self.minimised.curvature(phase, part)
+                hessian[own, own] += objective_multiplier * curved
+        return hessian
 
     @property
     def limits(self) -> tuple[Limit, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.optimise.backends import Problem
+from brachis.optimise.backends import Curvature, Problem
 
 
 class Pulled:
@@ -35,7 +35,6 @@ class Pulled:
         self.jacobian_columns = program.jacobian_columns
         self.rows = program.rows
         self.jacobian = program.jacobian
-        self.curvature = program.curvature
 
     def objective(self, x: np.ndarray) -> float:
         """Objective of the program, and the pull."""
@@ -45,3 +44,19 @@ class Pulled:
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the objective."""
         return self._program.gradient(x) + self._weight * (x - self._x)
+
+    def curvature(self, x: np.ndarray) -> Curvature:
+        """Return what the program knows of its Hessian, and that of the pull."""
+        own = self._program.curvature(x)
+        of_pull = self._weight * np.eye(len(x))
+
+        def find_hessian(
+            x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
+        ) -> np.ndarray:
+            hessian = objective_multiplier * of_pull
+            if own is not None:
+                hessian += own.hessian(x, objective_multiplier, multipliers)
+            return hessian
+
+        guess = np.zeros(len(self.lower)) if own is None else own.multipliers
+        return Curvature(find_hessian, guess)

@@ -25,7 +25,9 @@ class Ellipsoid(Program):
         if self.known is None:
             return None
         return Curvature(
-            lambda _x, multipliers: -2.0 * self.known * multipliers[0] * SQUARES,
+            lambda _x, _factor, multipliers: (
+                -2.0 * self.known * multipliers[0] * SQUARES
+            ),
             np.array([-1.0]),
         )
 

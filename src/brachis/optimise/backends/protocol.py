@@ -48,12 +48,13 @@ class Curvature:
     Attributes
     ----------
     hessian : callable
-        ``hessian(x, multipliers)`` returns the known part, (v, v), by multipliers, (c,).
+        ``hessian(x, objective_multiplier, multipliers)`` returns the known part, (v, v), by the multipliers of the
+        objective, 0 in a restoration, and of the rows, (c,).
     multipliers : (c,) ndarray
         A first guess. It serves until those of a solver give the known part some size.
     """
 
-    hessian: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    hessian: Callable[[np.ndarray, float, np.ndarray], np.ndarray]
     multipliers: np.ndarray
 
 

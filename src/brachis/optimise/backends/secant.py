@@ -62,14 +62,14 @@ class SecantHessian:
         (v, v) ndarray
             Symmetric, without negative eigenvalues.
         """
-        known = self._known.hessian(x, multipliers)
+        known = self._known.hessian(x, objective_multiplier, multipliers)
         if self._least_trace is None:
-            guess = self._known.hessian(x, self._multipliers)
+            guess = self._known.hessian(x, 1.0, self._multipliers)
             self._least_trace = float(_ENOUGH * np.trace(guess))
         if np.trace(known) < self._least_trace:
             # Without curvature steps are too long: the last multipliers that gave enough do for now.
             multipliers = self._multipliers
-            known = self._known.hessian(x, multipliers)
+            known = self._known.hessian(x, 1.0, multipliers)
         if objective_multiplier > 0.0:
             self._multipliers = multipliers
             self._learn(x, objective_multiplier, multipliers, known)
