@@ -88,11 +88,10 @@ def test_gripper_off_the_chain_is_locked_and_its_mass_is_carried():
     assert carried == pytest.approx([4.0, 5.0])
     # The finger is held at the end of its range nearest to zero, or where the user says.
     levers = {}
+    single = GRIPPER.replace("<mimic joint='finger'/>", "")
     for held in (0.02, 0.05):
         locked = None if held == 0.02 else {"finger": held}
-        robot = load(
-            [TURN, TURN], tool_frame="palm", more=GRIPPER, locked_joints=locked
-        )
+        robot = load([TURN, TURN], tool_frame="palm", more=single, locked_joints=locked)
         levers[held] = robot.model.inertias[2].mass * robot.model.inertias[2].lever
     np.testing.assert_allclose(
         levers[0.05] - levers[0.02], [0.0, 0.5 * 0.03, 0.0], atol=1e-14
@@ -130,6 +129,26 @@ def test_the_last_link_before_the_chains_part():
     assert default_chain(branching, "file.urdf") == DefaultChain(
         None, "palm", ("finger1", "finger2")
     )
+
+
+def test_a_locked_joint_is_followed_by_its_mimic():
+    robot = load(
+        [TURN], more=GRIPPER, tool_frame="tool", locked_joints={"finger": 0.03}
+    )
+    same = load(
+        [TURN],
+        more=GRIPPER,
+        tool_frame="tool",
+        locked_joints={"finger": 0.03, "follower": 0.03},
+    )
+    assert list(robot.model.inertias) == list(same.model.inertias)
+
+
+def test_a_mimic_that_is_locked_elsewhere_is_refused():
+    message = r"'follower' mimics 'finger', which is at 0\.03; found 0\.01 m; allowed: 0\.03 m"
+    locked = {"finger": 0.03, "follower": 0.01}
+    with pytest.raises(UrdfError, match=message):
+        load([TURN], more=GRIPPER, tool_frame="tool", locked_joints=locked)
 
 
 def test_mimic_on_the_chain_is_refused_by_name():

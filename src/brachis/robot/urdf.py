@@ -185,25 +185,7 @@ def read_chain(
     movable = _movable(tree)
     check_names("moving joint", locked_joints, movable, f"{where}: locked_joints")
     for name, position in locked_joints.items():
-        if not abs(position) <= FARTHEST:
-            raise UrdfError(
-                "the position of a locked joint is too large",
-                where=f"robot.locked_joints.{name}",
-                found=position,
-                allowed=f"finite, within {FARTHEST:g} rad or m of zero",
-            )
-        joint = tree.joints[name]
-        if abs(_clip_to_range(joint, position) - position) > tolerances.ANGLE:
-            unit = "m" if joint.get("type") == "prismatic" else "rad"
-            lowest, highest = (
-                _clip_to_range(joint, end) for end in (-FARTHEST, FARTHEST)
-            )
-            raise UrdfError(
-                "the position of a locked joint is out of its range",
-                where=f"robot.locked_joints.{name}",
-                found=f"{position:g} {unit}",
-                allowed=f"{lowest:g} to {highest:g} {unit}",
-            )
+        _check_locked(tree.joints[name], name, position)
     chain = tuple(
         name for name in path if name in movable and name not in locked_joints
     )
@@ -212,15 +194,66 @@ def read_chain(
         raise UrdfError(
             "no joint moves the tool", where=where, found=f"chain {base} -> {tool}"
         )
-    locked = {
-        name: float(locked_joints.get(name, _rest_position(tree.joints[name])))
-        for name in movable
-        if name not in chain
-    }
+    locked = _lock(tree, [name for name in movable if name not in chain], locked_joints)
     dynamics = read_dynamics(tree, chain, locked, tool)
     check_inertias(tree, dynamics.bodies, where)
     limits = tuple(_read_limit(tree.joints[name]) for name in chain)
     return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), dynamics)
+
+
+def _check_locked(joint: Element, name: str, position: float) -> None:
+    """Refuse a position, rad or m, that a locked joint cannot have."""
+    if not abs(position) <= FARTHEST:
+        raise UrdfError(
+            "the position of a locked joint is too large",
+            where=f"robot.locked_joints.{name}",
+            found=position,
+            allowed=f"finite, within {FARTHEST:g} rad or m of zero",
+        )
+    if abs(_clip_to_range(joint, position) - position) > tolerances.ANGLE:
+        lowest, highest = (_clip_to_range(joint, end) for end in (-FARTHEST, FARTHEST))
+        unit = _unit_of(joint)
+        raise UrdfError(
+            "the position of a locked joint is out of its range",
+            where=f"robot.locked_joints.{name}",
+            found=f"{position:g} {unit}",
+            allowed=f"{lowest:g} to {highest:g} {unit}",
+        )
+
+
+def _lock(
+    tree: UrdfTree, names: Sequence[str], given: Mapping[str, float]
+) -> dict[str, float]:
+    """Find the positions, rad or m, of joints that do not move: those given, else what they mimic, else rest."""
+    locked = {
+        name: float(given.get(name, _rest_position(tree.joints[name])))
+        for name in names
+    }
+    for name in names:
+        joint = tree.joints[name]
+        mimic = joint.find("mimic")
+        leader = None if mimic is None else mimic.get("joint")
+        if leader not in locked:
+            continue
+        multiplier = number_of(joint, "mimic", "multiplier", 1.0)
+        offset = number_of(joint, "mimic", "offset", 0.0)
+        position = multiplier * locked[leader] + offset
+        if name in given and abs(given[name] - position) > tolerances.ANGLE:
+            unit = _unit_of(joint)
+            raise UrdfError(
+                f"joint {name!r} mimics {leader!r}, which is at {locked[leader]:g}",
+                where=f"robot.locked_joints.{name}",
+                found=f"{given[name]:g} {unit}",
+                allowed=f"{position:g} {unit}",
+                hint=f"Leave {name} out: it follows",
+            )
+        locked[name] = position
+    return locked
+
+
+def _unit_of(joint: Element) -> str:
+    """Return the unit of a joint's position."""
+    return "m" if joint.get("type") == "prismatic" else "rad"
 
 
 def read_file(path: Path) -> str:
