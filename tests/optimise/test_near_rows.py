@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from brachis.optimise import near_rows
-from brachis.optimise.backends import SolverOptions, SolveStatus, residual, solvers_for
+from brachis.optimise.backends import (
+    Curvature,
+    SolverOptions,
+    SolveStatus,
+    residual,
+    solvers_for,
+)
 from brachis.optimise.near_rows import NearRows, solve_near_rows
 
 COUNT = 600
@@ -79,8 +85,27 @@ def test_from_a_point_that_few_rows_hold_back_all_are_needed(solve):
     assert report.objective == pytest.approx(-1.0, abs=1e-8)
 
 
+def test_where_curvature_is_known_fewer_rows_have_to_hold(solve):
+    class Curved(Disc):
+        def curvature(self, x):
+            hessian = np.diag([0.0, 0.0, 2.0])
+            return Curvature(
+                lambda _x, factor, _rows: factor * hessian, np.zeros(COUNT)
+            )
+
+    start = np.array([0.0, -0.9501, 0.0])
+    holding = np.count_nonzero(1.0 - Disc().rows(start) < 0.05)
+    assert 3 <= holding < 6
+    solve_near_rows(Disc(), start, solve, 1e-9)
+    assert solve.rows == [COUNT]
+    solve.rows.clear()
+    report = solve_near_rows(Curved(), start, solve, 1e-9)
+    assert max(solve.rows) < COUNT / 2
+    assert report.objective == pytest.approx(-1.0, abs=1e-8)
+
+
 def test_from_a_point_far_beyond_the_rows_all_are_needed(solve):
-    solve_near_rows(Disc(), np.array([0.0, -1.5, 0.0]), solve, 1e-9)
+    solve_near_rows(Disc(), np.array([0.0, -1.6, 0.0]), solve, 1e-9)
     assert solve.rows == [COUNT]
 
 

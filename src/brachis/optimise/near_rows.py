@@ -28,6 +28,8 @@ _AT_BOUND = 0.05
 """Distance from its bound up to which a row holds the motion, about."""
 _ROWS_A_VARIABLE = 2.0
 """Rows that hold the motion, for every variable, no fewer: from a slower motion the end time would collapse."""
+_ROWS_IF_CURVED = 1.0
+"""The same where curvature is known, which bounds the steps along which no row is near."""
 _LEAST_KEPT = 0.2
 """Part of the rows, the nearest ones, that is kept whatever their distance: too few let the end time collapse."""
 _MOST_KEPT = 0.6
@@ -129,8 +131,11 @@ def solve_near_rows(
     """
     slack = _slack(program, x)
     holding = np.count_nonzero(slack < _AT_BOUND)
-    is_fast = holding >= _ROWS_A_VARIABLE * len(x) and slack.min() >= -_FIRST_VIOLATION
-    if not is_fast:
+    if slack.min() < -_FIRST_VIOLATION:
+        return solve(program, x)
+    is_curved = program.curvature(x) is not None
+    needed = _ROWS_IF_CURVED if is_curved else _ROWS_A_VARIABLE
+    if holding < needed * len(x):
         return solve(program, x)
     kept = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
     if len(kept) > _MOST_KEPT * len(slack):
