@@ -56,6 +56,27 @@ def test_it_is_linear_on_lines_and_circles(
     np.testing.assert_allclose(law.at_end(-1), [0.7, 0.1 / length, 0, 0], rtol=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_across_a_rounded_corner_the_speed_is_kept(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first, second, blend = rng.uniform([0.2, 0.2, 0.02], [0.6, 0.5, 0.1])
+    angle = rng.uniform(-2.5, 2.5)
+    way = [0.0, second * np.cos(angle), second * np.sin(angle)]
+    segments = [
+        {"line": {"by": [0.0, first, 0.0]}, "blend": float(blend)},
+        {"line": {"by": way}},
+    ]
+    task_map, path = path_and_map(segments)
+    assert np.diff(path.knots).min() > 1e-9
+    _, begin, end, _ = path.breaks
+    leg = Leg(0.5 * begin, 0.5 * (end + 1.0), speed=0.1)
+    law = law_of(leg, task_map, path)
+    s, rate, _, _ = law.at(np.linspace(0.0, law.duration, 201))
+    slopes = path.derivatives(s, 1)[1]
+    speeds = rate * np.linalg.norm(slopes[:, :3], axis=1)
+    np.testing.assert_allclose(speeds, 0.1, rtol=1e-6)
+
+
 def test_a_free_leg_has_none() -> None:
     assert time_law_of(Leg(0.0, 1.0), *path_and_map([LINE])) is None
 

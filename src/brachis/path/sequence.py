@@ -170,10 +170,13 @@ class SequencePath:
     def knots(self) -> Array:
         """Values of s between which the path is analytic, from its begin to its end."""
         found = [self.breaks]
-        for begin, piece in zip(self.breaks[:-1], self.pieces, strict=True):
-            knots = piece.curve.knots
-            inner = knots[(knots > piece.first) & (knots < piece.last)]
-            found.append(begin + (inner - piece.first) / self.total)
+        for (begin, end), piece in zip(pairwise(self.breaks), self.pieces, strict=True):
+            knots = begin + (piece.curve.knots - piece.first) / self.total
+            # Ends of a piece may be knots of its curve, but for rounding.
+            is_inner = (knots > begin + tolerances.PATH) & (
+                knots < end - tolerances.PATH
+            )
+            found.append(knots[is_inner])
         return np.unique(np.concatenate(found))
 
     def between(self, begin: float, end: float) -> Self:
