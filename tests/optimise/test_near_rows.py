@@ -104,6 +104,12 @@ def test_where_curvature_is_known_fewer_rows_have_to_hold(solve):
     assert report.objective == pytest.approx(-1.0, abs=1e-8)
 
 
+def test_from_a_point_beyond_the_rows_few_are_enough(solve):
+    report = solve_near_rows(Disc(), np.array([0.0, -1.3, 0.0]), solve, 1e-9)
+    assert solve.rows[0] < COUNT
+    assert report.objective == pytest.approx(-1.0, abs=1e-8)
+
+
 def test_from_a_point_far_beyond_the_rows_all_are_needed(solve):
     solve_near_rows(Disc(), np.array([0.0, -1.6, 0.0]), solve, 1e-9)
     assert solve.rows == [COUNT]
@@ -149,7 +155,7 @@ def test_all_iterations_are_not_used_up_again():
         (uno,) = solvers_for("uno")
         report = uno.solve(problem, x, SolverOptions(max_iterations=2), None)
         spent = SolveStatus.ITERATION_LIMIT
-        return replace(report, status=spent, objective=-1.0, violation=0.0)
+        return replace(report, status=spent, violation=1.0)
 
     start = 0.999 * np.array([np.cos(-1.5), np.sin(-1.5), 0.0])
     report = solve_near_rows(Disc(), start, solve, 1e-9)

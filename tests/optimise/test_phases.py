@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import simpson
 from scipy.interpolate import BSpline, make_interp_spline
 
+from brachis.errors import UnreachableError
+from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.boundary import BoundarySpline, EndCondition, sum_powers
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.phase import Phase
@@ -284,12 +286,31 @@ def test_the_hessian_at_a_given_speed_is_that_of_the_objective(case):
     assert not known.hessian(x, 0.0, no_rows).any()
 
 
-def test_of_an_end_time_that_is_free_no_curvature_is_known():
-    phase = phase_of("r2")
-    program = Program(
-        [phase.with_limits([own for own in phase.limits if not own.guarantee.is_mean])]
-    )
+def without_means(phase: Phase) -> Program:
+    limits = [limit for limit in phase.limits if not limit.guarantee.is_mean]
+    return Program([phase.with_limits(limits)])
+
+
+def test_no_curvature_is_known_of_an_end_time_that_is_free():
+    program = without_means(phase_of("r2"))
     assert program.curvature(program.x_lower) is None
+
+
+def test_no_curvature_is_known_at_a_given_speed_without_redundant_joints():
+    program = without_means(at_given_speed("r0", "bent"))
+    assert program.curvature(program.x_lower) is None
+
+
+def test_a_solve_at_a_given_speed_from_out_of_reach_reports_it():
+    phase = at_given_speed("r2", "bent")
+    program = without_means(phase)
+    (x,) = points_at_given_speed(phase, 1)
+    x[1:] += 50.0
+    with pytest.raises(UnreachableError):
+        program.rows(x)
+    (uno,) = solvers_for("uno")
+    report = uno.solve(program, x, SolverOptions(), None)
+    assert report.status is SolveStatus.EVALUATION_ERROR
 
 
 def test_a_bent_time_law_is_a_spline():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brachis.optimise.backends import SolverOptions, solvers_for
+from brachis.optimise.backends import Curvature, SolverOptions, solvers_for
 from brachis.optimise.pull import Pulled
 
 
@@ -57,3 +57,16 @@ def test_the_curvature_is_that_of_the_pull():
     known = pulled.curvature(START)
     hessian = known.hessian(START, 2.0, np.zeros(1))
     np.testing.assert_allclose(hessian, 0.6 * np.eye(2))
+
+
+def test_the_curvature_of_the_program_is_added():
+    own = np.array([[2.0, 1.0], [1.0, 3.0]])
+
+    class Curved(HalfPlane):
+        def curvature(self, _x):
+            return Curvature(lambda _x, factor, _rows: factor * own, np.array([-0.5]))
+
+    known = Pulled(Curved(), START, 0.3).curvature(START)
+    hessian = known.hessian(START, 2.0, np.zeros(1))
+    np.testing.assert_allclose(hessian, 0.6 * np.eye(2) + 2.0 * own)
+    assert known.multipliers == [-0.5]

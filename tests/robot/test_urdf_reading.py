@@ -144,8 +144,39 @@ def test_a_locked_joint_is_followed_by_its_mimic():
     assert list(robot.model.inertias) == list(same.model.inertias)
 
 
+@pytest.mark.parametrize("order", ["abc", "cba"])
+def test_mimics_of_mimics_follow_in_any_order_of_the_file(order):
+    mimics = {
+        "a": "<mimic joint='b' multiplier='-2'/>",
+        "b": "<mimic joint='c' multiplier='0.5' offset='0.1'/>",
+        "c": "",
+    }
+    more = "".join(
+        f"<link name='finger_{name}'>{INERTIAL.format(mass=0.5)}</link>"
+        f"<joint name='{name}' type='prismatic'><parent link='tool'/><child link='finger_{name}'/>"
+        "<axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/>"
+        f"{mimics[name]}</joint>"
+        for name in order
+    )
+    options = {"more": more, "tool_frame": "tool"}
+    followed = load([TURN], locked_joints={"c": 0.3}, **options)
+    free = more
+    for mimic in mimics.values():
+        free = free.replace(mimic, "") if mimic else free
+    locked = {"a": -0.5, "b": 0.25, "c": 0.3}
+    given = load([TURN], more=free, tool_frame="tool", locked_joints=locked)
+    for own, other in zip(followed.model.inertias, given.model.inertias, strict=True):
+        np.testing.assert_allclose(own.lever, other.lever, atol=1e-14)
+
+
+def test_a_joint_that_mimics_itself_is_refused():
+    more = GRIPPER.replace("mimic joint='finger'", "mimic joint='follower'")
+    with pytest.raises(UrdfError, match="mimic each other in a loop; found follower"):
+        load([TURN], more=more, tool_frame="tool")
+
+
 def test_a_mimic_that_is_locked_elsewhere_is_refused():
-    message = r"'follower' mimics 'finger', which is at 0\.03; found 0\.01 m; allowed: 0\.03 m"
+    message = r"'follower' mimics 'finger', which is locked at 0\.03 m; found 0\.01 m; allowed: 0\.03 m"
     locked = {"finger": 0.03, "follower": 0.01}
     with pytest.raises(UrdfError, match=message):
         load([TURN], more=GRIPPER, tool_frame="tool", locked_joints=locked)

@@ -136,7 +136,7 @@ def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarra
     is_curved = values > _NEARLY_ZERO
     inverse = np.divide(0.5, values, out=np.zeros_like(values), where=is_curved)
     factors = phase.mean_weights(x)[:, None] * weights * inverse
-    return phase.sum_squares(phase.limit_slopes(x)[:, is_mean], factors)
+    return phase.sum_outer_products(phase.limit_slopes(x)[:, is_mean], factors)
 
 
 def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ _AT_BOUND = 0.05
 _ROWS_A_VARIABLE = 2.0
 """Rows that hold the motion, for every variable, no fewer: from a slower motion the end time would collapse."""
 _ROWS_IF_CURVED = 1.0
-"""The same where curvature is known, which bounds the steps along which no row is near."""
+"""The same where a part of the Hessian is known: curvature keeps steps short."""
 _LEAST_KEPT = 0.2
 """Part of the rows, the nearest ones, that is kept whatever their distance: too few let the end time collapse."""
 _MOST_KEPT = 0.6
@@ -44,8 +44,8 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """Multiples of this, modulo 1, are spread evenly."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
-_OVER = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT, SolveStatus.BEATEN)
-"""How solves end after which nothing is solved."""
+_FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT, SolveStatus.BEATEN)
+"""Statuses after which no further solve is tried."""
 
 
 class NearRows:
@@ -147,7 +147,7 @@ def solve_near_rows(
         slack = _slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
         # With all rows the solve would use up time and iterations too.
-        is_over = report.status in _OVER
+        is_over = report.status in _FINAL
         if is_over or (report.status.usable and not len(missing)):
             return _complete(program, kept, reports)
         if not report.status.usable or slack.min() < -_LAST_VIOLATION:

@@ -38,7 +38,7 @@ class Objective(Protocol):
         ...
 
     def is_curved(self, phase: Phase) -> bool:
-        """Tell whether the share is a sum of squares, or has one."""
+        """Tell whether the share contains a sum of squares."""
         ...
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
@@ -78,16 +78,16 @@ class EndTime:
         return gradient
 
     def is_curved(self, phase: Phase) -> bool:
-        """Tell whether the duration is given."""
-        return phase.time_law is not None
+        """Tell whether the duration is given, and joints are redundant."""
+        return phase.time_law is not None and phase.joint_map.r > 0
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Hessian of the mean square, (v, v)."""
+        """Hessian of the weighted mean square of the redundant joints' accelerations, (v, v)."""
         points, curves = phase.state(x).yddot.shape
         by_curves = np.zeros((3, points, curves - 1, curves))
         by_curves[2, :, :, 1:] = np.eye(curves - 1)
         slopes = phase.slopes_by_variables(by_curves, x)
-        hessian = phase.sum_squares(slopes, 2.0 * _CALM * _shares(phase))
+        hessian = phase.sum_outer_products(slopes, 2.0 * _CALM * _shares(phase))
         hessian[0] = 0.0  # the duration does not change
         hessian[:, 0] = 0.0
         return hessian
@@ -119,7 +119,7 @@ class LeastAcceleration:
         return phase.gradient(Partials(qddot=slopes[:, None]), x)
 
     def is_curved(self, _phase: Phase) -> bool:
-        """Tell that it is."""
+        """Return True: the share is a sum of squares."""
         return True
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ class LeastAcceleration:
         by_joints = np.tile(np.diag(self.weights), (len(phase.t_norm), 1, 1))
         by_curves = phase.evaluate(x).chain([Partials(qddot=by_joints)])
         slopes = phase.slopes_by_variables(by_curves, x)
-        return phase.sum_squares(slopes, 2.0 * _shares(phase))
+        return phase.sum_outer_products(slopes, 2.0 * _shares(phase))
 
 
 def _shares(phase: Phase) -> np.ndarray:

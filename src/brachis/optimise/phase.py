@@ -431,14 +431,14 @@ class Phase:
             [np.bincount(variable, term, self.variables) for term in terms.T]
         )
 
-    def sum_squares(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Add up g g^T, (v, v), of the slopes g of all values at all points, (z, c), with weights (K,) or (K, c)."""
+    def sum_outer_products(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Add up g g^T, (v, v), over the slopes g of all values at all points, (z, c), with weights (K,) or (K, c)."""
         columns = slopes.shape[1]
         rows = np.zeros((len(self.t_norm), columns, self.variables))
         point = self._layout.point[:, None]
         variable = self._layout.variable[:, None]
         rows[point, np.arange(columns), variable] = slopes
-        factors = np.broadcast_to(weights.T, rows.shape[1::-1]).T
+        factors = weights[:, None] if weights.ndim == 1 else weights
         flat = rows.reshape(-1, self.variables)
         return np.asarray((rows * factors[:, :, None]).reshape(flat.shape).T @ flat)
 

@@ -290,7 +290,8 @@ class Program(Summary):
             return None
         # Squares of accelerations fall with the fourth power of the time T: dT/d(mean) = -T/4 where the mean is 1.
         guess = np.zeros(len(self.lower))
-        guess[self._mean_rows] = -0.25 * self.objective(x) / max(len(self.means), 1)
+        if len(self.means):
+            guess[self._mean_rows] = -0.25 * self.end_time(x) / len(self.means)
         return Curvature(self._find_hessian, guess)
 
     def _find_hessian(

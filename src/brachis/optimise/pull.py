@@ -53,6 +53,7 @@ class Pulled:
         def find_hessian(
             x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
         ) -> np.ndarray:
+            """Return the known part of the program, and that of the pull."""
             hessian = objective_multiplier * of_pull
             if own is not None:
                 hessian += own.hessian(x, objective_multiplier, multipliers)

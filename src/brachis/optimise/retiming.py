@@ -37,6 +37,8 @@ _WORTH = 3.0
 """Tolerances by which a timing of the splines' own joint path is faster if it is worth to be followed."""
 _MOST_INTERVALS = 256
 """Intervals of all redundant curves together: with four curves of 128 a solve takes half a minute, and gains 0.2 %."""
+_LEAST_INTERVALS = 4
+"""Intervals of a redundant curve in a phase, however short."""
 _PLACES_AN_INTERVAL = 3.5
 """Places of the path at which limits hold, for every interval."""
 _NARROWED = 4
@@ -56,7 +58,7 @@ class PathEffort:
     Attributes
     ----------
     intervals : tuple of int
-        Of the redundant curves over the path, one after the other.
+        Of the redundant curves over the whole path, one number after the other; phases share them by their time.
     places : int
         At which joint paths are timed.
     is_rough_before, is_rough_after : bool
@@ -329,12 +331,12 @@ def _better(
     ahead: tuple[float, ...],
 ) -> BetterPaths:
     """Solve over the path from the best joint paths, and keep what is faster."""
-    places = int(_PLACES_AN_INTERVAL * intervals)
-    stations = places // len(ahead)
-    phases = [
-        PathPhase(phase, own, intervals, stations, ahead)
-        for phase, own in zip(program.phases, best.timings, strict=True)
-    ]
+    phases = []
+    for phase, own in zip(program.phases, best.timings, strict=True):
+        share = own.t_end / best.t_end
+        count = max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
+        stations = int(_PLACES_AN_INTERVAL * count) // len(ahead)
+        phases.append(PathPhase(phase, own, count, stations, ahead))
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)
     reports = (*best.reports, report)

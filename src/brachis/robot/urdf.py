@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import numpy as np
@@ -58,9 +59,8 @@ def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
                 allowed="a direction, any length but zero",
             )
     for name in _movable(tree):
-        mimic = tree.joints[name].find("mimic")
-        leader = None if mimic is None else mimic.get("joint")
-        if leader is not None and not {name, leader}.isdisjoint(chain):
+        leader = _leader_of(tree.joints[name])
+        if leader and not {name, leader}.isdisjoint(chain):
             raise UrdfError(
                 f"joint {name!r} mimics {leader!r}",
                 where=where,
@@ -194,7 +194,8 @@ def read_chain(
         raise UrdfError(
             "no joint moves the tool", where=where, found=f"chain {base} -> {tool}"
         )
-    locked = _lock(tree, [name for name in movable if name not in chain], locked_joints)
+    still = [name for name in movable if name not in chain]
+    locked = _lock(tree, still, locked_joints, where)
     dynamics = read_dynamics(tree, chain, locked, tool)
     check_inertias(tree, dynamics.bodies, where)
     limits = tuple(_read_limit(tree.joints[name]) for name in chain)
@@ -222,17 +223,29 @@ def _check_locked(joint: Element, name: str, position: float) -> None:
 
 
 def _lock(
-    tree: UrdfTree, names: Sequence[str], given: Mapping[str, float]
+    tree: UrdfTree, names: Sequence[str], given: Mapping[str, float], where: str
 ) -> dict[str, float]:
-    """Find the positions, rad or m, of joints that do not move: those given, else what they mimic, else rest."""
+    """Find the positions, rad or m, of joints that do not move: those given, else what they mimic, else rest.
+
+    What a joint mimics may put it beyond its own range, as the file says.
+    """
     locked = {
         name: float(given.get(name, _rest_position(tree.joints[name])))
         for name in names
     }
-    for name in names:
+    leaders = {name: _leader_of(tree.joints[name]) for name in names}
+    graph = {name: {leaders[name]} & set(names) for name in names}
+    try:
+        order = tuple(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        raise UrdfError(
+            "joints mimic each other in a loop",
+            where=where,
+            found=" -> ".join(error.args[1]),
+        ) from error
+    for name in order:
         joint = tree.joints[name]
-        mimic = joint.find("mimic")
-        leader = None if mimic is None else mimic.get("joint")
+        leader = leaders[name]
         if leader not in locked:
             continue
         multiplier = number_of(joint, "mimic", "multiplier", 1.0)
@@ -241,14 +254,21 @@ def _lock(
         if name in given and abs(given[name] - position) > tolerances.ANGLE:
             unit = _unit_of(joint)
             raise UrdfError(
-                f"joint {name!r} mimics {leader!r}, which is at {locked[leader]:g}",
+                f"joint {name!r} mimics {leader!r}, which is locked at "
+                f"{locked[leader]:g} {_unit_of(tree.joints[leader])}",
                 where=f"robot.locked_joints.{name}",
                 found=f"{given[name]:g} {unit}",
                 allowed=f"{position:g} {unit}",
-                hint=f"Leave {name} out: it follows",
+                hint=f"Leave {name} out, or lock {leader} where {name} needs it",
             )
         locked[name] = position
     return locked
+
+
+def _leader_of(joint: Element) -> str:
+    """Return the name of the joint that a joint mimics; empty if it mimics none."""
+    mimic = joint.find("mimic")
+    return "" if mimic is None else mimic.get("joint", "")
 
 
 def _unit_of(joint: Element) -> str:

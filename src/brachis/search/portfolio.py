@@ -52,7 +52,7 @@ _REFINED = 5e-3
 _FAR = 0.2
 """Timing gap of the best motion from which on another solver is tried: few knots alone cost up to 0.15."""
 _NAMED = 3
-"""Lattices that a message names."""
+"""Largest number of lattices that a message names."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 

@@ -170,7 +170,7 @@ class RobotSettings(Model):
     gravity: tuple[Number, Number, Number] = (0.0, 0.0, -9.81)
     """Gravity [x, y, z] in the world frame, m/s^2."""
     locked_joints: dict[Name, Number] = Field(default={})
-    """Joints that do not move: their positions by name, rad (m)."""
+    """Joints that do not move: their positions by name, rad (m). A joint that mimics one of them follows it."""
     payload: Payload | None = None
     """Rigid body fixed to the tool frame. Null: none."""
     limits_file: Name | None = None

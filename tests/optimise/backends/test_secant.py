@@ -95,3 +95,12 @@ def test_without_multipliers_the_last_ones_count():
     hessian(np.ones(SIZE), 1.0, np.array([-3.0]))
     again = hessian(np.ones(SIZE), 1.0, none)
     np.testing.assert_allclose(again, 6.0 * SQUARES, rtol=1e-9)
+
+
+def test_in_a_restoration_the_objective_stays_curved():
+    problem = ellipsoid(1.0)
+    known = Curvature(lambda _x, factor, _rows: factor * SQUARES, np.zeros(1))
+    hessian = SecantHessian(problem, known)
+    for factor in (1.0, 0.0):
+        found = hessian(np.zeros(SIZE), factor, np.zeros(1))
+        np.testing.assert_allclose(found, SQUARES, atol=1e-12)

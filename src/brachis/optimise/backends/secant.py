@@ -69,7 +69,8 @@ class SecantHessian:
         if np.trace(known) < self._least_trace:
             # Without curvature steps are too long: the last multipliers that gave enough do for now.
             multipliers = self._multipliers
-            known = self._known.hessian(x, 1.0, multipliers)
+            factor = objective_multiplier or 1.0  # also in a restoration
+            known = self._known.hessian(x, factor, multipliers)
         if objective_multiplier > 0.0:
             self._multipliers = multipliers
             self._learn(x, objective_multiplier, multipliers, known)
