@@ -352,7 +352,7 @@ def test_chain_without_moving_joints():
         ("<robot name='x'><link name='a'>", "not well-formed XML"),
         (
             "j1,j2",
-            "not a URDF; found 'j1,j2' at its beginning; .* a URDF, the name of a robot, or a task file",
+            "not a URDF; found 'j1,j2' at its beginning; .* Name a URDF, or a robot that comes with brachis",
         ),
         ("", "not a URDF; found '' at its beginning"),
         (

@@ -111,7 +111,7 @@ def _robot_element(text: str, where: str) -> Element:
             where=where,
             found=f"{text[:20]!r} at its beginning",
             allowed="XML, with the root element <robot>",
-            hint="brachis inspect takes a URDF, the name of a robot, or a task file (.yaml)",
+            hint="Name a URDF, or a robot that comes with brachis: brachis robots lists them",
         )
     parser = etree.XMLParser(
         remove_blank_text=True, resolve_entities=False, encoding="utf-8"

@@ -264,7 +264,7 @@ class SearchSettings(Model):
     remaining work takes longer than 6 s. The answer does not depend on it unless the time runs out."""
     time_limit: Positive = Field(default=60.0, le=1e6)
     """Time limit of the whole plan, s. The best verified motion found by then is returned; if there is none, an
-    unverified one, perhaps a second later."""
+    unverified one, up to two seconds later."""
     seed: Count = Field(default=0, ge=0)
     """Seed of the random numbers."""
     least_motion: Flag = True

@@ -82,6 +82,8 @@ def test_unverified_plan_says_so(run, task, write, tmp_path):
     assert outcome.code == 1
     assert json.loads(outcome.out)["verified"] is False
     assert "unverified" in outcome.err
+    assert "verification (" in outcome.err
+    assert "FAILED, allowed" in outcome.err
     names = [
         "unverified.json",
         "unverified.npz",

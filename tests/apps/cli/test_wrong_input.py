@@ -340,3 +340,11 @@ def test_files_of_the_kernel_are_no_results(name, command, run, tmp_path):
     ended = run(command, name, *out)
     assert ended.code == 2
     assert "the file is not a brachis result" in ended.err
+
+
+def test_a_text_that_shows_a_task_is_no_task_file(run, tmp_path):
+    text = tmp_path / "notes.md"
+    text.write_text("# A task\n\n```yaml\nbrachis: 1\n```\n")
+    outcome = run("verify", text)
+    assert outcome.code == 2
+    assert "not a brachis result" in outcome.err

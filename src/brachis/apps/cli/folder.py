@@ -41,6 +41,9 @@ Writer = Callable[[Path], object]
 Drawing = Callable[[], Any]
 """Draws a Matplotlib figure."""
 
+_NAMED = 3
+"""Largest number of failed checks that a message names."""
+
 _SCHEMA = b'{\n  "$schema": "https://json-schema.org/draft/2020-12/schema",\n  "$id": "urn:brachis:'
 _BEGINNINGS = {
     ".html": (b"<!doctype html>\n<!-- brachis report -->",),
@@ -358,8 +361,20 @@ def finish(
         for each in result.not_completed:
             print_error(f"not completed: {each}")
     if not verified:
-        print_error(f"the motion found did not pass the verification; {complaint}")
+        failed = "" if result is None else _failed_checks(result.verification)
+        print_error(
+            f"the motion found did not pass the verification{failed}; {complaint}"
+        )
     return exit_code(verified, failures)
+
+
+def _failed_checks(verification: brachis.Verification) -> str:
+    """Say which checks failed, the first three."""
+    failed = [check for check in verification.checks if not check.passed]
+    words = [f"{check.name} {check.in_words()}" for check in failed[:_NAMED]]
+    if len(failed) > _NAMED:
+        words.append(f"{len(failed) - _NAMED} more")
+    return f" ({'; '.join(words)})"
 
 
 def draw(make: Drawing, path: Path) -> None:
