@@ -42,11 +42,11 @@ _KEPT_BACK = 0.1 * tolerances.END_TIME
 """Fraction of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
-_MANY = 150
-"""Number of variables of a phase above which active sets take seconds an iteration. No smoother motion that is as fast
-is then looked for."""
+_MANY = 200
+"""Number of variables above which active sets take tenths of a second an iteration, or seconds. No smoother motion that
+is as fast is then looked for."""
 _FOR_MANY = "ipopt"
-"""Backend for phases with more variables, where the motion may be slower."""
+"""Backend for more variables, where the motion may be slower."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,21 +117,21 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     before = fastest.refined
     assert start is not None and before is not None
     task = start.problem.task
-    most = max(phase.variables for phase in before.program.phases)
+    count = len(before.x)
     status = ""
     if not fastest.verified:
         status = "the fastest motion is not verified"
     elif deadline.passed:
         status = "no time was left"
-    elif most > _MANY and not task.search.slower:
-        status = f"the fastest motion is kept: with {most} variables no smoother one is looked for"
+    elif count > _MANY and not task.search.slower:
+        status = f"the fastest motion is kept: with {count} variables no smoother one is looked for"
     if status:
         return _keep(fastest, status)
     slower = max(task.search.slower, tolerances.END_TIME)
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
-    name = _FOR_MANY if most > _MANY else task.solver.name
+    name = _FOR_MANY if count > _MANY else task.solver.name
     solve = _session(name, soon, listener, patience=5)
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)

@@ -269,7 +269,7 @@ class SearchSettings(Model):
     """Seed of the random numbers."""
     least_motion: Flag = True
     """Whether the smoothest motion is chosen: least joint accelerations, with an end time within 1e-4 (relative) of the
-    fastest. With more than 150 variables, as intervals: auto often has, it is looked for only with `slower`."""
+    fastest. With more than 200 variables, as intervals: auto often has, it is looked for only with `slower`."""
     slower: Share = 0.0
     """How much slower the smoothest motion may be, for example 1 % or 0.01."""
 
