@@ -361,14 +361,14 @@ def finish(
         for each in result.not_completed:
             print_error(f"not completed: {each}")
     if not verified:
-        failed = "" if result is None else _failed_checks(result.verification)
+        failed = "" if result is None else _describe_failures(result.verification)
         print_error(
             f"the motion found did not pass the verification{failed}; {complaint}"
         )
     return exit_code(verified, failures)
 
 
-def _failed_checks(verification: brachis.Verification) -> str:
+def _describe_failures(verification: brachis.Verification) -> str:
     """Say which checks failed, the first three."""
     failed = [check for check in verification.checks if not check.passed]
     words = [f"{check.name} {check.in_words()}" for check in failed[:_NAMED]]
