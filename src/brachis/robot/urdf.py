@@ -185,7 +185,7 @@ def read_chain(
     movable = _movable(tree)
     check_names("moving joint", locked_joints, movable, f"{where}: locked_joints")
     for name, position in locked_joints.items():
-        _check_locked(tree.joints[name], name, position)
+        _check_locked_position(tree.joints[name], name, position)
     chain = tuple(
         name for name in path if name in movable and name not in locked_joints
     )
@@ -202,7 +202,7 @@ def read_chain(
     return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), dynamics)
 
 
-def _check_locked(joint: Element, name: str, position: float) -> None:
+def _check_locked_position(joint: Element, name: str, position: float) -> None:
     """Refuse a position, rad or m, that a locked joint cannot have."""
     if not abs(position) <= FARTHEST:
         raise UrdfError(
