@@ -302,7 +302,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
         Kind.FIGURES: rb'\A\{\n  "t_end"',
         Kind.URDF: rb"(?s)\A\s*(?=<).*<robot\b",
         Kind.SWEEP: rb"(?m)^sweep\s*:",
-        Kind.TASK: rb"(?ms)\A(?!.*^```).*^brachis\s*:",  # not a text that shows one
+        Kind.TASK: rb"(?ms)\A(?!.*^```).*^brachis\s*:",  # but not Markdown
     }
     for kind, pattern in patterns.items():
         if re.search(pattern, beginning):

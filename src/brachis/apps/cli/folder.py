@@ -374,7 +374,7 @@ def _describe_failures(verification: brachis.Verification) -> str:
     words = [f"{check.name} {check.in_words()}" for check in failed[:_NAMED]]
     if len(failed) > _NAMED:
         words.append(f"{len(failed) - _NAMED} more")
-    return f" ({'; '.join(words)})"
+    return f" ({'; '.join(words)})" if words else ""
 
 
 def draw(make: Drawing, path: Path) -> None:
