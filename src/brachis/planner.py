@@ -225,7 +225,7 @@ def _search(
     deadline: Deadline,
     report: Listener,
 ) -> Search:
-    """Search for the fastest motion, from a known one if one is given; raise an error that explains why none was found."""
+    """Search for the fastest motion, from a known one if one is given; raise what explains that none was found."""
     search = _open_search(problem, families, deadline, report)
     exact = None
     if known is None and problem.task.tolerances != Tolerances():
