@@ -28,7 +28,6 @@ from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.failure import explain_reach
 from brachis.search.joint_path import DeadEnd
 from brachis.search.posture_lattice import PostureLattice
-from brachis.search.processes import process_count
 from brachis.search.starts import SEARCH_LEVELS
 from brachis.task import load_task
 
@@ -624,15 +623,6 @@ def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):
         if math.isfinite(candidate.t_end)
     ]
     assert len({f"{coarse:.4g}" for coarse in finished}) == len(finished)
-
-
-def test_no_processes_are_started_where_little_time_is_left():
-    assert (
-        process_count(2)
-        == process_count(2, Deadline.after(60.0))
-        == min(2, os.cpu_count() or 1)
-    )
-    assert process_count(2, Deadline.after(1.0)) == 1
 
 
 def test_a_search_without_time_says_where_its_lattices_ended(robot, clock):

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import wait
+
 import pytest
 
-from brachis.errors import BrachisError
+from brachis.errors import BrachisError, PathError
 from brachis.search import processes
 from brachis.search.processes import run_in_processes
 
 
 class Unsendable:
     """What cannot be pickled."""
+
+    def __len__(self):
+        return 7
 
     def __reduce__(self):
         raise TypeError("cannot be sent")
@@ -20,41 +26,82 @@ def length(item, _listener):
     return len(item)
 
 
+def end_if_elsewhere(own, _listener):
+    if os.getpid() != own:
+        os._exit(3)
+
+
 def say(item, listener):
     listener(str(item))
     return item
 
 
-def test_work_that_cannot_be_sent_is_said_so():
-    assert list(run_in_processes(length, ["a", "bc"], jobs=2, listener=print)) == [1, 2]
-    with pytest.raises(
-        BrachisError, match=r"the worker processes cannot run the plans; .*jobs: 1"
-    ):
-        list(
-            run_in_processes(
-                length, [Unsendable(), Unsendable()], jobs=2, listener=print
-            )
-        )
+def refuse(item, _listener):
+    if item == 2:
+        raise PathError("refused")
+    return item
 
 
-def test_auto_starts_processes_when_what_is_left_takes_long(monkeypatch):
-    """The first item is done here; the rest elsewhere, where nobody hears it."""
+@pytest.fixture
+def workers():
+    """Another process, ready, in place of any that was started before."""
+    processes._start_workers.cache_clear()
+    found = processes._start_workers(1)
+    wait(found._starting)
+    yield found
+    processes._start_workers.cache_clear()
+
+
+@pytest.mark.usefixtures("workers")
+def test_work_is_shared_and_comes_back_in_order():
+    here = []
+    made = run_in_processes(say, range(20), jobs=2, listener=here.append)
+    assert list(made) == list(range(20))
+    assert "0" not in here  # the first one was handed out
+    assert 0 < len(here) < 20
+
+
+@pytest.mark.usefixtures("workers")
+def test_work_that_cannot_be_sent_is_done_here():
+    given = [Unsendable(), Unsendable(), Unsendable()]
+    assert list(run_in_processes(length, given, jobs=2, listener=print)) == [7, 7, 7]
+
+
+@pytest.mark.usefixtures("workers")
+def test_a_process_that_ends_is_said_so():
+    given = [os.getpid(), os.getpid()]
+    with pytest.raises(BrachisError, match=r"ended before its work was done.*jobs: 1"):
+        list(run_in_processes(end_if_elsewhere, given, jobs=2, listener=print))
+
+
+@pytest.mark.usefixtures("workers")
+def test_an_error_comes_in_its_turn():
+    made = run_in_processes(refuse, range(5), jobs=2, listener=print)
+    assert [next(made), next(made)] == [0, 1]
+    with pytest.raises(PathError, match="refused"):
+        next(made)
+
+
+def test_nobody_waits_for_processes_to_start(monkeypatch):
+    monkeypatch.setattr(processes._Workers, "count_free", lambda _: 0)
+    here = []
+    made = run_in_processes(say, [1, 2, 3], jobs=2, listener=here.append)
+    assert list(made) == [1, 2, 3]
+    assert here == ["1", "2", "3"]
+
+
+@pytest.mark.usefixtures("workers")
+def test_auto_asks_for_processes_when_what_is_left_takes_long(monkeypatch):
+    """The first item is done here; then it is known how long one takes."""
     here = []
 
-    def listen(text):
-        here.append(text)
+    def plan_three():
+        here.clear()
+        made = run_in_processes(say, [1, 2, 3], jobs="auto", listener=here.append)
+        return list(made)
 
-    assert list(run_in_processes(say, [1, 2, 3], jobs="auto", listener=listen)) == [
-        1,
-        2,
-        3,
-    ]
+    assert plan_three() == [1, 2, 3]
     assert here == ["1", "2", "3"]
-    here.clear()
     monkeypatch.setattr(processes, "_PAYS", 0.0)
-    assert list(run_in_processes(say, [1, 2, 3], jobs="auto", listener=listen)) == [
-        1,
-        2,
-        3,
-    ]
-    assert here == ["1"]
+    assert plan_three() == [1, 2, 3]
+    assert here == ["1", "3"]

@@ -215,7 +215,6 @@ class Search:
             limit,
             jobs=self._problem.task.search.jobs,
             listener=self._listener,
-            deadline=self._deadline,
         )
         with closing(work) as outcomes:
             for number, candidate in enumerate(outcomes, first):
@@ -353,7 +352,7 @@ class Search:
     def _jobs(self) -> int:
         """How many candidates are finished at the same time: with ``auto`` one, for the next one may not be needed."""
         jobs = self._problem.task.search.jobs
-        return 1 if jobs == "auto" else process_count(jobs, self._deadline)
+        return 1 if jobs == "auto" else process_count(jobs)
 
     @property
     def _latest(self) -> Deadline:

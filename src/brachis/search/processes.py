@@ -1,29 +1,34 @@
-"""Work for several processes."""
+"""Work for several processes: this one, and others that help it as soon as they are ready.
+
+Nothing waits for a process to start. Nothing waits for a process either while there is work that nobody does.
+"""
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import os
 import time
-import warnings
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, Future, wait
+from functools import cache
+from importlib import import_module
 from pickle import PicklingError
 from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
 from brachis.common import interrupts
-from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Listener, ignore
 from brachis.errors import BrachisError
 
 _MAIN = "MainProcess"
-_START = 5.0
-"""Seconds that processes may take to start: two on a free machine, more on a busy one."""
-
-_PAYS = 6.0
-"""Seconds of work for which other processes are started."""
+_PAYS = 3.0
+"""Seconds of work for which other processes are started; that takes them a second or two."""
+_STAY = 300.0
+"""Seconds after which a process without work ends."""
+_HEARTBEAT = 0.1
+"""Seconds until Ctrl-C is noticed."""
 
 _Given = TypeVar("_Given")
 _Made = TypeVar("_Made")
@@ -35,7 +40,6 @@ def run_in_processes(
     *others: object,
     jobs: int | str,
     listener: Listener,
-    deadline: Deadline = NEVER,
 ) -> Generator[_Made, None, None]:
     """Do a piece of work for every item, in up to `jobs` processes.
 
@@ -49,11 +53,10 @@ def run_in_processes(
         The same for all items.
     jobs : int or "auto"
         With 1, and within another program's workers, the work is done here, item by item as it is asked for. With
-        ``auto`` it is, until what is left takes longer than to start other processes.
+        ``auto`` it is, until what is left takes longer than to start other processes. What cannot be sent to others is
+        done here too.
     listener : callable
         Only heard of work that is done here.
-    deadline : Deadline, optional
-        By which processes have to have started.
 
     Yields
     ------
@@ -63,66 +66,114 @@ def run_in_processes(
     Raises
     ------
     BrachisError
-        The work cannot be sent to other processes, or a process ended before its work was done.
+        A process ended before its work was done.
     """
-    count = process_count(jobs, deadline)
-    is_alone = count == 1 or len(given) <= 1 or _within_a_worker()
+    count = process_count(jobs)
+    is_alone = count == 1 or len(given) <= 1 or _is_within_a_worker()
+    outcomes: list[Future[_Made]] = []
     taken = 0.0
     done = 0
-    for item in given:
-        left = taken / max(done, 1) * (len(given) - done)
-        pays = jobs != "auto" or (left > _PAYS and deadline.left >= _START)
-        if not is_alone and pays:
-            break
-        interrupts.check()
-        began = time.perf_counter()
-        made_here = function(item, *others, listener)
-        taken += time.perf_counter() - began
-        done += 1
-        yield made_here
-    given = given[done:]
-    if not given:
-        return
-    interrupts.check()
-    from joblib import Parallel, delayed
-
-    made: Any = None
     try:
-        with (
-            interrupts.block_in_children()
-        ):  # joblib would lose a press, and its processes die of it
-            made = Parallel(n_jobs=count, backend="loky", return_as="generator")(
-                delayed(_apart)(function, item, *others) for item in given
-            )
-        for one in made:  # noqa: UP028  ("yield from" would close `made` before the lines below)
-            yield one
-    except (BrokenExecutor, PicklingError) as error:
+        for number in range(len(given)):
+            while number == len(outcomes) or not outcomes[number].done():
+                interrupts.check()
+                left = taken / max(done, 1) * (len(given) - len(outcomes))
+                if not is_alone and (jobs != "auto" or left > _PAYS):
+                    workers = _start_workers(count - 1)
+                    waiting = given[len(outcomes) :]
+                    share = len(waiting) * (count - 1) // count
+                    most = min(share, workers.count_free())
+                    outcomes.extend(
+                        workers.submit(function, item, *others)
+                        for item in waiting[:most]
+                    )
+                if len(outcomes) < len(given):
+                    began = time.perf_counter()
+                    item = given[len(outcomes)]
+                    outcomes.append(_do_here(function, item, *others, listener))
+                    taken += time.perf_counter() - began
+                    done += 1
+                else:
+                    wait([outcomes[number]], _HEARTBEAT)
+            if isinstance(outcomes[number].exception(), PicklingError):
+                outcomes[number] = _do_here(function, given[number], *others, listener)
+            yield outcomes[number].result()
+    except BrokenExecutor as error:
+        _start_workers.cache_clear()
         raise BrachisError(
-            "the worker processes cannot run the plans",
+            "a process that helped with the plan ended before its work was done",
             found=str(error).partition("\n")[0].rstrip("."),
-            hint="Set search.jobs: 1, or put your own limit or closed form in a module that the workers can import",
+            hint="Set search.jobs: 1",
         ) from error
     finally:
-        with (
-            interrupts.defer(),
-            warnings.catch_warnings(),
-        ):  # that work is thrown away is meant
-            warnings.simplefilter("ignore")
-            if made is not None:
-                made.close()
+        for outcome in outcomes:
+            outcome.cancel()
 
 
-def process_count(jobs: int | str, deadline: Deadline = NEVER) -> int:
+def process_count(jobs: int | str) -> int:
     """Return the number of processes that is used where a task asks for `jobs`, a number or ``auto``.
 
-    Never more than there are processors; only this one if the others would not have started by the deadline.
+    Never more than there are processors.
     """
     most = os.cpu_count() or 1
-    wanted = most if isinstance(jobs, str) else min(jobs, most)
-    return 1 if deadline.left < _START else wanted
+    return most if isinstance(jobs, str) else min(jobs, most)
 
 
-def _within_a_worker() -> bool:
+class _Workers:
+    """Other processes, `count` of them."""
+
+    def __init__(self, count: int) -> None:
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        self._executor = ProcessPoolExecutor(count, timeout=_STAY)
+        atexit.register(self._executor.shutdown, kill_workers=True)
+        self._under_way: list[Future[Any]] = []
+        self._starting = [self.submit(_get_ready) for _ in range(count)]
+
+    def submit(
+        self, function: Callable[..., _Made], *arguments: object
+    ) -> Future[_Made]:
+        """Hand out a piece of work."""
+        with interrupts.block_in_children():
+            future = self._executor.submit(_apart, function, *arguments)
+        self._under_way.append(future)
+        return future
+
+    def count_free(self) -> int:
+        """Count the pieces of work that may be handed out: two for each process that is ready."""
+        self._under_way = [own for own in self._under_way if not own.done()]
+        ready = sum(own.done() for own in self._starting)
+        return max(0, 2 * ready - len(self._under_way))
+
+
+@cache
+def _start_workers(count: int) -> _Workers:
+    """Start other processes, once."""
+    return _Workers(count)
+
+
+def _get_ready(_listener: Listener) -> None:
+    """Load what plans need."""
+    import_module("brachis.search.portfolio")
+
+
+def _do_here(function: Callable[..., _Made], *arguments: object) -> Future[_Made]:
+    """Do a piece of work in this process."""
+    outcome: Future[_Made] = Future()
+    try:
+        outcome.set_result(function(*arguments))
+    except BrachisError as error:  # who asks for the outcome gets it
+        outcome.set_exception(error)
+    return outcome
+
+
+def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
+    """Do a piece of work in a process of its own: one thread for linear algebra, nobody listening."""
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
+        return function(*arguments, ignore)
+
+
+def _is_within_a_worker() -> bool:
     """Tell whether this is somebody's worker process: processes of processes would multiply."""
     from joblib.parallel import get_active_backend
 
@@ -130,9 +181,3 @@ def _within_a_worker() -> bool:
         bool(get_active_backend()[0].nesting_level)
         or multiprocessing.current_process().name != _MAIN
     )
-
-
-def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
-    """Run in a process of its own: one thread for linear algebra, nobody listening."""
-    with ThreadpoolController().limit(limits=1, user_api="blas"):
-        return function(*arguments, ignore)

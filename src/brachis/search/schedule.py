@@ -222,7 +222,6 @@ def _guess_on_some_branches(
         deadline,
         jobs=search.jobs,
         listener=listener,
-        deadline=deadline,
     )
     ranked: list[tuple[int, InitialGuess]] = []
     lattices: Lattices = ()

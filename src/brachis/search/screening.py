@@ -120,7 +120,6 @@ def _improve_most(
         charts,
         jobs=starts[0].problem.task.search.jobs,
         listener=listener,
-        deadline=deadline,
     )
     solved: list[InitialGuess] = []
     with closing(work) as outcomes:
