@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import importlib.metadata
 import itertools
+import pickle
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from dataclasses import dataclass, field, fields
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
@@ -235,9 +236,27 @@ class _Matcher:
         """The ideal arm whose axes are so near (rad, m) that they may be meant to be there."""
         return snap_axes(self._geometry, self._task_map, 2e-3)
 
+    @cached_property
+    def _content(self) -> bytes:
+        """All that the answer depends on, apart from the families."""
+        geometry = self._geometry
+        task_map = self._task_map
+        parts = (
+            *(geometry.joint_names, geometry.revolute, geometry.axes, geometry.points),
+            *(geometry.tool_position, geometry.tool_rotation),
+            *_ranges_to_check(self._robot),
+            type(task_map),
+            *(getattr(task_map, own.name) for own in fields(task_map)[1:]),
+        )
+        return pickle.dumps(parts)
+
     def match(self, names: tuple[str, ...]) -> TriedDecomposition:
         """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
         redundant = tuple(sorted(self._robot.joint_names.index(name) for name in names))
+        return _find_once(_Choice(redundant, self._families, self._content, self))
+
+    def match_anew(self, redundant: tuple[int, ...]) -> TriedDecomposition:
+        """Do what `match` does if nobody has asked before."""
         reasons: dict[str, str] = {}
         match = self._match(redundant, reasons, None)
         if match is None and self._ideal:
@@ -297,6 +316,22 @@ class _Matcher:
                 f"only for an ideal arm, and the axes are off by up to {rough.miss}; up to {TOLERANCE:.0e} is "
                 "accepted as rounding. If the URDF rounds angles, as in 1.57, write them with more digits"
             )
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """Redundant joints, and what their closed form depends on."""
+
+    redundant: tuple[int, ...]
+    families: tuple[Family, ...]
+    content: bytes
+    matcher: _Matcher = field(compare=False)
+
+
+@lru_cache(maxsize=256)
+def _find_once(choice: _Choice) -> TriedDecomposition:
+    """Keep closed forms, which have to be recorded, from one plan to the next."""
+    return choice.matcher.match_anew(choice.redundant)
 
 
 def _compute_margins(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:

@@ -217,6 +217,7 @@ def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.nda
 
 def _turns(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Return the rotation matrices, (K, 3, 3), about a unit vector by angles (K,), rad."""
-    still = np.zeros(len(angles))
-    columns = [_rotate(axis, angles, unit[:, None] + still) for unit in _AXES]
-    return np.array(columns).transpose(2, 1, 0)
+    still = np.outer(axis, axis)
+    cosine = np.cos(angles)[:, None, None]
+    sine = np.sin(angles)[:, None, None]
+    return still + cosine * (_AXES - still) + sine * cross(axis[:, None], _AXES)

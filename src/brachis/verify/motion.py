@@ -26,7 +26,7 @@ from brachis.path.legs import Leg, legs_of
 from brachis.robot import Robot, TaskMap
 from brachis.task import Task
 from brachis.trajectory import Trajectory
-from brachis.verify.mechanics import torques
+from brachis.verify.mechanics import joint_placements, torques
 from brachis.verify.report import VerifyOptions
 
 _HALVINGS = 30
@@ -291,6 +291,11 @@ class Given:
         both, _ = self.states.merge(MotionStates.at(self.pieces, *places))
         apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > SAME_PLACE)
         return replace(self, states=both.only(np.append(True, apart)))
+
+    @cached_property
+    def joints(self) -> tuple[np.ndarray, np.ndarray]:
+        """The `joint_placements` in the states."""
+        return joint_placements(self.robot, self.states.q)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:

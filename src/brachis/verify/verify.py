@@ -116,7 +116,10 @@ def _check_path(given: Given) -> Check:
     targets = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
     found = states.q
     if not isinstance(task_map, JointSpace):
-        found = task_map.of_placements(*tool_placements(task_map.robot, states.q))
+        rotations, origins = given.joints
+        joints = rotations[once], origins[once]
+        placed = tool_placements(task_map.robot, states.q, joints)
+        found = task_map.of_placements(*placed)
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = np.argmax(errors)
     tolerance = given.options.path_tolerance

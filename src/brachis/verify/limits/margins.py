@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.common.arrays import cross
 from brachis.robot.task_map import JointSpace, RowsAndYaw
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.mechanics import joint_placements, tool_placements
@@ -22,7 +23,7 @@ def find_margins(given: Given) -> tuple[Margin, ...]:
     if not np.isfinite(states.q).all():
         return ()
     if not isinstance(given.task_map, JointSpace):
-        singular = _singular_values(given, states)
+        singular = _singular_values(given, states.q, given.joints)
         k = np.argmin(singular)
         time = float(states.t[k])
         name = "smallest singular value"
@@ -37,25 +38,31 @@ def find_margins(given: Given) -> tuple[Margin, ...]:
     return tuple(margins)
 
 
-def _singular_values(given: Given, states: MotionStates) -> np.ndarray:
-    """Least singular values, (K,), of the Jacobian of the rows that the task prescribes, by the arm's own joints."""
-    joints = joint_placements(given.robot, states.q)
+def _singular_values(
+    given: Given, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Least singular values, (K,), of the Jacobian of the rows that the task prescribes, by the arm's own joints.
+
+    They are the roots of the least eigenvalues of J J^T, right to 1e-8 of the largest one; `joints` are the
+    `joint_placements` in postures q, (K, n).
+    """
     rotations, origins = joints
-    tool = tool_placements(given.robot, states.q, joints)[0]
+    tool = tool_placements(given.robot, q, joints)[0].T
     columns = []
     for number, body in enumerate(given.robot.urdf_dynamics.bodies, 1):
-        axis = rotations[:, number] @ body.axis
-        arm = np.cross(axis, tool - origins[:, number])
-        parts = (axis, 0.0 * axis) if body.sliding else (arm, axis)
-        columns.append(np.concatenate(parts, axis=1))
-    every = np.stack(columns, axis=2)
+        axis = (rotations[:, number] @ body.axis).T
+        arm = cross(axis, tool - origins[:, number].T)
+        columns.append((axis, 0.0 * axis) if body.sliding else (arm, axis))
+    every = np.array(columns).reshape(len(columns), 6, -1).T
     task_map = given.task_map
     rows = list(task_map.axes)
     if isinstance(task_map, RowsAndYaw):
         rows.append(3 + task_map.world_axis)
     elif task_map.m > len(rows):
         rows += [3, 4, 5]
-    return np.linalg.svd(every[:, rows], compute_uv=False)[:, -1]
+    jacobian = every[:, rows]
+    squares = np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(1, 2))[:, 0]
+    return np.sqrt(squares.clip(min=0.0))
 
 
 def _parts_of_ranges(
@@ -80,7 +87,8 @@ def _worst_singularity(given: Given) -> Worst | None:
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return 2 - value / wanted, (K, 1)."""
-        return 2.0 - _singular_values(given, states)[:, None] / wanted
+        joints = joint_placements(given.robot, states.q)
+        return 2.0 - _singular_values(given, states.q, joints)[:, None] / wanted
 
     return worst_between(given, ratios, ("arm",))
 
