@@ -326,7 +326,7 @@ def refine_and_verify(
         finer = with_points_at_violations(done)
         if finer is None:
             break
-        report = solve(finer, refined.x)
+        report = solve(finer, refined.x, refined.report.learnt)
         if not report.status.usable:
             break
         program = finer

@@ -86,7 +86,7 @@ class SolvedProgram(Summary):
         return self.reports[0].status.usable
 
 
-Solve = Callable[[Program, np.ndarray], SolverReport]
+Solve = Callable[..., SolverReport]
 """Solves a program from a point x, (v,)."""
 Attempt = Callable[[Program, np.ndarray], SolvedProgram]
 """Solves a changed program from a point x, (v,), perhaps in several steps, in which the program may change again."""
@@ -372,8 +372,16 @@ class SolverSession:
         )
         return dataclasses.replace(self, options=own, acceptable=1e-2)
 
-    def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
-        """Solve a program from the point x, (v,), or from a slightly slower motion that is within the limits."""
+    def __call__(
+        self,
+        program: Program | PathProgram,
+        x: np.ndarray,
+        learnt: np.ndarray | None = None,
+    ) -> SolverReport:
+        """Solve a program from the point x, (v,), or from a slightly slower motion that is within the limits.
+
+        For `learnt` see `SolverOptions`.
+        """
         if isinstance(program, Program):
             x = _slow_down(program, x)
         # Only the time that is not given can get shorter.
@@ -385,14 +393,18 @@ class SolverSession:
             backend: Solver, problem: Problem, x: np.ndarray
         ) -> SolverReport:
             """Solve in the time that is left."""
+            nonlocal learnt
             is_near = isinstance(problem, NearRows)
             options = dataclasses.replace(
                 self.options,
                 time_limit=until.left,
                 progress=progress,
                 first_step=_NEAR_STEP if is_near else self.options.first_step,
+                learnt=learnt,
             )
-            return backend.solve(problem, x, options, self.progress)
+            report = backend.solve(problem, x, options, self.progress)
+            learnt = report.learnt
+            return report
 
         is_large = isinstance(program, PathProgram) and len(x) > _LARGE_PROGRAM
         if is_large and self.for_large not in (None, self.backend):

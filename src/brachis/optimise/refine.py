@@ -277,6 +277,8 @@ _LONGEST_IF_LATE = 1.0
 """The same where the time is up: a slower motion within the limits is better than none."""
 _CLOSE = 1.01
 """Ratio of a time that is long enough to one that is too short, at which no shorter one is looked for."""
+_RELIEF = 4.0
+"""Violations fall by no more than about so many times the fraction by which a motion gets slower."""
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 
@@ -337,9 +339,10 @@ def refine(
     for _ in range(options.max_rounds):
         answer = reports[-1].x
         violation, missing = violations(dense, answer, goal)
-        factor, remaining = _lengthen(
-            dense, answer, violation, options, options.tolerance
+        by = (
+            options.tolerance if violation < goal + _RELIEF * options.tolerance else 0.0
         )
+        factor, remaining = _lengthen(dense, answer, violation, options, by)
         if remaining <= goal:
             return SolvedProgram(
                 program, tuple(reports), violation=remaining, time_scaled=factor
@@ -351,7 +354,7 @@ def refine(
         is_same = finer.collocation_points == program.collocation_points
         if is_same or options.deadline.passed:
             break
-        report = solve(finer, answer)
+        report = solve(finer, answer, reports[-1].learnt)
         if not report.status.usable and not _still_good(report, reports[-1]):
             break
         program = finer

@@ -101,6 +101,15 @@ def test_in_a_restoration_the_objective_stays_curved():
     problem = ellipsoid(1.0)
     known = Curvature(lambda _x, factor, _rows: factor * SQUARES, np.zeros(1))
     hessian = SecantHessian(problem, known)
-    for factor in (1.0, 0.0):
+    for factor, part in ((1.0, 1.0), (0.0, 0.01)):
         found = hessian(np.zeros(SIZE), factor, np.zeros(1))
-        np.testing.assert_allclose(found, SQUARES, atol=1e-12)
+        np.testing.assert_allclose(found, part * SQUARES, atol=1e-12)
+
+
+def test_what_one_solve_learnt_the_next_one_knows():
+    problem = ellipsoid(0.7)
+    learnt = 0.6 * SQUARES  # the rest of 2 SQUARES with the multiplier 1
+    multipliers = np.array([-1.0])
+    hessian = SecantHessian.of(problem, np.zeros(SIZE), learnt)
+    found = hessian(np.zeros(SIZE), 1.0, multipliers)
+    np.testing.assert_allclose(found, 2.0 * SQUARES, atol=1e-12)

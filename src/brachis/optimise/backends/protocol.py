@@ -123,6 +123,9 @@ class SolverOptions:
     apart : bool
         Whether the solve runs in a process of its own, which is ended when nothing is heard of it for long. That takes
         some 0.07 s more.
+    learnt : (v, v) ndarray, optional
+        Of the report of a solve with the same variables and nearly the same rows: Uno begins with this Hessian, where
+        a problem knows a part of it.
     """
 
     tolerance: float = 1e-6
@@ -134,6 +137,7 @@ class SolverOptions:
     anywhere: bool = False
     to_beat: float = np.inf
     apart: bool = False
+    learnt: np.ndarray | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,6 +161,8 @@ class SolverReport(Summary):
         s.
     message : str
         The backend's own words.
+    learnt : (v, v) ndarray or None
+        The Hessian of the Lagrangian, without the part that the problem knows, where the backend learnt it.
     """
 
     solver: str
@@ -168,6 +174,7 @@ class SolverReport(Summary):
     iterations: int
     wall_time: float
     message: str
+    learnt: np.ndarray | None = None
 
     @property
     def feasible(self) -> bool:

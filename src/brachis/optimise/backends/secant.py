@@ -33,16 +33,33 @@ class SecantHessian:
     ----------
     problem : Problem
     known : Curvature
+    learnt : (v, v) ndarray, optional
+        A at first; by default zero.
+
+    Attributes
+    ----------
+    learnt : (v, v) ndarray
+        A.
     """
 
-    def __init__(self, problem: Problem, known: Curvature) -> None:
+    def __init__(
+        self, problem: Problem, known: Curvature, learnt: np.ndarray | None = None
+    ) -> None:
         self._problem = problem
         self._known = known
         self._multipliers = known.multipliers
         self._least_trace: float | None = None
         count = len(problem.x_lower)
-        self._rest = np.zeros((count, count))
+        self.learnt = np.zeros((count, count)) if learnt is None else learnt
         self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    @classmethod
+    def of(
+        cls, problem: Problem, x: np.ndarray, learnt: np.ndarray | None
+    ) -> SecantHessian | None:
+        """Begin a solve from x, (v,), of a problem that knows a part of its Hessian; None for one that does not."""
+        known = problem.curvature(x)
+        return None if known is None else cls(problem, known, learnt)
 
     def __call__(
         self, x: np.ndarray, objective_multiplier: float, multipliers: np.ndarray
@@ -69,12 +86,15 @@ class SecantHessian:
         if np.trace(known) < self._least_trace:
             # Without curvature steps are too long: the last multipliers that gave enough do for now.
             multipliers = self._multipliers
-            factor = objective_multiplier or 1.0  # also in a restoration
+            factor = objective_multiplier or 1.0
             known = self._known.hessian(x, factor, multipliers)
+            if objective_multiplier == 0.0:
+                # In a restoration the least that is enough: feasible points may be far.
+                known *= self._least_trace / np.trace(known)
         if objective_multiplier > 0.0:
             self._multipliers = multipliers
             self._learn(x, objective_multiplier, multipliers, known)
-        values, vectors = np.linalg.eigh(known + self._rest)
+        values, vectors = np.linalg.eigh(known + self.learnt)
         return np.asarray((vectors * np.abs(values)) @ vectors.T)
 
     def _learn(
@@ -98,18 +118,18 @@ class SecantHessian:
         """Add up the rows of a Jacobian, (nnz,), with multipliers: (v,)."""
         terms = jacobian * multipliers[self._problem.jacobian_rows]
         columns = self._problem.jacobian_columns
-        return np.bincount(columns, terms, len(self._rest))
+        return np.bincount(columns, terms, len(self.learnt))
 
     def _update(self, s: np.ndarray, y: np.ndarray, known: np.ndarray) -> None:
-        """Update A, `_rest`, after a step s with a change y of the Lagrangian's gradient, (v,) each; see the module."""
+        """Update A after a step s with a change y of the Lagrangian's gradient, (v,) each; see the module."""
         s_y = s @ y
         if not s_y > _LEAST_COSINE * np.linalg.norm(s) * np.linalg.norm(y):
             return
         wanted = y - known @ s
-        s_a_s = abs(s @ self._rest @ s)
+        s_a_s = abs(s @ self.learnt @ s)
         if s_a_s > 0.0:
-            self._rest = self._rest * min(1.0, abs(s @ wanted) / s_a_s)
-        error = wanted - self._rest @ s
+            self.learnt = self.learnt * min(1.0, abs(s @ wanted) / s_a_s)
+        error = wanted - self.learnt @ s
         outer = np.outer(error, y) / s_y
         correction = (error @ s) * np.outer(y, y) / s_y**2
-        self._rest = self._rest + outer + outer.T - correction
+        self.learnt = self.learnt + outer + outer.T - correction

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -50,11 +51,14 @@ _LOST = 0.9
 def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     """Solve the monitor's problem from `x`."""
     _solve_first_problem()
+    learnt = monitor.options.learnt
     with monitor:
         for radius, scaled in _RESTARTS:
             units = _units(monitor.problem, x) if scaled else np.ones(len(x))
             stall = _Stall(monitor, units)
-            result = _run(monitor, x, units, radius, stall)
+            hessian = SecantHessian.of(monitor.problem, x, learnt)
+            learnt = None  # it may be what has failed
+            result = _run(monitor, x, units, radius, hessian, stall)
             x = units * np.array(result.primal_solution)
             ending = result.optimization_status.name
             found = result.solution_status.name
@@ -73,7 +77,8 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         status = SolveStatus.ITERATION_LIMIT
     message = f"{ending.lower()}, {found.lower()}"
     multipliers = np.array(result.constraint_dual_solution)
-    return monitor.report(NAME, status, x, multipliers, message)
+    report = monitor.report(NAME, status, x, multipliers, message)
+    return report if hessian is None else replace(report, learnt=hessian.learnt)
 
 
 @cache
@@ -166,6 +171,7 @@ def _run(
     x: np.ndarray,
     units: np.ndarray,
     radius: float,
+    hessian: SecantHessian | None,
     terminate: _Stall,
 ) -> Any:
     """One call of Uno, which is untyped; its variables are x in units."""
@@ -204,9 +210,8 @@ def _run(
         problem.jacobian_columns.tolist(),
         scale(monitor.jacobian, units[problem.jacobian_columns]),
     )
-    known = problem.curvature(x)
-    if known is not None:
-        _set_hessian(model, SecantHessian(problem, known), units)
+    if hessian is not None:
+        _set_hessian(model, hessian, units)
     model.set_initial_primal_iterate((x / units).tolist())
     settings = {
         "primal_tolerance": options.tolerance,
