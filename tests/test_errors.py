@@ -85,10 +85,3 @@ def test_errors_show_their_message_in_notebooks_and_logs():
     error = errors.InputError("wrong", where="a key", found=3)
     assert repr(error) == "InputError('a key: wrong; found 3')"
     assert f"{[error]}" == f"[{error!r}]"
-
-
-@pytest.mark.parametrize(
-    ("count", "text"), [(0, "0 rows"), (1, "1 row"), (2, "2 rows")]
-)
-def test_counts_are_written_with_their_noun(count, text):
-    assert errors.write_count(count, "row") == text

@@ -20,7 +20,8 @@ from brachis import ik
 from brachis.common.arguments import check_callable, check_list, count
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore, report_progress
-from brachis.errors import BrachisError, InputError, write_count
+from brachis.common.words import write_count
+from brachis.errors import BrachisError, InputError
 from brachis.optimise.candidate import Candidate
 from brachis.optimise.layout import SHORTEST_TIME
 from brachis.optimise.least_motion import LeastMotion, find_least_motion

@@ -21,7 +21,8 @@ import yaml
 from brachis import planner
 from brachis.common.deadline import Deadline
 from brachis.common.files import locate_urdf
-from brachis.errors import PlanningError, write_count
+from brachis.common.words import write_count
+from brachis.errors import PlanningError
 from brachis.ik.registry import default_task_space
 from brachis.result import Result
 from brachis.robot import Robot, TaskMap, bind, dynamics

@@ -14,7 +14,7 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.common.arrays import cross
-from brachis.errors import write_count
+from brachis.common.words import write_count
 from brachis.ik.protocol import NotApplicableError
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
 from brachis.ik.vectors import across, dot

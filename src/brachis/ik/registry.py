@@ -19,7 +19,8 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.errors import DecompositionError, UnknownNameError, write_count
+from brachis.common.words import write_count
+from brachis.errors import DecompositionError, UnknownNameError
 from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar, prismatic

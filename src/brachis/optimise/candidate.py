@@ -12,7 +12,8 @@ import numpy as np
 
 from brachis.common.arrays import interpolate_columns
 from brachis.common.summary import Summary
-from brachis.errors import UnreachableError, write_count
+from brachis.common.words import write_count
+from brachis.errors import UnreachableError
 from brachis.kinematics import (
     CHART,
     ChartMap,
@@ -326,7 +327,7 @@ def refine_and_verify(
         finer = with_points_at_violations(done)
         if finer is None:
             break
-        report = solve(finer, refined.x, refined.report.learnt)
+        report = solve(finer, refined.x)
         if not report.status.usable:
             break
         program = finer

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -86,7 +86,7 @@ class SolvedProgram(Summary):
         return self.reports[0].status.usable
 
 
-Solve = Callable[..., SolverReport]
+Solve = Callable[[Program, np.ndarray], SolverReport]
 """Solves a program from a point x, (v,)."""
 Attempt = Callable[[Program, np.ndarray], SolvedProgram]
 """Solves a changed program from a point x, (v,), perhaps in several steps, in which the program may change again."""
@@ -323,6 +323,7 @@ class SolverSession:
     acceptable: float = -np.inf
     for_large: Solver | None = None
     pull: float = 0.0
+    _last: list[SolverReport] = field(default_factory=list, repr=False)
 
     @classmethod
     def for_task(
@@ -372,16 +373,14 @@ class SolverSession:
         )
         return dataclasses.replace(self, options=own, acceptable=1e-2)
 
-    def __call__(
-        self,
-        program: Program | PathProgram,
-        x: np.ndarray,
-        learnt: np.ndarray | None = None,
-    ) -> SolverReport:
+    def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,), or from a slightly slower motion that is within the limits.
 
-        For `learnt` see `SolverOptions`.
+        Where the last solve ended at x, this one goes on with the Hessian that it has learnt.
         """
+        learnt = None
+        if self._last and np.array_equal(self._last[0].x, x):
+            learnt = self._last[0].learnt
         if isinstance(program, Program):
             x = _slow_down(program, x)
         # Only the time that is not given can get shorter.
@@ -404,6 +403,7 @@ class SolverSession:
             )
             report = backend.solve(problem, x, options, self.progress)
             learnt = report.learnt
+            self._last[:] = [report]
             return report
 
         is_large = isinstance(program, PathProgram) and len(x) > _LARGE_PROGRAM

@@ -12,6 +12,7 @@ stays. The multipliers that bottlenecks are found by are those of the fastest on
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -132,7 +133,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     program = before.program.with_objective(objective)
     soon = deadline.part(0.5)
     name = _FOR_MANY if count > _MANY else task.solver.name
-    solve = _session(name, soon, listener, patience=5)
+    solve = _session(name, soon, listener)
     longest = program.with_time_scaled(before.x, 1.0 + slower - _KEPT_BACK)
     first = solve(program, longest)
     if not first.status.usable:
@@ -152,7 +153,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
         before.t_end * (1.0 + slower),
     )
     # Rounds of refinement begin near enough, and end sooner.
-    solve = _session(name, soon, listener, patience=2)
+    solve = dataclasses.replace(solve, options=_options(patience=2))
     found = refine_and_verify(fastest, program, (first,), solve, options)
     if found.trajectory is None or found.refined is None or not found.verified:
         status = "the fastest motion is kept: a smoother one was not verified"
@@ -213,12 +214,9 @@ def least_acceleration(
     )
 
 
-def _session(
-    name: str, deadline: Deadline, listener: Listener, patience: int
-) -> SolverSession:
-    """Make a session of a backend; any feasible motion will do, however the solve ended."""
-    backend = solvers_for(name)[0]
-    options = SolverOptions(
+def _options(patience: int) -> SolverOptions:
+    """Bound a solve; for `patience` see there."""
+    return SolverOptions(
         tolerance=1e-6,
         max_iterations=60,
         time_limit=np.inf,
@@ -227,9 +225,15 @@ def _session(
         anywhere=True,
     )
 
+
+def _session(name: str, deadline: Deadline, listener: Listener) -> SolverSession:
+    """Make a session of a backend; any feasible motion will do, however the solve ended."""
+    backend = solvers_for(name)[0]
+
     def progress(iteration: int, objective: float) -> None:
         rms = 100.0 * objective**0.5
         text = f"iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
         listener(Iteration(f"least motion: {text}"))
 
+    options = _options(patience=5)
     return SolverSession(backend, options, deadline, progress, acceptable=FEASIBLE)

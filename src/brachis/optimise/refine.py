@@ -354,7 +354,7 @@ def refine(
         is_same = finer.collocation_points == program.collocation_points
         if is_same or options.deadline.passed:
             break
-        report = solve(finer, answer, reports[-1].learnt)
+        report = solve(finer, answer)
         if not report.status.usable and not _still_good(report, reports[-1]):
             break
         program = finer

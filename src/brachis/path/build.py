@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.errors import PathError, StartError, write_apart
+from brachis.common.words import write_apart
+from brachis.errors import PathError, StartError
 from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
 from brachis.path.joins import find_joins, refuse_corners
 from brachis.path.protocol import Array, Curve, Path

@@ -8,13 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.errors import (
-    InputError,
-    PathError,
-    Remedy,
-    StartError,
-    write_apart,
-)
+from brachis.common.words import write_apart
+from brachis.errors import InputError, PathError, Remedy, StartError
 from brachis.ik import Match
 from brachis.limits import Limit, Moments, Role
 from brachis.limits.joint import PositionLimit, position_measure

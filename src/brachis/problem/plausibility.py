@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from brachis.errors import PathError, write_apart
+from brachis.common.words import write_apart
+from brachis.errors import PathError
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import TURN, UNITS
 from brachis.robot.plausibility import Check, Issue, find_issues, link_lengths, reach

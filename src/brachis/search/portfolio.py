@@ -22,7 +22,7 @@ import numpy as np
 from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore
-from brachis.errors import write_count
+from brachis.common.words import name_first, write_count
 from brachis.optimise.backends import SolveStatus
 from brachis.optimise.candidate import Candidate, InitialGuess
 from brachis.problem.problem import Decomposition, Problem
@@ -51,8 +51,6 @@ _REFINED = 5e-3
 """Part of the end time that refinement adds at most, as a rule; where it adds more, another motion may be faster."""
 _FAR = 0.2
 """Timing gap of the best motion from which on another solver is tried: few knots alone cost up to 0.15."""
-_NAMED = 3
-"""Largest number of lattices that a message names."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no guess is solved while nothing is verified."""
 
@@ -325,10 +323,7 @@ class Search:
         if not self.interrupted:
             return tuple(parts)
         if self._unfinished_lattices:
-            known = list(self._unfinished_lattices)
-            names = " | ".join(known[:_NAMED])
-            if len(known) > _NAMED:
-                names += f" and {len(known) - _NAMED} more"
+            names = name_first(list(self._unfinished_lattices), " | ")
             parts.append(f"the lattice of {names} was not searched completely")
         unsolved = sum(each.status == NOT_TRIED for each in self.candidates)
         counts = {"planned": unsolved, "refined": len(self._waiting)}

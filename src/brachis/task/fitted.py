@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from brachis.common.files import read_text
-from brachis.errors import TaskError, write_count
+from brachis.common.words import write_count
+from brachis.errors import TaskError
 from brachis.task.messages import validate
 from brachis.task.models import Task
 from brachis.task.orientation import Attitude, OrientationMode, Rotate, TurnTo

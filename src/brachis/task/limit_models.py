@@ -24,7 +24,8 @@ from pydantic import (
     model_validator,
 )
 
-from brachis.errors import InputError, check_names, write_count
+from brachis.common.words import write_count
+from brachis.errors import InputError, check_names
 from brachis.task.fields import (
     LARGEST,
     LEAST,

@@ -13,7 +13,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from brachis.errors import write_count
+from brachis.common.words import write_count
 from brachis.task.fields import (
     Count,
     Flag,

@@ -16,7 +16,8 @@ from brachis.common import tolerances
 from brachis.common.arguments import file_name, number, numbers
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
-from brachis.errors import InputError, UnknownNameError, write_apart, write_count
+from brachis.common.words import write_apart, write_count
+from brachis.errors import InputError, UnknownNameError
 from brachis.kernel import Spline
 from brachis.robot import Robot, dynamics
 from brachis.task import Task

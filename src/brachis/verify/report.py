@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from brachis.common.summary import Summary
-from brachis.errors import write_apart
+from brachis.common.words import write_apart
 from brachis.robot.joints import shown_unit
 
 POSITION_SCALE = "0: the middle of the range, 1: an end"

@@ -34,15 +34,13 @@ from brachis.common.files import (
     writing_errors,
 )
 from brachis.common.progress import Listener
+from brachis.common.words import name_first
 from brachis.errors import InputError
 
 Writer = Callable[[Path], object]
 """Writes one file to a path."""
 Drawing = Callable[[], Any]
 """Draws a Matplotlib figure."""
-
-_NAMED = 3
-"""Largest number of failed checks that a message names."""
 
 _SCHEMA = b'{\n  "$schema": "https://json-schema.org/draft/2020-12/schema",\n  "$id": "urn:brachis:'
 _BEGINNINGS = {
@@ -371,10 +369,8 @@ def finish(
 def _describe_failures(verification: brachis.Verification) -> str:
     """Say which checks failed, the first three."""
     failed = [check for check in verification.checks if not check.passed]
-    words = [f"{check.name} {check.in_words()}" for check in failed[:_NAMED]]
-    if len(failed) > _NAMED:
-        words.append(f"{len(failed) - _NAMED} more")
-    return f" ({'; '.join(words)})" if words else ""
+    words = [f"{check.name} {check.in_words()}" for check in failed]
+    return f" ({name_first(words, '; ')})" if words else ""
 
 
 def draw(make: Drawing, path: Path) -> None:

@@ -30,7 +30,8 @@ from brachis.apps.cli.output import (
     write_posture,
 )
 from brachis.common.files import is_task_file
-from brachis.errors import InputError, write_count
+from brachis.common.words import write_count
+from brachis.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np

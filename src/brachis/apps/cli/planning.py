@@ -44,7 +44,7 @@ from brachis.apps.cli.output import (
     write_posture,
 )
 from brachis.common.progress import Listener
-from brachis.errors import write_count
+from brachis.common.words import write_count
 
 _PLANNED = ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png")
 _BOTTLENECK = ("bottleneck.json", "timeline.png")

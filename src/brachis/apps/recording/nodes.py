@@ -27,7 +27,7 @@ import numpy as np
 
 from brachis.apps.recording.recording import FEWEST_ROWS, Recording
 from brachis.common import tolerances
-from brachis.errors import write_count
+from brachis.common.words import write_count
 from brachis.trajectory.pieces import piece_coefficients
 
 _TINY = np.finfo(float).tiny

@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 
 from brachis.common.files import check_kind, read_text
-from brachis.errors import InputError, TaskError, UnknownNameError, write_count
+from brachis.common.words import write_count
+from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import Robot
 from brachis.task.points.tables import Table, read_table
 from brachis.task.points.units import ANGLES, LENGTHS

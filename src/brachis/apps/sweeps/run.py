@@ -17,7 +17,7 @@ from brachis.apps.sweeps.result import Store, SweepResult
 from brachis.common import interrupts
 from brachis.common.arguments import check_callable
 from brachis.common.progress import Listener, report_progress
-from brachis.errors import write_count
+from brachis.common.words import write_count
 
 
 def sweep(

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.errors import TaskError, write_count
+from brachis.common.words import write_count
+from brachis.errors import TaskError
 from brachis.task.point_data import FitTolerance
 from brachis.task.points.points import (
     Array,

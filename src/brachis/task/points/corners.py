@@ -11,7 +11,7 @@ from math import cos, sin
 import numpy as np
 
 from brachis.common.arrays import interpolate_columns, spread, with_like_signs
-from brachis.errors import write_count
+from brachis.common.words import write_count
 from brachis.task.points.checks import Scatter
 from brachis.task.points.fit import lengths_along
 from brachis.task.points.points import Array, Indices, Points, PointsAndNotes

@@ -15,7 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from brachis.errors import TaskError, write_count
+from brachis.common.words import write_count
+from brachis.errors import TaskError
 from brachis.task.fields import POSITION
 from brachis.task.points.points import Array, Points, PointsAndNotes, Rows
 
