@@ -59,7 +59,7 @@ def work() -> None:
     slopes = motion.derivatives()
     motion.singular_slopes(*find_least_singular(motion.inverse))
     for quantity in ("speed", "angular speed", "acceleration"):
-        chain.tool_size_slopes(quantity, N, q, qdot, qddot)
+        chain.tool_size_slopes(quantity, q, qdot, qddot)
     whole = MotionSlopes(motion.gradient, *slopes)
     table = apply_chain_rule([((*partials, None), None)], [N], whole)
     every = np.ones((2, 3, POINTS, 2))

@@ -11,9 +11,11 @@ import pytest
 import brachis
 from brachis.errors import PathError, TaskError
 from brachis.limits import Moments, limits_of
+from brachis.limits.tool import ToolMotion
 from brachis.robot import bind
 from brachis.search.given_motion import EXACT, GIVEN
 from brachis.task import Tolerances, load_task
+from brachis.trajectory.samples import tool_motion
 from support.spatial import START, rail_arm
 
 EVERYTHING = {
@@ -84,6 +86,24 @@ def test_positions_of_virtual_joints_are_how_far_the_tool_is_from_the_path():
     # The tool's axis leans towards x for a positive lead, and towards y for a positive side.
     axis = (path.rotation.T @ tool.rotation)[:, 2]
     np.testing.assert_allclose(axis[:2], [np.sin(lead), np.sin(side) * np.cos(lead)])
+
+
+def test_the_real_tool_is_limited_and_sampled():
+    robot = robot_with(EVERYTHING)
+    arm = rail_arm()
+    rng = np.random.default_rng(2)
+    states = rng.normal(size=(3, 5, robot.n))
+    own = [each[:, : arm.n] for each in states]
+    moving = Moments(*states, states[0], np.zeros(5))
+    for quantity in ("speed", "angular speed", "acceleration"):
+        expected = arm.chain.tool_sizes(quantity, *own)
+        tool = ToolMotion(robot, quantity)
+        np.testing.assert_allclose(tool.sizes(moving), expected, rtol=1e-12)
+        for slopes in tool.slopes(moving)[1]:
+            assert not slopes[:, arm.n :].any()
+    position, _, speed = tool_motion(robot, states[0], states[1])
+    np.testing.assert_allclose(position, arm.tool_placements(own[0])[0], atol=1e-12)
+    np.testing.assert_allclose(speed, arm.chain.tool_sizes("speed", *own), rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["tool_tilt", "tool_distance", "tool_range"])

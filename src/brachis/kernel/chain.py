@@ -155,12 +155,7 @@ class Chain:
         return found
 
     def tool_sizes(
-        self,
-        quantity: str,
-        moving: int,
-        q: np.ndarray,
-        qdot: np.ndarray,
-        qddot: np.ndarray,
+        self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> np.ndarray:
         """Compute the size of a motion of the tool in K states.
 
@@ -168,8 +163,6 @@ class Chain:
         ----------
         quantity : {"speed", "angular speed", "acceleration"}
             Of the tool's origin, in the world frame.
-        moving : int
-            The first so many joints move the tool; the others do not count.
         q, qdot, qddot : (K, n) ndarray
 
         Returns
@@ -178,35 +171,21 @@ class Chain:
             m/s, rad/s or m/s^2.
         """
         sizes = np.empty(len(q))
-        states = (q, qdot, qddot)
-        self._write_tool_sizes(quantity, moving, states, (sizes, 0, 0, 0))
+        before = (_QUANTITIES.index(quantity),)
+        found = (sizes, 0, 0, 0)  # nobody asks for slopes
+        self._call("brachis_tool_sizes", (q, qdot, qddot), *found, before=before)
         return sizes
 
     def tool_size_slopes(
-        self,
-        quantity: str,
-        moving: int,
-        q: np.ndarray,
-        qdot: np.ndarray,
-        qddot: np.ndarray,
+        self, quantity: str, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Compute `tool_sizes`, (K,), and their slopes by q, qdot and qddot, (K, n) each: 0 where the size is 0."""
         sizes = np.empty(len(q))
         by_q, by_qdot, by_qddot = np.empty((3, len(q), self.n))
+        before = (_QUANTITIES.index(quantity),)
         found = (sizes, by_q, by_qdot, by_qddot)
-        self._write_tool_sizes(quantity, moving, (q, qdot, qddot), found)
+        self._call("brachis_tool_sizes", (q, qdot, qddot), *found, before=before)
         return sizes, (by_q, by_qdot, by_qddot)
-
-    def _write_tool_sizes(
-        self,
-        quantity: str,
-        moving: int,
-        states: tuple[np.ndarray, ...],
-        found: tuple[np.ndarray | int, ...],
-    ) -> None:
-        """Write sizes, (K,), and slopes, (K, n) each; 0 stands for slopes that nobody asks for."""
-        before = (_QUANTITIES.index(quantity), moving)
-        self._call("brachis_tool_sizes", states, *found, before=before)
 
     def _call(
         self,

@@ -26,7 +26,7 @@ FUNCTIONS = {
     "brachis_mass_matrices": "- plpp",
     "brachis_tool": "- plpippp",
     "brachis_tool_derivatives": "- llpppippp",
-    "brachis_tool_sizes": "- plilppppppp",
+    "brachis_tool_sizes": "- plippppppp",
     "brachis_logarithms": "- lpp",
     "brachis_bounds_of_pairs": "- llpppdpp",
     "brachis_go_backwards": "i llpppppdddpp",

@@ -56,10 +56,9 @@ void brachis_tool_derivatives(
 }
 
 /* Sizes, (K), of the tool's velocity (`quantity` 0), angular velocity (1) or acceleration (2) at its origin, and their slopes
-by q, qdot and qddot, (K, n) each, if they are asked for: those of a vector of length zero are zero. Only the first `moving`
-joints move. */
+by q, qdot and qddot, (K, n) each, if they are asked for: those of a vector of length zero are zero. */
 void brachis_tool_sizes(
-    const chain *arm, long count, int quantity, long moving, const double *q, const double *qdot, const double *qddot,
+    const chain *arm, long count, int quantity, const double *q, const double *qdot, const double *qddot,
     double *sizes, double *slopes_q, double *slopes_qdot, double *slopes_qddot
 )
 {
@@ -70,10 +69,9 @@ void brachis_tool_sizes(
         twist V = {0};
         vec tangential = {0};
         for (long i = 0; i < n; i++) {
-            pack counts = all(i < moving ? 1.0 : 0.0);
             posture[i] = gather(q, count, n, k, i);
-            rates[i] = counts * gather(qdot, count, n, k, i);
-            more[i] = counts * gather(qddot, count, n, k, i);
+            rates[i] = gather(qdot, count, n, k, i);
+            more[i] = gather(qddot, count, n, k, i);
         }
         place_tool(arm, posture, 0, columns);
         for (long i = 0; i < n; i++) {
@@ -95,7 +93,6 @@ void brachis_tool_sizes(
         direction = scale(direction, inverse);
         differentiate_tool(n, columns, rates, more, 0, slopes, by_q, by_qdot);
         for (long i = 0; i < n; i++) {
-            pack counts = all(i < moving ? 1.0 : 0.0);
             vec found[3][3] = {
                 {slopes[i].v, columns[i].v, {0}},
                 {slopes[i].w, columns[i].w, {0}},
@@ -103,8 +100,8 @@ void brachis_tool_sizes(
             };
             const vec *own = found[quantity];
             scatter(dot(direction, own[0]), slopes_q, count, n, k, i);
-            scatter(counts * dot(direction, own[1]), slopes_qdot, count, n, k, i);
-            scatter(counts * dot(direction, own[2]), slopes_qddot, count, n, k, i);
+            scatter(dot(direction, own[1]), slopes_qdot, count, n, k, i);
+            scatter(dot(direction, own[2]), slopes_qddot, count, n, k, i);
         }
     }
 }

@@ -32,7 +32,7 @@ from brachis.task import Task
 class ToolMotion:
     """Size of a motion of the tool: speed, m/s, or acceleration, m/s^2, of its frame's origin, or angular speed, rad/s.
 
-    Virtual joints do not turn the tool.
+    Virtual joints do not move the tool: they say how far it is from the path.
 
     Parameters
     ----------
@@ -41,20 +41,23 @@ class ToolMotion:
     """
 
     def __init__(self, robot: Robot, quantity: str) -> None:
-        self._chain = robot.chain
+        self._robot = robot
         self._quantity = quantity
-        is_angular = quantity == "angular speed"
-        self._moving = len(robot.urdf_joints) if is_angular else robot.n
 
     def sizes(self, motion: JointStates) -> np.ndarray:
         """Sizes at K moments, (K,)."""
-        states = (motion.q, motion.qdot, motion.qddot)
-        return self._chain.tool_sizes(self._quantity, self._moving, *states)
+        return self._robot.chain.tool_sizes(self._quantity, *self._states(motion))
 
     def slopes(self, motion: JointStates) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         """Sizes at K moments, (K,), and their slopes by q, qdot and qddot, (K, n) each."""
+        chain = self._robot.chain
+        sizes, slopes = chain.tool_size_slopes(self._quantity, *self._states(motion))
+        return sizes, tuple(map(self._robot.of_real_joints, slopes))
+
+    def _states(self, motion: JointStates) -> list[np.ndarray]:
+        """Return q, qdot and qddot of the real joints, (K, n) each."""
         states = (motion.q, motion.qdot, motion.qddot)
-        return self._chain.tool_size_slopes(self._quantity, self._moving, *states)
+        return [self._robot.of_real_joints(own) for own in states]
 
 
 class ToolRatios(Limit):

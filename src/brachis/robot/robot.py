@@ -359,6 +359,12 @@ class Robot(Summary):
         """Names of the joints without the virtual ones."""
         return self.joint_names[: self.n - len(self.tool_joints)]
 
+    def of_real_joints(self, values: np.ndarray) -> np.ndarray:
+        """Return values of joints, (..., n), with zeros for the virtual ones, which do not move the tool."""
+        if not self.tool_joints:
+            return values
+        return np.where(np.arange(self.n) < len(self.urdf_joints), values, 0.0)
+
     @property
     def frame_id(self) -> int:
         """Pinocchio's index of the tool frame."""

@@ -101,7 +101,7 @@ class Samples(Summary):
 def tool_motion(
     robot: Robot, q: np.ndarray, qdot: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pose and speed of the tool frame in the world.
+    """Pose and speed of the tool frame in the world; virtual joints do not move it.
 
     Parameters
     ----------
@@ -117,6 +117,8 @@ def tool_motion(
     speed : (K,) ndarray
         m/s.
     """
+    q = robot.of_real_joints(q)
+    qdot = robot.of_real_joints(qdot)
     position, rotations = robot.tool_placements(q)
     coefficients = [pin.Quaternion(rotation).coeffs() for rotation in rotations]
     quaternion = np.roll(np.reshape(coefficients, (-1, 4)), 1, axis=1)

@@ -16,17 +16,17 @@ from brachis.verify.motion import Given, MotionStates
 def frame_motion(robot: Robot, states: MotionStates, vector: str) -> np.ndarray:
     """Sizes, (K, 1), of the tool frame's velocity (``linear``, m/s; ``angular``, rad/s), or ``acceleration``, m/s^2.
 
-    Virtual joints do not turn the tool.
+    Virtual joints do not move the tool.
     """
     model = robot.model
     data = model.createData()
     frame = (robot.frame_id, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-    qdot = states.qdot.copy()
-    if vector == "angular":
-        qdot[:, len(robot.urdf_joints) :] = 0.0
+    motion = [states.q.copy(), states.qdot.copy(), states.qddot.copy()]
+    for part in motion:
+        part[:, len(robot.urdf_joints) :] = 0.0
     sizes = np.empty((len(states.t), 1))
     for k in range(len(sizes)):
-        pin.forwardKinematics(model, data, states.q[k], qdot[k], states.qddot[k])
+        pin.forwardKinematics(model, data, *(part[k] for part in motion))
         if vector == "acceleration":
             part = pin.getFrameClassicalAcceleration(model, data, *frame).linear
         else:
