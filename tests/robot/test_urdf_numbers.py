@@ -238,14 +238,18 @@ def test_joints_may_have_the_names_of_links():
         ]
 
 
-def test_a_locked_joint_with_the_name_of_an_inner_link_is_an_error_of_ours():
-    held = changed("name='j1'", "name='link1'")
-    with pytest.raises(
-        UrdfError, match="Pinocchio cannot build the model; found Several frames"
-    ):
-        Robot.from_urdf(
-            "file.urdf", urdf_text=held, tool_frame="tool", locked_joints={"link1": 0.0}
-        )
+@pytest.mark.parametrize("link", ["base", "link1", "tool"])
+def test_joints_and_links_may_share_their_names(link):
+    text = TEXT.replace("name='j1'", f"name='{link}'")
+    own = {"urdf_text": text, "tool_frame": "tool"}
+    robot = Robot.from_urdf("file.urdf", **own)
+    plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
+    q = np.array([0.3, -0.4])
+    placed = robot.tool_placement(q).homogeneous
+    np.testing.assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)
+    held = Robot.from_urdf("f.urdf", **own, locked_joints={robot.joint_names[0]: 0.3})
+    placed = held.tool_placement(q[1:]).homogeneous
+    np.testing.assert_allclose(placed, plain.tool_placement(q).homogeneous, atol=1e-14)
 
 
 def test_a_tool_frame_with_the_name_of_a_joint_is_found():

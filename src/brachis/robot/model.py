@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.errors import InputError, UrdfError
-from brachis.robot.urdf import UrdfChain
+from brachis.robot.urdf import LINK, UrdfChain
 from brachis.robot.urdf_bodies import check_inertia, symmetric_matrix
 from brachis.task import Payload, Placement, RobotSettings
 
@@ -47,6 +47,8 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
         raise UrdfError(
             "Pinocchio cannot build the model", where=where, found=str(error)
         ) from error
+    for frame in model.frames:
+        frame.name = frame.name.removeprefix(LINK)
     names = tuple(str(name) for name in list(model.names)[1:])
     if names != chain.joint_names or model.nq != model.nv:
         raise UrdfError(

@@ -34,6 +34,8 @@ from brachis.robot.urdf_elements import (
     read_tree,
 )
 
+LINK = "link:"
+"""With this names of links begin in what Pinocchio reads."""
 _MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
@@ -131,7 +133,8 @@ class UrdfChain:
         Link names.
     xml : str
         The URDF that Pinocchio reads: ``continuous`` joints have become ``revolute`` ones without range, so that
-        every joint has one coordinate, and unsupported joints off the chain have become fixed.
+        every joint has one coordinate, and unsupported joints off the chain have become fixed. Names of links begin
+        with `LINK`.
     dynamics : UrdfDynamics
         Joints, bodies and friction as the text states them, read without Pinocchio.
     """
@@ -357,21 +360,21 @@ def _read_limit(joint: Element) -> UrdfLimit:
 
 
 def _plain_xml(tree: UrdfTree) -> str:
-    """Write the URDF with one-coordinate joints only; Pinocchio gives a continuous joint two coordinates."""
+    """Write the URDF with one-coordinate joints only; Pinocchio gives a continuous joint two coordinates.
+
+    Pinocchio looks joints and links up by name alone: those of links begin with `LINK`.
+    """
     robot = etree.Element("robot", name="robot")
     for name, link in tree.links.items():
-        plain = etree.SubElement(robot, "link", name=name)
+        plain = etree.SubElement(robot, "link", name=LINK + name)
         plain.extend(_copy_parts(link, "inertial"))
-    taken = set(tree.links)
     kinds = {"prismatic": "prismatic", "revolute": "revolute", "continuous": "revolute"}
     for name, joint in tree.joints.items():
         kind = kinds.get(joint.get("type"), "fixed")
-        unique = name
-        while kind == "fixed" and unique in taken:  # Pinocchio looks frames up by name
-            unique += "_joint"
-        taken.add(unique)
-        plain = etree.SubElement(robot, "joint", name=unique, type=kind)
+        plain = etree.SubElement(robot, "joint", name=name, type=kind)
         plain.extend(_copy_parts(joint, "parent", "child", "origin", "axis"))
+        for end in plain.iter("parent", "child"):
+            end.set("link", LINK + end.get("link"))
         if kind != "fixed":  # brachis checks the limits of the URDF itself
             wide = {"effort": "0", "velocity": "0", "lower": "-1e9", "upper": "1e9"}
             etree.SubElement(plain, "limit", wide)

@@ -298,8 +298,7 @@ class ProcessSpeed(Model):
 
 
 class ToolLimits(Model):
-    """Limits on the motion of the tool frame's origin, and on how fast the tool turns. They hold for the tool itself, also
-    where tolerances let it leave its path."""
+    """Limits on the motion of the tool itself, also where tolerances let it leave its path."""
 
     speed: Annotated[
         Speed | SpeedTable | None,

@@ -26,7 +26,7 @@ def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     They go through the base, every joint before and after its motion (one point if it is revolute) and the tool.
     """
     model = robot.model
-    base = model.getFrameId(robot.base_frame)
+    base = model.getFrameId(robot.base_frame, pin.FrameType.BODY)
     bones = np.empty((len(q), 2 * robot.n + 2, 3))
     for points, data in zip(bones, robot.place_joints(q), strict=True):
         points[0] = model.frames[base].placement.translation
