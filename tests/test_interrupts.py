@@ -10,6 +10,7 @@ import threading
 
 import pytest
 
+import brachis
 from brachis.common import interrupts
 
 
@@ -154,3 +155,17 @@ def test_a_press_in_a_blocked_block_comes_at_its_end():
     with pytest.raises(KeyboardInterrupt):
         work()
     assert done == ["the block"]
+
+
+def test_a_press_ends_all_plans_also_where_one_returns_what_it_has(monkeypatch):
+    begun = []
+
+    def plan(_robot, task, **_keywords):
+        begun.append(task)
+        interrupts.clear()  # as a plan that ends with its best motion does
+        return "a result"
+
+    monkeypatch.setattr("brachis.planner.plan", plan)
+    with pytest.raises(KeyboardInterrupt):
+        brachis.plan_many(["a", "b"])
+    assert begun == ["a"]

@@ -19,6 +19,7 @@ from threadpoolctl import ThreadpoolController
 from brachis import ik
 from brachis.common.arguments import check_callable, check_list, count
 from brachis.common.deadline import Deadline
+from brachis.common.interrupts import SigintHandler
 from brachis.common.progress import Listener, ignore, report_progress
 from brachis.common.words import write_count
 from brachis.errors import BrachisError, InputError
@@ -459,10 +460,12 @@ def plan_many(
 def _plan_one(
     given: Any, keywords: TaskKeywords, listener: Callable[[str], None]
 ) -> Outcome:
-    """Plan one task."""
+    """Plan one task; Ctrl-C does not end this plan alone."""
     robot, task = given if isinstance(given, tuple) else (None, given)
+    heard = SigintHandler.heard
+    outcome: Outcome
     try:
-        return plan(
+        outcome = plan(
             robot,
             task,
             listener=listener,
@@ -471,4 +474,7 @@ def _plan_one(
             **keywords,
         )
     except BrachisError as error:
-        return error
+        outcome = error
+    if SigintHandler.heard > heard:
+        raise KeyboardInterrupt
+    return outcome

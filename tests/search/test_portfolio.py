@@ -565,7 +565,7 @@ def end_time(robot: brachis.Robot, asked: dict[str, Any]) -> float:
 
 
 def test_more_processes_than_processors_are_not_made(robot, monkeypatch):
-    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    monkeypatch.setattr("joblib.cpu_count", lambda: 1)
     assert brachis.plan(
         robot, task(search={"jobs": 100_000}, redundant_joints=["j1"])
     ).verified

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import time
 from concurrent.futures import wait
 
 import pytest
@@ -46,7 +48,7 @@ def refuse(item, _listener):
 def workers():
     """Another process, ready, in place of any that was started before."""
     processes._start_workers.cache_clear()
-    found = processes._start_workers(1)
+    found = processes._start_workers(1, os.getpid())
     wait(found._starting)
     yield found
     processes._start_workers.cache_clear()
@@ -105,3 +107,25 @@ def test_auto_asks_for_processes_when_what_is_left_takes_long(monkeypatch):
     monkeypatch.setattr(processes, "_PAYS", 0.0)
     assert plan_three() == [1, 2, 3]
     assert here == ["1", "3"]
+
+
+@pytest.mark.usefixtures("workers")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_fork_starts_processes_of_its_own():
+    child = os.fork()
+    if child == 0:
+        made = run_in_processes(say, range(4), jobs=2, listener=print)
+        os._exit(0 if list(made) == [0, 1, 2, 3] else 1)
+    try:
+        ended = 0
+        for _ in range(600):
+            ended, status = os.waitpid(child, os.WNOHANG)
+            if ended:
+                break
+            time.sleep(0.1)
+        assert ended, "it hangs"
+        assert os.waitstatus_to_exitcode(status) == 0
+    finally:
+        if not ended:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)

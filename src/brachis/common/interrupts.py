@@ -14,7 +14,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
@@ -34,6 +34,8 @@ class SigintHandler:
         Whether a press also raises KeyboardInterrupt.
     """
 
+    heard: ClassVar[int] = 0
+    """How many presses ended something early."""
     pending = False
     raising = False
 
@@ -72,8 +74,14 @@ def check() -> None:
 
 
 def clear() -> None:
-    """Forget a press that was heard."""
+    """Forget a press that was heard, and count it."""
+    SigintHandler.heard += 1
     sigint_handler().pending = False
+
+
+def ignore() -> None:
+    """Let presses end nothing in this process, whose parent hears them."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextlib.contextmanager

@@ -79,7 +79,7 @@ def run_in_processes(
                 interrupts.check()
                 left = taken / max(done, 1) * (len(given) - len(outcomes))
                 if not is_alone and (jobs != "auto" or left > _PAYS):
-                    workers = _start_workers(count - 1)
+                    workers = _start_workers(count - 1, os.getpid())
                     waiting = given[len(outcomes) :]
                     share = len(waiting) * (count - 1) // count
                     most = min(share, workers.count_free())
@@ -113,9 +113,13 @@ def run_in_processes(
 def process_count(jobs: int | str) -> int:
     """Return the number of processes that is used where a task asks for `jobs`, a number or ``auto``.
 
-    Never more than there are processors.
+    Never more than there are processors for this process.
     """
-    most = os.cpu_count() or 1
+    if jobs == 1:
+        return 1
+    from joblib import cpu_count
+
+    most = int(cpu_count())
     return most if isinstance(jobs, str) else min(jobs, most)
 
 
@@ -125,8 +129,10 @@ class _Workers:
     def __init__(self, count: int) -> None:
         from joblib.externals.loky import ProcessPoolExecutor
 
-        self._executor = ProcessPoolExecutor(count, timeout=_STAY)
-        atexit.register(self._executor.shutdown, kill_workers=True)
+        self._executor = ProcessPoolExecutor(
+            count, timeout=_STAY, initializer=interrupts.ignore
+        )
+        atexit.register(self._end, os.getpid())
         self._under_way: list[Future[Any]] = []
         self._starting = [self.submit(_get_ready) for _ in range(count)]
 
@@ -139,6 +145,11 @@ class _Workers:
         self._under_way.append(future)
         return future
 
+    def _end(self, owner: int) -> None:
+        """End the processes with the one that owns them, and not with a fork of it."""
+        if os.getpid() == owner:
+            self._executor.shutdown(kill_workers=True)
+
     def count_free(self) -> int:
         """Count the pieces of work that may be handed out: two for each process that is ready."""
         self._under_way = [own for own in self._under_way if not own.done()]
@@ -147,8 +158,8 @@ class _Workers:
 
 
 @cache
-def _start_workers(count: int) -> _Workers:
-    """Start other processes, once."""
+def _start_workers(count: int, _owner: int) -> _Workers:
+    """Start other processes, once for the process with the number `_owner`: a fork of it needs its own."""
     return _Workers(count)
 
 

@@ -191,6 +191,23 @@ def test_interrupt_during_an_evaluation(name, evaluation):
     )
 
 
+@pytest.mark.parametrize("function", ["rows", "jacobian"])
+def test_what_is_raised_within_a_backend_comes_out(name, function, monkeypatch):
+    problem = disc()
+    whole = getattr(problem, function)
+    calls = []
+
+    def fail(x):
+        calls.append(x)
+        if len(calls) > 3:
+            raise ZeroDivisionError("a limit of the user's own")
+        return whole(x)
+
+    monkeypatch.setattr(problem, function, fail)
+    with pytest.raises(ZeroDivisionError, match="own"):
+        solve(name, problem, [40.0, -30.0])
+
+
 # The objective is not the first variable here, as it is in a program of one phase.
 def test_progress_tells_iteration_and_objective(name):
     problem, calls = bounded(), []

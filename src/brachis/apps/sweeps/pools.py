@@ -246,4 +246,5 @@ def _end_with_parent(parent: int) -> None:
             time.sleep(HEARTBEAT)
         os._exit(1)
 
+    interrupts.ignore()
     threading.Thread(target=watch, daemon=True).start()

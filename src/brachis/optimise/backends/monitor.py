@@ -37,8 +37,8 @@ class SolveMonitor:
     """Watches one solve.
 
     A backend written in another language must not see a KeyboardInterrupt, which Python would raise at the first line
-    of any callback. Used as a context manager around the backend, it turns SIGINT into a flag; the backend then
-    has to stop, and `report` raises the interrupt.
+    of any callback, nor any other error than UnreachableError: it may lose them. Used as a context manager around the
+    backend, it keeps them; the backend then has to stop, and `report` raises them.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class SolveMonitor:
         self.problem = problem
         self.options = options
         self.iterations = 0
-        self.interrupt: KeyboardInterrupt | None = None
+        self.interrupt: BaseException | None = None
         self.timed_out = False
         self.exhausted = False
         self._evaluations = 0
@@ -165,9 +165,12 @@ class SolveMonitor:
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # checked below
                 values = np.asarray(function(np.array(x)))
-        except KeyboardInterrupt as interrupt:
-            self.interrupt = interrupt
-            raise UnreachableError("the solve has to stop") from interrupt
+        except UnreachableError:
+            raise
+        except (KeyboardInterrupt, Exception) as error:
+            # Compiled backends lose what is raised within them, for example by a limit of the user's own.
+            self.interrupt = error
+            raise UnreachableError("the solve has to stop") from error
         if not is_usable(values):
             raise UnreachableError("a value or a slope is not a finite number there")
         return values
