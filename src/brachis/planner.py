@@ -182,7 +182,7 @@ def plan(
             ended = time.perf_counter()
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=asked.strict)
-            gap = search.find_gap_of_best()
+            gap = None if deadline.passed else search.find_gap_of_best()
             if gap is not None and not end_time:
                 is_given = asked.spline.intervals != "auto"
                 slow = gap.issues(intervals_are_given=is_given)
@@ -233,7 +233,9 @@ def _search(
     if known is None and problem.task.tolerances != Tolerances():
         exact = _plan_exactly(problem, robot, families, deadline, report)
     with search.end_early():
-        search.run(known, exact)
+        search.run(known, exact if exact is not None and exact.verified else None)
+    if search.best is None and search.interrupted:
+        search.best = exact
     if search.best is None:
         raise search.explain().error()
     return search
@@ -264,7 +266,10 @@ def _plan_exactly(
     deadline: Deadline,
     report: Listener,
 ) -> Candidate | None:
-    """Plan for a tool that stays on the path: fewer joints are redundant, and the search is short."""
+    """Plan for a tool that stays on the path: fewer joints are redundant, and the search is short.
+
+    The motion need not be verified.
+    """
     report("planning for a tool that stays exactly on the path")
     task = problem.task.model_copy(update={"tolerances": Tolerances()})
     try:
@@ -274,12 +279,10 @@ def _plan_exactly(
         search.run()
     except BrachisError:  # the tolerances are needed
         return None
-    if not search.is_satisfied:
+    if search.best is None:
         return None
-    assert search.best is not None
     best = dataclasses.replace(search.best, origin="without tolerances")
-    planned = with_tolerances(best, problem)
-    return planned if planned.verified else None
+    return with_tolerances(best, problem)
 
 
 def _find_smoother(
@@ -292,7 +295,8 @@ def _find_smoother(
     found = find_least_motion(best, deadline, report)
     assert best.start is not None
     is_exact = best.start.problem.robot.n != problem.robot.n
-    return with_tolerances(found, problem) if is_exact else found
+    is_new = found.trajectory is not best.trajectory
+    return with_tolerances(found, problem) if is_exact and is_new else found
 
 
 def _read(

@@ -46,7 +46,8 @@ class Result(PlannedMotion):
     warnings : tuple of Issue
         What of robot, task and motion is implausible, and a timing that is much slower than possible.
     timing_gap : TimingGap or None
-        By how much another timing of the same joint path could be faster; None if the phase plane finds none.
+        By how much another timing of the same joint path could be faster; None if the phase plane finds none, or if no
+        time was left for it.
 
     Examples
     --------

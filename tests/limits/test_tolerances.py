@@ -14,6 +14,7 @@ from brachis.limits import Moments, limits_of
 from brachis.limits.tool import ToolMotion
 from brachis.robot import bind
 from brachis.search.given_motion import EXACT, GIVEN
+from brachis.search.portfolio import Search
 from brachis.task import Tolerances, load_task
 from brachis.trajectory.samples import tool_motion
 from support.spatial import START, rail_arm
@@ -209,6 +210,25 @@ def test_a_plan_starts_from_the_motion_without_tolerances(leaning):
     found = brachis.plan(result.task, effort="exhaustive")
     assert len(found.candidates) > 1
     assert found.t_end <= result.t_end
+
+
+def test_if_the_time_is_up_the_motion_without_tolerances_is_not_lost(
+    leaning, monkeypatch
+):
+    plain, result = leaning
+    whole = Search.run
+
+    def run(search, known=None, exact=None):
+        """Find nothing in the search with tolerances."""
+        if search._problem.robot.tool_joints:
+            search.interrupted = True
+        else:
+            whole(search, known, exact)
+
+    monkeypatch.setattr(Search, "run", run)
+    found = brachis.plan(result.task)
+    assert found.interrupted
+    assert found.t_end == pytest.approx(plain.t_end, rel=1e-9)
 
 
 def test_tolerances_that_gain_nothing_leave_the_tool_on_the_path():
