@@ -73,7 +73,7 @@ _FAR = 0.5
 """Violation, as a part of a limit, that a smaller branch margin does not mend."""
 _LIGHT = 3_000_000
 """Variables times rows up to which a solve over all knots takes a second or two from the timing of a joint path."""
-_FOR_KNOTS = 0.8
+_FOR_KNOTS = 0.5
 """Part of the time left after which the knots are not refined further."""
 _PULL = 0.001
 """Weight of the pull towards the motion that is refined, with several redundant joints; see `Pulled`."""
