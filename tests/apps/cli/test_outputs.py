@@ -89,6 +89,17 @@ def test_nothing_is_written_over_other_files(case, run, saved, monkeypatch):
     assert contents(saved) == before
 
 
+@pytest.mark.parametrize("name", ["overview.png", "result.npz"])
+def test_a_folder_with_the_name_of_an_output_is_refused_before_planning(
+    name, run, saved, tmp_path, monkeypatch
+):
+    (tmp_path / name).mkdir()
+    monkeypatch.setattr(brachis, "plan", lambda *_, **__: pytest.fail("it planned"))
+    outcome = run("plan", saved / "task.yaml", "--out", tmp_path)
+    assert outcome.code == 2
+    assert f"{name}: the file cannot be written; found a folder" in outcome.err
+
+
 def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
     (tmp_path / "new.csv").symlink_to(saved / "points.csv")
     (tmp_path / "new.urdf").symlink_to(saved / "robot.urdf")
