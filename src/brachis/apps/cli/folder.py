@@ -48,7 +48,10 @@ Drawing = Callable[[], Any]
 def check_output(
     out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]
 ) -> None:
-    """Refuse to write over a folder, an input of the command, or a file that brachis did not write.
+    """Refuse what cannot be written, or should not be replaced.
+
+    An output is refused whose folder does not exist, or that would replace a folder, an input of the command or a file
+    that brachis did not write.
 
     Parameters
     ----------
@@ -67,6 +70,13 @@ def check_output(
 
     with writing_errors(out):
         status = status_of(out)
+    if status is None and not is_folder(out.parent):
+        raise InputError(
+            "the file cannot be written",
+            where=str(out),
+            found=f"no folder {out.parent}",
+            hint="Make the folder first",
+        )
     if status is not None and stat.S_ISDIR(status.st_mode):
         raise InputError(
             "the file cannot be written",
@@ -261,13 +271,14 @@ def _make_folder(
     """
     if out is None:
         return
-    if out.suffix in {Path(name).suffix for name in names} and not is_folder(out):
+    has_suffix = out.suffix in {Path(name).suffix for name in names}
+    if is_file(out) or (has_suffix and not is_folder(out)):
         raise InputError(
             "several files are written, into a folder, and this is the name of a file",
             where="--out",
             found=out,
             allowed="a folder",
-            hint=f"Write --out {out.with_suffix('')}",
+            hint=f"Write --out {out.with_suffix('')}" if out.suffix else None,
         )
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -162,8 +162,8 @@ def write(
     Raises
     ------
     InputError
-        The format is unknown or cannot hold the motion, `dt` or `last` cannot be used, a library is missing, or the
-        file cannot be written or is not of brachis.
+        The format is unknown or cannot hold the motion, `dt` or `last` cannot be used, a joint is given twice, a
+        library is missing, or the file cannot be written or is not of brachis.
     UnknownNameError
         A format or a joint does not exist.
 

@@ -47,7 +47,7 @@ class Report:
         InputError
             The suffix is another than html, or the file cannot be written or is not a report.
         """
-        check_suffix(path, ".html", "A browser prints it as PDF")
+        check_report_name(path)
         with atomic_write(path, BEGINNINGS[".html"]) as stream:
             stream.write(self.content)
 
@@ -70,6 +70,16 @@ class Report:
         """Show the page in a notebook."""
         frame = 'style="width:100%;height:80vh;border:1px solid #8888" sandbox="allow-scripts"'
         return f'<iframe {frame} srcdoc="{html.escape(self.html)}"></iframe>'
+
+
+def check_report_name(path: str | os.PathLike[str]) -> None:
+    """Refuse the name of a file of another format.
+
+    Raises
+    ------
+    InputError
+    """
+    check_suffix(path, ".html", "A browser prints it as PDF")
 
 
 def make_report(
