@@ -24,10 +24,12 @@ from brachis.common.files import locate_urdf
 from brachis.common.words import write_count
 from brachis.errors import InputError, PlanningError
 from brachis.ik.registry import default_task_space
+from brachis.problem.plausibility import of_robot
 from brachis.result import Result
 from brachis.robot import Robot, TaskMap, bind, dynamics
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import UrdfLimit
+from brachis.robot.plausibility import report_issues
 from brachis.robot.task_map.protocol import AXES
 from brachis.robot.urdf import default_chain, read_chain, read_file
 from brachis.task import LimitSpec, load_task
@@ -408,6 +410,7 @@ def starter_task(
                 result = planner.plan(task, listener=tell, check_advice=False)
                 if result.verified:
                     return Starter(written, bound, result)
+    report_issues(of_robot(robot), strict=False)
     raise PlanningError(
         "no first motion was found",
         where=str(path),

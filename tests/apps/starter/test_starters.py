@@ -163,6 +163,16 @@ def test_what_is_no_arm(tmp_path):
         starter_task(tmp_path / "robot.urdf")
 
 
+def test_masses_in_g_are_named_if_no_motion_is_found(tmp_path):
+    text = brachis.robots.path_of("iiwa14").read_text()
+    (tmp_path / "g.urdf").write_text(text.replace('mass value="', 'mass value="1000'))
+    with (
+        pytest.warns(brachis.PlausibilityWarning, match="the mass looks like g"),
+        pytest.raises(PlanningError, match="no first motion"),
+    ):
+        starter_task(tmp_path / "g.urdf", folder=tmp_path)
+
+
 @pytest.mark.parametrize(
     ("name", "frame"), [("iiwa14", "link_1"), ("iiwa14", "link_2"), ("scara3", "link1")]
 )
