@@ -180,7 +180,7 @@ def _from_percent(value: object) -> object:
         raise refuse(
             "this is not a percentage or a fraction",
             found=value,
-            allowed="a percentage such as 1 %, or a number such as 0.01",
+            allowed="a percentage from 0 to 100 %, or a number such as 0.01",
         )
     return float(percent[1]) / 100.0
 
