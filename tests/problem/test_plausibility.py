@@ -419,6 +419,17 @@ def test_a_path_in_mm_is_out_of_reach_and_the_hint_says_why(changes):
     )
 
 
+def test_a_turn_in_degrees_is_out_of_reach_and_the_hint_says_why():
+    content = task(task_space=["x", "y", "yaw"], path=[{"line": {"by": [0, 0.3, 90]}}])
+    del content["redundant_joints"]
+    with (
+        pytest.warns(brachis.PlausibilityWarning, match="looks like degrees"),
+        pytest.raises(PathError, match="out of reach") as caught,
+    ):
+        brachis.plan(content)
+    assert caught.value.hint == "The turn of yaw looks like degrees: 90 rad"
+
+
 def test_a_path_that_is_too_long_in_metres_has_no_such_hint():
     with pytest.raises(PathError, match="out of reach") as caught:
         brachis.plan(task(path=[{"line": {"length": 5.0, "angle_deg": 90}}]))
@@ -432,6 +443,9 @@ def test_a_path_start_in_mm():
         caught.value.hint
         == "The path looks like mm: divided by 1000 it is where the tool is"
     )
+    with pytest.raises(StartError, match="off the path") as caught:
+        brachis.plan(task(path_start=[1432.0, 0.0]))
+    assert caught.value.hint.startswith("The path looks like mm: divided by 1000 it is")
     with pytest.raises(StartError, match="off the path") as caught:
         brachis.plan(task(path_start=[1.7, 0.0]))
     assert "mm" not in caught.value.hint
@@ -665,6 +679,30 @@ def test_an_angle_in_rad_where_degrees_belong(angle):
         brachis.load_task(task(path=[{"line": {"length": 0.5, "angle_deg": angle}}]))
     )
     assert str(found).startswith("path[0].line.angle_deg: the angle looks like rad")
+
+
+def test_an_angle_in_rad_of_a_start_a_frame_or_a_body():
+    place = {"xyz": [1.0, 0.0, 0.0], "rpy_deg": [0.0, 0.0, 1.5708]}
+    content = task(
+        task_space="pose",
+        path_start={"position": [1.0, 0.0, 0.0], "rpy_deg": [3.14159, 0.0, 0.0]},
+        frames={"table": place},
+        scene=[{"box": [1, 1, 1], "position": [3, 0, 0], "rpy_deg": [0, 0, 1.5708]}],
+    )
+    found = [issue.where for issue in of_task(brachis.load_task(content))]
+    assert sorted(found) == [
+        "frames.table.rpy_deg[2]",
+        "path_start.rpy_deg[0]",
+        "scene[0].rpy_deg[2]",
+    ]
+
+
+def test_a_joint_that_is_locked_in_degrees():
+    text = SCARA.read_text()
+    robot = Robot.from_urdf("x", urdf_text=text, locked_joints={"j1": 90.0})
+    assert ("robot.locked_joints.j1", "the position looks like degrees") in told(robot)
+    robot = Robot.from_urdf("x", urdf_text=text, locked_joints={"j1": 1.5})
+    assert not told(robot)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 5.5, 11.0, 45.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import InputError
+from brachis.errors import InputError, StartError
 from brachis.limits import Moments
 from brachis.limits.clearance import build_clearance
 from brachis.robot.from_task import robot_for
@@ -373,3 +374,18 @@ def test_a_robot_without_collision_geometry_is_refused_or_gets_capsules(tmp_path
     middle = data.oMi[2].act(joint.translation)
     ends = data.oMi[2].translation, data.oMi[3].translation
     np.testing.assert_allclose(middle, 0.5 * (ends[0] + ends[1]), atol=1e-9)
+
+
+def test_an_error_names_the_first_pairs_that_are_too_close():
+    with pytest.raises(StartError, match="clearance limit") as caught:
+        brachis.plan(
+            "iiwa14",
+            start=[0.3, 0.6, 0.2, -1.2, 0.1, 0.8, 0.1],
+            path=[{"line": {"by": [0, 0.1, 0]}}],
+            task_space="pose",
+            scene=[{"name": "b", "box": [1, 1, 1], "position": [0.3, 0, 0.5]}],
+            collisions={"clearance": 0.3},
+        )
+    assert len(str(caught.value)) < 500
+    _, others = str(caught.value.found).split("likewise ")
+    assert re.search(r"^[^,]+, [^,]+, [^,]+ and \d+ more$", others)

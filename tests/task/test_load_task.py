@@ -204,6 +204,21 @@ def test_a_share_is_a_fraction_or_a_percentage(value: object, share: float) -> N
     assert load_task(task.to_dict()) == task
 
 
+@pytest.mark.parametrize(
+    ("part", "key", "value", "share"),
+    [
+        ("spline", "tolerance", "1 %", 0.01),
+        ("spline", "shortest_interval", "5 %", 0.05),
+        ("refinement", "tolerance", "0.02 %", 2e-4),
+    ],
+)
+def test_all_shares_may_be_percentages(part, key, value, share) -> None:
+    task = load_task(minimal(**{part: {key: value}}))
+    assert getattr(getattr(task, part), key) == pytest.approx(share, rel=1e-15)
+    with pytest.raises(TaskError, match=rf"{part}.{key}: out of range"):
+        load_task(minimal(**{part: {key: "100 %"}}))
+
+
 def test_a_task_is_frozen(complete: Task) -> None:
     with pytest.raises(ValidationError, match="frozen"):
         complete.branch = "auto"

@@ -74,6 +74,7 @@ DYNAMICS = {
         {"path": [[0], [1], [2]]},
         {"solver": "ipopt"},
         {"search": {"slower": "1 %"}},
+        {"spline": {"tolerance": "1 %"}},
         {"robot": DYNAMICS},
         {
             "robot": {

@@ -22,12 +22,14 @@ from brachis import planner
 from brachis.common.deadline import Deadline
 from brachis.common.files import locate_urdf
 from brachis.common.words import write_count
-from brachis.errors import PlanningError
+from brachis.errors import InputError, PlanningError
 from brachis.ik.registry import default_task_space
+from brachis.problem.plausibility import of_robot
 from brachis.result import Result
 from brachis.robot import Robot, TaskMap, bind, dynamics
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import UrdfLimit
+from brachis.robot.plausibility import report_issues
 from brachis.robot.task_map.protocol import AXES
 from brachis.robot.urdf import default_chain, read_chain, read_file
 from brachis.task import LimitSpec, load_task
@@ -44,6 +46,8 @@ _QUICK = {
     "search.least_motion": False,
 }
 """Keys of the plan by which a task is tried."""
+_LEAST_REACH = 1e-6
+"""Reach below which a tool does not move, m: what rounding makes of a frame on a joint's axis is far smaller."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,7 @@ def choices(task_map: TaskMap) -> Iterator[Choice]:
     """
     robot = task_map.robot
     postures = _draw_postures(robot)
-    positions, _ = robot.tool_placements(postures)
-    reach = float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
+    reach = _measure_reach(robot, postures)
     for lowest in (0.1 * reach, -np.inf):
         quality = _quality(task_map, postures, reach, lowest)
         for k in np.argsort(-quality)[:4]:
@@ -79,6 +82,12 @@ def choices(task_map: TaskMap) -> Iterator[Choice]:
                 line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
                 if line is not None:
                     yield Choice(postures[k], line)
+
+
+def _measure_reach(robot: Robot, postures: np.ndarray) -> float:
+    """Measure how far the tool gets from the middle in postures (K, n), m."""
+    positions, _ = robot.tool_placements(postures)
+    return float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
 
 
 def _draw_postures(robot: Robot) -> np.ndarray:
@@ -350,6 +359,8 @@ def starter_task(
     ------
     UrdfError, UnknownNameError
         As `Robot.from_urdf`.
+    InputError
+        The tool frame does not move, or only turns on the spot.
     PlanningError
         No posture and line were found from which a plan was verified.
 
@@ -376,6 +387,13 @@ def starter_task(
     robot = Robot.from_urdf(
         path, tool_frame=tool_frame, base_frame=base_frame, limits=limits
     )
+    if _measure_reach(robot, _draw_postures(robot)) < _LEAST_REACH:
+        raise InputError(
+            "this tool frame does not move, or only turns on the spot",
+            where=str(path),
+            found=f"{robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}",
+            hint="Name another tool frame, farther along the chain",
+        )
     deadline = Deadline.after(90.0)  # s; then no further task space is tried
     changes = {**_QUICK, "robot.urdf": str(path.absolute())}
     for space in spaces(robot):
@@ -392,6 +410,7 @@ def starter_task(
                 result = planner.plan(task, listener=tell, check_advice=False)
                 if result.verified:
                     return Starter(written, bound, result)
+    report_issues(of_robot(robot), strict=False)
     raise PlanningError(
         "no first motion was found",
         where=str(path),

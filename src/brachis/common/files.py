@@ -28,6 +28,17 @@ from brachis.errors import InputError, TaskError
 LARGEST_TEXT = 16_000_000
 """Bytes of a text file that is read."""
 
+BEGINNINGS = {
+    ".html": rb"<!doctype html>\n<!-- brachis report -->",
+    ".json": rb'\{\n  "(t_end"|\$schema": "https://json-schema\.org/draft/2020-12/schema",\n  "\$id": "urn:brachis:)',
+    ".npz": rb"PK\x03\x04.{26}meta\.npy",
+    ".pdf": rb"%PDF",
+    ".png": rb"\x89PNG",
+    ".svg": rb"<\?xml|<svg",
+    ".urdf": rb'<\?xml version="1\.0"\?>\n<!-- brachis compose -->',
+}
+"""Patterns of how files begin that brachis writes, by their suffix; `brachis.export.FORMATS` has those of exports."""
+
 _TEMPORARY = re.compile(r"\.brachis-[0-9a-f]{8}-([0-9]+)-[0-9a-f]{16}\.part")
 
 
@@ -152,8 +163,38 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
         )
 
 
+def check_beginning(path: str | os.PathLike[str], beginning: bytes) -> None:
+    """Refuse to replace a file that begins otherwise than those that brachis writes; an empty one may be replaced.
+
+    Parameters
+    ----------
+    path : path
+        File to write.
+    beginning : bytes
+        Pattern of how an older one begins.
+
+    Raises
+    ------
+    InputError
+    """
+    with writing_errors(path):
+        if not is_file(path):
+            return
+        with Path(path).open("rb") as stream:
+            content = stream.read(256)
+    if content and not re.match(beginning, content, re.DOTALL):
+        raise InputError(
+            "the file exists and was not written by brachis",
+            where=os.fspath(path),
+            found=f"a file that begins with {content[:24]!r}",
+            allowed="a new file, or an older one of the same kind",
+        )
+
+
 @contextmanager
-def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def atomic_write(
+    path: str | os.PathLike[str], beginning: bytes = b""
+) -> Iterator[BinaryIO]:
     """Open a temporary file in the folder of `path`; it takes that name once the block has ended without an error.
 
     Parameters
@@ -161,6 +202,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     path : path
         File to write; a symbolic link is followed. Something that is not a regular file (``/dev/stdout``, a named
         pipe) is written in place, for it must not be replaced by a file.
+    beginning : bytes, optional
+        Pattern of how the older file must begin that may be replaced; by default any may be.
 
     Yields
     ------
@@ -169,9 +212,10 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     Raises
     ------
     InputError
-        The folder does not exist, or it or the file cannot be written. Other errors of the block are passed on, its
-        `OSError` among them.
+        The folder does not exist, it or the file cannot be written, or `check_beginning` refuses the file. Other errors
+        of the block are passed on, its `OSError` among them.
     """
+    check_beginning(path, beginning)
     with writing_errors(path):
         target = Path(path)
         status = status_of(path)

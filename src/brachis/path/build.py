@@ -14,7 +14,13 @@ from brachis.path.joins import find_joins, refuse_corners
 from brachis.path.protocol import Array, Curve, Path
 from brachis.path.sequence import PathFrame, Piece
 from brachis.robot import Robot, TaskMap
-from brachis.robot.plausibility import place_hint, position_hint, turn_hint
+from brachis.robot.plausibility import (
+    distance_hint,
+    place_hint,
+    position_hint,
+    reach,
+    turn_hint,
+)
 from brachis.robot.task_map.protocol import POSE_ROWS, joints_of, position_rows
 from brachis.task import Segment, Task
 
@@ -194,6 +200,12 @@ def _place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str
     """Say what stated coordinates, (c,), that are not the tool's, (c,), look like."""
     axes = len(task_map.axes)
     found = place_hint(place[:axes], target[:axes], task_map.rows)
+    if found is None and axes:
+        robot = task_map.robot
+        base = np.array(robot.model.jointPlacements[1].translation)[list(task_map.axes)]
+        away = float(np.linalg.norm(target[:axes] - base))
+        far = reach(robot)
+        found = distance_hint(away, far) if away > far else None
     if found is None and len(target) == axes + 9:
         return turn_hint(place[axes:].reshape(3, 3), target[axes:].reshape(3, 3))
     return found

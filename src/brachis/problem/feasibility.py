@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.words import write_apart
+from brachis.common.words import name_first, write_apart
 from brachis.errors import InputError, PathError, Remedy, StartError
 from brachis.ik import Match
 from brachis.limits import Limit, Moments, Role
@@ -158,7 +158,8 @@ def _check_at_rest(
         label = limit.labels[worst]
         found, allowed = in_figures(limit, worst, float(values[worst]))
         remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
-        others = ", ".join(str(one.subject) for one in weak if one is not label)
+        subjects = [str(one.subject) for one in weak if one is not label]
+        others = name_first(subjects, ", ")
         more = ""
         if others:
             # No number for one of several joints is enough.

@@ -17,7 +17,15 @@ from brachis.common.words import write_apart
 from brachis.errors import PathError
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import TURN, UNITS
-from brachis.robot.plausibility import Check, Issue, find_issues, link_lengths, reach
+from brachis.robot.plausibility import (
+    Check,
+    Issue,
+    distance_hint,
+    find_issues,
+    find_locked_in_degrees,
+    link_lengths,
+    reach,
+)
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import YAW
 from brachis.task import LIMIT_KINDS, SpeedTable, Task
@@ -222,8 +230,12 @@ def _angles(task: Task) -> Iterator[Issue]:
         key: getattr(task.robot, key).model_dump()
         for key in ("mounting", "tool_offset")
     }
-    path = [segment.model_dump(exclude={"bspline", "spline"}) for segment in task.path]
-    for key, degrees in _in_degrees("", {"robot": robot, "path": path}):
+    numbers = {"path": {"__all__": {"bspline", "spline"}}}
+    content = task.model_dump(
+        include={"path_start", "path", "frames", "scene"}, exclude=numbers
+    )
+    content["robot"] = robot
+    for key, degrees in _in_degrees("", content):
         eighths = round(degrees / (0.125 * TURN))
         if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * TURN * eighths) < 2e-3:
             usual = f"{math.degrees(degrees):.4g} deg for that angle"
@@ -252,6 +264,7 @@ def of_robot(robot: Robot) -> tuple[Issue, ...]:
         *_lengths(robot),
         *_masses(bare),
         *_payload(robot, bare),
+        *find_locked_in_degrees(robot),
     )
     return (*_scales(robot), *_friction(robot), *find_issues(figures))
 
@@ -349,16 +362,13 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
         return
     beyond = s[away > far]
     found, most = write_apart(furthest, far)
-    # A path that is only a little too long is not hundreds of times as far.
-    looks_like_mm = 0.05 * far < furthest / 1000.0 < 3.0 * far
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on{say_how_far(task_map, path, beyond[0])}",
         s_interval=(float(beyond[0]), float(beyond[-1])),
         found=f"{found} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
         allowed=f"at most {most} m, which is all links and slides in one line",
-        hint=f"The path looks like mm: divided by 1000 it is {furthest / 1000.0:.3g} m away"
-        if looks_like_mm
-        else "Shorten or move the path, or the robot's mounting",
+        hint=distance_hint(furthest, far)
+        or "Shorten or move the path, or the robot's mounting",
     )
 
 

@@ -13,7 +13,9 @@ import pinocchio as pin
 
 from brachis.errors import BrachisWarning, PlausibilityError
 from brachis.robot import Robot
+from brachis.robot.joints import TURN
 from brachis.robot.task_map.protocol import AXES
+from brachis.robot.urdf_elements import read_tree
 
 
 class PlausibilityWarning(BrachisWarning):
@@ -161,6 +163,23 @@ def find_issues(checks: Iterable[Check]) -> Iterator[Issue]:
             yield Issue(check.where, check.message, found, usual, check.advice)
 
 
+def find_locked_in_degrees(robot: Robot) -> Iterator[Check]:
+    """Look at the angles at which joints are locked."""
+    locked = robot.settings.locked_joints
+    joints = read_tree(robot.urdf, robot.source).joints if locked else {}
+    for name, value in locked.items():
+        if joints[name].get("type") != "prismatic":
+            yield Check(
+                f"robot.locked_joints.{name}",
+                "the position looks like degrees",
+                abs(value),
+                2.0 * TURN + 1e-3,
+                "rad",
+                shown=f"{value:.6g}",
+                advice=f"{value:.6g} degrees are {math.radians(value):.6g} rad",
+            )
+
+
 def link_lengths(robot: Robot) -> list[float]:
     """Distances from joint to joint, and from the last joint to the tool frame, m."""
     placements = [
@@ -201,6 +220,16 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
     largest = max(abs(lower), abs(upper))
     if unit == "m" and abs(value) > 10.0 * largest and lower <= length <= upper:
         return f"It looks like mm: {value:.6g} mm are {length:.6g} m"
+    return None
+
+
+def distance_hint(away: float, far: float) -> str | None:
+    """Return that a path looks like mm if it is `away` from the first joint, m, and the arm reaches `far`, m."""
+    # A path that is only a little too long is not hundreds of times as far.
+    if 0.05 * far < away / 1000.0 < 3.0 * far:
+        return (
+            f"The path looks like mm: divided by 1000 it is {away / 1000.0:.3g} m away"
+        )
     return None
 
 

@@ -19,7 +19,7 @@ from brachis.errors import BrachisError, PathError, PlanningError, Remedy
 from brachis.limits import Limit, Moments, Role
 from brachis.optimise.candidate import Candidate
 from brachis.problem.feasibility import in_figures, load_remedies
-from brachis.problem.plausibility import say_how_far
+from brachis.problem.plausibility import of_places, say_how_far
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
 from brachis.robot.joints import in_turn_of
@@ -133,7 +133,8 @@ def explain_reach(
         fail(
             _has_any(_exist(anywhere)),
             "the path is out of reach from s = {first:.3g} on{far} (no posture was found)",
-            "Shorten or move the path, or choose another start posture",
+            _unit_hint(problem)
+            or "Shorten or move the path, or choose another start posture",
         )
         or fail(
             within,
@@ -158,6 +159,16 @@ def explain_reach(
         "Every point of the path is within reach of this branch, but no joint path through them was found; "
         f"try {others}another {given} posture"
     )
+
+
+def _unit_hint(problem: Problem) -> str | None:
+    """Say what figure of the path looks like another unit; None if all are plausible."""
+    issues = [issue for issue in of_places(problem) if issue.where == "path"]
+    texts = [
+        f"{issue.message[:1].upper()}{issue.message[1:]}: {issue.found}"
+        for issue in issues
+    ]
+    return "; ".join(texts) or None
 
 
 def _exist(q: np.ndarray) -> np.ndarray:

@@ -39,9 +39,9 @@ from pydantic import (
     Discriminator,
     Field,
     GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     Strict,
     Tag,
-    WithJsonSchema,
 )
 from pydantic_core import CoreSchema, PydanticCustomError
 
@@ -180,9 +180,19 @@ def _from_percent(value: object) -> object:
         raise refuse(
             "this is not a percentage or a fraction",
             found=value,
-            allowed="from 0 to 100 %, or a number from 0 to 1",
+            allowed="a percentage from 0 to 100 %, or a number such as 0.01",
         )
     return float(percent[1]) / 100.0
+
+
+class _OrPercent:
+    """Lets the JSON schema of a number, with its own bounds, also allow a percentage."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        percentage = {"type": "string", "pattern": _PERCENT.pattern}
+        return {"anyOf": [handler(schema), percentage]}
 
 
 def _check_version(version: object) -> object:
@@ -203,20 +213,7 @@ Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Count = Annotated[int, Strict()]
-Share = Annotated[
-    float,
-    BeforeValidator(_from_percent),
-    Strict(),
-    Field(ge=0, le=1),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "minimum": 0, "maximum": 1},
-                {"type": "string", "pattern": _PERCENT.pattern},
-            ]
-        }
-    ),
-]
+Share = Annotated[float, Strict(), BeforeValidator(_from_percent), _OrPercent()]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[str, Strict(), Field(min_length=1)]
 _T = TypeVar("_T")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from math import degrees
 from pathlib import Path
@@ -33,6 +34,9 @@ from brachis.task.segments import (
     SplineSegment,
     SplineThrough,
 )
+
+_HAS_UNIT = re.compile(r"[_ (\[](deg|degrees|mm|cm)[)\]]?$", re.IGNORECASE)
+"""How the header of a column ends whose numbers are neither in rad nor in m."""
 
 
 def segments_along(
@@ -251,6 +255,15 @@ def _along_joints(
             )
     names = "the names of the joints"
     table, _ = read_table(text, str(path), names, lambda _header, _where: None)
+    for column in table.header:
+        if _HAS_UNIT.search(column):
+            raise TaskError(
+                "a path of joints is in rad and m",
+                found=f"column {column!r}",
+                allowed="the names of the joints, without a unit",
+                where=f"{path}: line {table.header_line}",
+                hint="Convert the numbers to rad and m, and name the columns as the joints",
+            )
     _check_count(len(table.values), path)
     nothing = table.values[:, :0]
     refuse_repetitions(Points(table.values, nothing, None, table.lines, str(path)))

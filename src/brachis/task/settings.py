@@ -178,7 +178,7 @@ class RobotSettings(Model):
     limits come first, for each joint named there. Null: none."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
-    speed_override: Annotated[Share, Field(gt=0.0)] = 1.0
+    speed_override: Share = Field(default=1.0, gt=0.0, le=1.0)
     """Factor on all joint velocity limits, in addition to limits.scale; for example 50 % or 0.5. The motion is planned
     for these lower limits, not played more slowly. Other limits do not change."""
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
@@ -202,11 +202,12 @@ class SplineSettings(Model):
     it needs them; with limits on jerk, torque rate or means it halves the intervals that lose most time, until two
     rounds together gain less than half the tolerance. A number makes planning faster and the motion slower. knots:
     free needs a number."""
-    tolerance: Positive = Field(default=1.0e-3, le=0.1)
-    """With intervals: auto, the accepted loss against very many intervals, as a fraction of the end time t_E."""
+    tolerance: Share = Field(default=1.0e-3, gt=0.0, le=0.1)
+    """With intervals: auto, the accepted loss against very many intervals, relative to the end time t_E: 0.1 % or
+    0.001, for example."""
     knots: Literal["uniform", "free"] = "uniform"
     """uniform: intervals of equal length; free: their lengths are variables of the optimisation."""
-    shortest_interval: Positive = Field(default=0.1, lt=1.0)
+    shortest_interval: Share = Field(default=0.1, gt=0.0, lt=1.0)
     """With knots: free, the shortest interval as a fraction of the mean one; never less than 5e-5 t_E."""
     rest: Literal["velocity", "full", "jerk"] = "full"
     """What is zero at both ends and at stops. velocity: the velocity. full: velocity and acceleration. jerk: velocity,
@@ -270,7 +271,7 @@ class SearchSettings(Model):
     least_motion: Flag = True
     """Whether the smoothest motion is chosen: least joint accelerations, with an end time within 1e-4 (relative) of the
     fastest. With more than 200 variables, as intervals: auto often has, it is looked for only with `slower`."""
-    slower: Share = 0.0
+    slower: Share = Field(default=0.0, ge=0.0, le=1.0)
     """How much slower the smoothest motion may be, for example 1 % or 0.01."""
 
     @model_validator(mode="after")
@@ -301,7 +302,7 @@ class SolverSettings(Model):
 class RefinementSettings(Model):
     """Adding collocation points until the limits hold in between them as well."""
 
-    tolerance: Positive = Field(default=1.0e-4, ge=1.0e-5, le=0.01)
+    tolerance: Share = Field(default=1.0e-4, ge=1.0e-5, le=0.01)
     """Largest accepted violation of a limit at any time, relative to the limit. For a position: in rad (m), or relative
     to half its range if that is less than 1 rad (m). The checks do not resolve less than 1e-5."""
     density: Count = Field(default=10, ge=10, le=1000)

@@ -16,7 +16,14 @@ import numpy as np
 from pydantic import ValidationError
 
 from brachis.common import tolerances
-from brachis.common.files import Kind, atomic_write, check_kind, check_suffix, read_file
+from brachis.common.files import (
+    BEGINNINGS,
+    Kind,
+    atomic_write,
+    check_kind,
+    check_suffix,
+    read_file,
+)
 from brachis.errors import InputError, ResultFileError
 from brachis.robot import bind
 from brachis.robot.from_task import robot_from_settings
@@ -85,7 +92,8 @@ def write_result(
     Raises
     ------
     InputError
-        The suffix is another than npz, the folder does not exist or cannot be written, or there are too many nodes.
+        The suffix is another than npz, the folder does not exist or cannot be written, the file exists and is not a
+        result, or there are too many nodes.
     """
     check_suffix(
         path, ".npz", "brachis.export.write writes tables and formats of controllers"
@@ -95,7 +103,7 @@ def write_result(
         "meta": np.array(json.dumps({"schema": SCHEMA, **meta})),
         **arrays,
     }
-    with atomic_write(path) as stream:
+    with atomic_write(path, BEGINNINGS[".npz"]) as stream:
         np.savez(stream, **contents)
 
 

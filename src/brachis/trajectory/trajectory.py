@@ -304,12 +304,14 @@ class Trajectory(Summary):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all that is needed to load and verify the trajectory.
 
-        The file is written under a temporary name and renamed, so that a broken write leaves nothing behind.
+        The file is written under a temporary name and renamed, so that a broken write leaves nothing behind. An older
+        result of this name is replaced.
 
         Raises
         ------
         InputError
-            The suffix is another than npz, or the folder does not exist or cannot be written.
+            The suffix is another than npz, the folder does not exist or cannot be written, or the file exists and is
+            not a result.
         """
         meta = {
             "task": self.task.to_dict(),

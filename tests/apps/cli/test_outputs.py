@@ -89,6 +89,61 @@ def test_nothing_is_written_over_other_files(case, run, saved, monkeypatch):
     assert contents(saved) == before
 
 
+@pytest.mark.parametrize("name", ["overview.png", "result.npz"])
+def test_a_folder_with_the_name_of_an_output_is_refused_before_planning(
+    name, run, saved, tmp_path, monkeypatch
+):
+    (tmp_path / name).mkdir()
+    monkeypatch.setattr(brachis, "plan", lambda *_, **__: pytest.fail("it planned"))
+    outcome = run("plan", saved / "task.yaml", "--out", tmp_path)
+    assert outcome.code == 2
+    assert f"{name}: the file cannot be written; found a folder" in outcome.err
+
+
+REFUSED_AT_ONCE = {
+    "a suffix of another format": (("report", "--out", "x.png"), "suffix"),
+    "a suffix of a format alike": (("report", "--out", "x.htm"), "suffix"),
+    "a figure without a folder": (("plot", "--out", "gone/x.png"), "no folder gone"),
+    "a report without a folder": (("report", "--out", "gone/x.html"), "no folder gone"),
+    "a file where a folder is needed": (
+        ("bottleneck", "--out", "mine"),
+        "into a folder",
+    ),
+    "a joint given twice": (
+        ("export", "--out", "x.csv", "--joints", "j1,j1"),
+        "'j1' is given twice",
+    ),
+    "a fit of a path without points": (
+        ("plot", "--out", "x.png", "--kind", "fit"),
+        "the path was not fitted",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED_AT_ONCE)
+def test_outputs_that_are_refused_at_once(case, run, saved, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("mine").write_text("a file")
+    for heavy in (brachis.report, brachis.bottleneck):
+        for name in {"make_report", "report"} & {*vars(heavy)}:
+            monkeypatch.setattr(heavy, name, lambda *_, **__: pytest.fail("it worked"))
+    arguments, said = REFUSED_AT_ONCE[case]
+    command, *more = arguments
+    outcome = run(command, saved / "result.npz", *more)
+    assert outcome.code == 2
+    assert said in outcome.err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_motion_is_verified_against_an_included_robot(run, saved):
+    outcome = run("verify", saved / "result.npz", "--urdf", "scara3")
+    assert "does not exist" not in outcome.err
+    assert outcome.code in (0, 1)
+    outcome = run("verify", saved / "result.npz", "--urdf", "scara4")
+    assert outcome.code == 2
+    assert "Did you mean 'scara3'?" in outcome.err
+
+
 def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
     (tmp_path / "new.csv").symlink_to(saved / "points.csv")
     (tmp_path / "new.urdf").symlink_to(saved / "robot.urdf")

@@ -94,6 +94,20 @@ def test_inspect_refuses_a_path_out_of_reach_as_plan_does(run, task, write):
     assert "the path is out of reach" in refused.err
 
 
+def test_inspect_says_of_a_path_out_of_reach_that_the_robot_is_in_mm(
+    run, task, write, tmp_path
+):
+    text = SCARA.read_text()
+    (tmp_path / "mm.urdf").write_text(text.replace('xyz="1 0 0"', 'xyz="1000 0 0"'))
+    task["robot"]["urdf"] = str(tmp_path / "mm.urdf")
+    task["path"] = [{"line": {"by": [0.0, 1e5]}}]
+    path = write(task)
+    refused = run("inspect", path)
+    assert refused == run("plan", path)
+    assert refused.code == 2
+    assert "the distance from the joint before looks like mm" in refused.err
+
+
 def test_inspect_says_once_that_limits_look_like_degrees(run, task, write):
     task["robot"]["limits"]["velocity"] = 180
     (line,) = re.findall("warning: .*", run("inspect", write(task)).out)

@@ -228,7 +228,7 @@ def test_unusable_output_folder(run, task, write, tmp_path):
     occupied.write_text("")
     outcome = run("plan", write(task), "--out", occupied)
     assert outcome.code == 2
-    assert "cannot be made" in outcome.err
+    assert "a folder, and this is the name of a file" in outcome.err
     assert occupied.read_text() == ""
 
 

@@ -5,6 +5,7 @@ import importlib.util
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -141,6 +142,18 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(
         use.recorded_up_to, rel=0.02
     )
     assert ratio.lines[0].get_ydata().max() <= 1.0 + 1e-4
+
+
+@pytest.mark.parametrize(("factor", "is_doubted"), [(2.0, False), (1000.0, True)])
+def test_a_recorded_motion_far_faster_than_its_limits_allow_is_doubted(
+    found, factor, is_doubted
+):
+    slow = SimpleNamespace(
+        t_end=factor * found.recorded.t_end, verification=found.result.verification
+    )
+    remarks = dataclasses.replace(found, result=slow).remarks
+    said = f"{factor:.0f} times as fast as the plan: its times may have another unit"
+    assert any(said in remark for remark in remarks) == is_doubted
 
 
 def test_the_figure_shows_both(found):

@@ -1,10 +1,17 @@
+import dataclasses
 import os
+import shutil
 import stat
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import brachis
+from brachis import export
+from brachis.apps.compose import Rail, on_rail
+from brachis.apps.plots.style import figure_class, save_figure
+from brachis.apps.report.page import Report
 from brachis.common.files import atomic_write
 from brachis.errors import InputError
 from brachis.trajectory import Trajectory
@@ -119,3 +126,68 @@ def test_a_trajectory_is_saved_through_it(line_trajectory, tmp_path):
     assert np.array_equal(Trajectory.load(path).q, line_trajectory.q)
     with pytest.raises(InputError, match=r"nowhere.*cannot be written"):
         line_trajectory.save(tmp_path / "nowhere" / "result.npz")
+
+
+def foreign_files(folder):
+    """Files of other programs, by name."""
+    np.savez(folder / "result.npz", a=np.zeros(3))
+    (folder / "motion.csv").write_text("x,y\n0,0\n")
+    (folder / "motion.json").write_text('{"a": 1}')
+    (folder / "report.html").write_text("<!doctype html>\n<p>mine</p>")
+    (folder / "figure.png").write_text("no figure")
+    shutil.copy(brachis.robots.path_of("scara3"), folder / "cell.urdf")
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def write_kind(name, motion, folder):
+    """Write a file of the kind that the suffix of its name says."""
+    path = folder / name
+    match path.suffix:
+        case ".npz":
+            motion.save(path)
+        case ".html":
+            Report("<!doctype html>\n<!-- brachis report -->\n", verified=True).save(
+                path
+            )
+        case ".png":
+            save_figure(figure_class()(), path)
+        case ".urdf":
+            arm = brachis.robots.path_of("iiwa14")
+            rail = Rail(axis=(0, 1, 0), range=(-1, 1), velocity=1, force=100, mass=5)
+            on_rail(arm, rail, output=path)
+        case _:
+            export.write(motion, path, dt=0.1)
+
+
+NAMES = (
+    "result.npz",
+    "motion.csv",
+    "motion.json",
+    "report.html",
+    "figure.png",
+    "cell.urdf",
+)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_writers_replace_what_they_wrote_and_nothing_of_others(
+    name, line_trajectory, tmp_path
+):
+    before = foreign_files(tmp_path)
+    with pytest.raises(InputError, match="exists and was not written by brachis"):
+        write_kind(name, line_trajectory, tmp_path)
+    assert (tmp_path / name).read_bytes() == before[name]
+    (tmp_path / name).write_bytes(b"")
+    write_kind(name, line_trajectory, tmp_path)
+    written = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(written + b"older")
+    write_kind(name, line_trajectory, tmp_path)
+    assert not (tmp_path / name).read_bytes().endswith(b"older")
+
+
+def test_a_composed_robot_has_one_mark_however_many_rails(tmp_path):
+    rail = Rail(axis=(0, 1, 0), range=(-1, 1), velocity=1, force=100, mass=5)
+    other = dataclasses.replace(rail, name="x", root="w")
+    on_rail(brachis.robots.path_of("iiwa14"), rail, output=tmp_path / "one.urdf")
+    text = on_rail(tmp_path / "one.urdf", other)
+    assert text.count("<!-- brachis compose -->") == 1

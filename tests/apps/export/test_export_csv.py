@@ -76,10 +76,10 @@ def test_a_missing_folder_is_named(line_trajectory, tmp_path):
 @pytest.mark.parametrize("dt", [0.0, -0.1, float("nan"), 1e-9])
 def test_an_unusable_period_leaves_the_old_file(line_trajectory, tmp_path, dt):
     path = tmp_path / "motion.csv"
-    path.write_text("old")
+    path.write_text("t,q_old")
     with pytest.raises(InputError, match="period"):
         export.write(line_trajectory, path, dt=dt)
-    assert path.read_text() == "old"
+    assert path.read_text() == "t,q_old"
 
 
 TOO_LARGE = """
@@ -99,7 +99,7 @@ def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else
     line_trajectory, tmp_path
 ):
     path, saved = tmp_path / "motion.csv", tmp_path / "result.npz"
-    path.write_text("old")
+    path.write_text("t,q_old")
     line_trajectory.save(saved)
     done = subprocess.run(
         [sys.executable, "-c", TOO_LARGE, saved, path],
@@ -108,5 +108,5 @@ def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else
         check=True,
     )
     assert done.stdout == f"{path}: the file cannot be written; found File too large\n"
-    assert path.read_text() == "old"
+    assert path.read_text() == "t,q_old"
     assert sorted(tmp_path.iterdir()) == [path, saved]

@@ -379,6 +379,15 @@ def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
             {"joints": ["j1"]},
             "an animation cannot leave out joints; found j1",
         ),
+        (
+            "motion.gif",
+            {"slower": 1e9},
+            r"slower: the animation would have too many pictures; .*Lower slower",
+        ),
+        *(
+            (f"motion.{suffix}", {"joints": ["j1", "j2", "j1"]}, "'j1' is given twice")
+            for suffix in ("csv", "json", "parquet", "yaml")
+        ),
         ("motion.json", {"last": "held"}, "Did you mean 'hold'"),
     ],
 )

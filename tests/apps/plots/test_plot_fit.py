@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from brachis.apps.plots import plot_fit
+from brachis.errors import InputError
 from brachis.task import fit_path
 from support.seams import bent, wave
 
@@ -43,5 +44,6 @@ def test_angles_have_an_axis_of_their_own(line_trajectory):
     assert angles.get_ydata().max() <= tolerance.get_ydata()[0] == pytest.approx(0.2)
 
 
-def test_a_path_that_was_not_fitted_says_so(line_trajectory):
-    assert "not fitted" in plot_fit(line_trajectory).texts[0].get_text()
+def test_a_path_that_was_not_fitted_is_refused(line_trajectory):
+    with pytest.raises(InputError, match="the path was not fitted"):
+        plot_fit(line_trajectory)

@@ -11,7 +11,7 @@ import yaml
 
 import brachis
 from brachis.apps.starter import Starter, choices, placeholders, starter_task, task_text
-from brachis.errors import PlanningError, UrdfError
+from brachis.errors import InputError, PlanningError, UrdfError
 from brachis.robot import bind
 from brachis.robot.limits import UrdfLimit
 from brachis.task import LimitSpec
@@ -161,3 +161,21 @@ def test_what_is_no_arm(tmp_path):
     (tmp_path / "robot.urdf").write_text("<robot name='x'><link name='a'/></robot>")
     with pytest.raises(UrdfError, match="no joint moves"):
         starter_task(tmp_path / "robot.urdf")
+
+
+def test_masses_in_g_are_named_if_no_motion_is_found(tmp_path):
+    text = brachis.robots.path_of("iiwa14").read_text()
+    (tmp_path / "g.urdf").write_text(text.replace('mass value="', 'mass value="1000'))
+    with (
+        pytest.warns(brachis.PlausibilityWarning, match="the mass looks like g"),
+        pytest.raises(PlanningError, match="no first motion"),
+    ):
+        starter_task(tmp_path / "g.urdf", folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "frame"), [("iiwa14", "link_1"), ("iiwa14", "link_2"), ("scara3", "link1")]
+)
+def test_a_frame_that_only_turns_on_the_spot_is_refused(name, frame):
+    with pytest.raises(InputError, match=r"only turns on the spot.*Name another"):
+        starter_task(brachis.robots.path_of(name), tool_frame=frame)

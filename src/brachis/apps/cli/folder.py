@@ -26,7 +26,9 @@ from brachis.apps.cli.output import (
     show_progress,
 )
 from brachis.common.files import (
+    BEGINNINGS,
     atomic_write,
+    check_beginning,
     is_file,
     is_folder,
     status_of,
@@ -42,22 +44,14 @@ Writer = Callable[[Path], object]
 Drawing = Callable[[], Any]
 """Draws a Matplotlib figure."""
 
-_SCHEMA = b'{\n  "$schema": "https://json-schema.org/draft/2020-12/schema",\n  "$id": "urn:brachis:'
-_BEGINNINGS = {
-    ".html": (b"<!doctype html>\n<!-- brachis report -->",),
-    ".json": (b'{\n  "t_end"', _SCHEMA),
-    ".npz": (b"PK",),
-    ".pdf": (b"%PDF",),
-    ".png": (b"\x89PNG",),
-    ".svg": (b"<?xml", b"<svg"),
-    ".urdf": (b"<?xml", b"<robot"),
-}
-
 
 def check_output(
     out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]
 ) -> None:
-    """Refuse to write over an input of the command, or over a file that brachis did not write.
+    """Refuse what cannot be written, or should not be replaced.
+
+    An output is refused whose folder does not exist, or that would replace a folder, an input of the command or a file
+    that brachis did not write.
 
     Parameters
     ----------
@@ -76,6 +70,20 @@ def check_output(
 
     with writing_errors(out):
         status = status_of(out)
+    if status is None and not is_folder(out.parent):
+        raise InputError(
+            "the file cannot be written",
+            where=str(out),
+            found=f"no folder {out.parent}",
+            hint="Make the folder first",
+        )
+    if status is not None and stat.S_ISDIR(status.st_mode):
+        raise InputError(
+            "the file cannot be written",
+            where=str(out),
+            found="a folder of this name",
+            allowed="a name that no folder has",
+        )
     if status is None or not stat.S_ISREG(status.st_mode):
         return
     for path in inputs:
@@ -96,17 +104,9 @@ def check_output(
             found=f"suffix {suffix}" if suffix else "no suffix",
             allowed=f"a new file, or one that ends in {' or '.join(allowed)}",
         )
-    exported = [form.beginnings for form in FORMATS.values() if form.suffix == suffix]
-    known = sum(exported, _BEGINNINGS.get(suffix, ()))
-    with writing_errors(out), out.open("rb") as stream:
-        beginning = stream.read(max(map(len, known)))
-    if beginning and not beginning.startswith(known):
-        raise InputError(
-            "the file exists and was not written by brachis",
-            where=str(out),
-            found=f"a file that begins with {beginning!r}",
-            allowed="a new file, or an older one of the same kind",
-        )
+    exported = {form.beginning for form in FORMATS.values() if form.suffix == suffix}
+    own = BEGINNINGS.get(suffix)
+    check_beginning(out, b"|".join(exported if own is None else {own, *exported}))
 
 
 def write_files(
@@ -147,13 +147,6 @@ def write_files(
     KeyboardInterrupt
         Ctrl-C while figures were drawn; its text says what was written before.
     """
-    for name in (*results, *figures):
-        if is_folder(out / name):
-            raise InputError(
-                "the file cannot be written",
-                where=str(out / name),
-                found="a folder of this name",
-            )
     written = [str(out / name) for name in results]
     failures = []
     with end_cleanly():
@@ -278,13 +271,14 @@ def _make_folder(
     """
     if out is None:
         return
-    if out.suffix in {Path(name).suffix for name in names} and not is_folder(out):
+    has_suffix = out.suffix in {Path(name).suffix for name in names}
+    if is_file(out) or (has_suffix and not is_folder(out)):
         raise InputError(
             "several files are written, into a folder, and this is the name of a file",
             where="--out",
             found=out,
             allowed="a folder",
-            hint=f"Write --out {out.with_suffix('')}",
+            hint=f"Write --out {out.with_suffix('')}" if out.suffix else None,
         )
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -95,10 +95,11 @@ def inspect(
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
-    from brachis.problem.plausibility import check_within_reach
+    from brachis.problem.plausibility import check_within_reach, of_robot, of_task
     from brachis.problem.problem import Problem
     from brachis.robot import bind
     from brachis.robot.from_task import robot_from_settings
+    from brachis.robot.plausibility import report_issues
     from brachis.task import name_task_file
 
     remarks: list[str] = []
@@ -111,8 +112,12 @@ def inspect(
         task = load_changed_task(source, changes)
         with name_task_file(source, keys):
             robot = robot_from_settings(task.robot)
-            problem = Problem.of(robot, task)
-            check_within_reach(problem.task_map, problem.path)
+            try:
+                problem = Problem.of(robot, task)
+                check_within_reach(problem.task_map, problem.path)
+            except InputError:
+                report_issues(of_robot(robot) + of_task(task), strict=task.strict)
+                raise
         space = space or task.task_space
     else:
         refuse_task_options({"--set": changes}, "a URDF")
@@ -215,11 +220,10 @@ def _remarks(
     from brachis.problem.plausibility import of_posture
     from brachis.robot.plausibility import refuse_issues
 
-    ik = brachis.ik
     remarks = []
     if candidates and not any(candidate.solver for candidate in candidates):
-        remarks.append(ik.NO_CLOSED_FORM)
-    if missing := ik.missing_eaik(candidates):
+        remarks.append(brachis.ik.NO_CLOSED_FORM)
+    if missing := brachis.ik.missing_eaik(candidates):
         remarks.append(missing)
     if posture is not None:
         q = _read_posture(robot, posture)
@@ -234,9 +238,8 @@ def _print_robot(
 ) -> None:
     """Print all for a person."""
     chain = f"{robot.base_frame} -> {robot.tool_frame}"
-    print_lines(
-        f"{data['robot']}: {chain}, {write_count(robot.n, 'joint')}", *data["remarks"]
-    )
+    joints = write_count(robot.n, "joint")
+    print_lines(f"{data['robot']}: {chain}, {joints}", *data["remarks"])
     rows = _joint_rows(robot, degrees=degrees)
     shown = [key for key in rows[0] if any(row[key] != _NONE for row in rows)]
     cells = [[row[key] for key in shown] for row in rows]

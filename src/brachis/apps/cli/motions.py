@@ -15,8 +15,21 @@ import typer
 from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Json, Verbosity, get_verbosity, motion_file
-from brachis.apps.cli.folder import draw, write_one, write_text
+from brachis.apps.cli.app import (
+    Degrees,
+    Json,
+    Verbosity,
+    get_verbosity,
+    motion_file,
+    urdf_of,
+)
+from brachis.apps.cli.folder import (
+    check_output,
+    draw,
+    end_cleanly,
+    write_one,
+    write_text,
+)
 from brachis.apps.cli.output import (
     WRITING,
     json_text,
@@ -45,7 +58,10 @@ ResultFile = Annotated[
 def verify(
     result: ResultFile,
     urdf: Annotated[
-        Path | None, Option(help="Check against this URDF instead of the saved one.")
+        Path | None,
+        Option(
+            help="Check against this URDF, or included robot, instead of the saved one."
+        ),
     ] = None,
     degrees: Degrees = False,
     json: Json = False,
@@ -55,7 +71,7 @@ def verify(
 
     _, trajectory = _load(result)
     settings = trajectory.task.robot
-    robot = robot_from_settings(settings, urdf=urdf) if urdf else None
+    robot = robot_from_settings(settings, urdf=urdf_of(urdf)) if urdf else None
     verification = brachis.verify_trajectory(trajectory, robot=robot)
     if json:
         print_json(verification.to_dict())
@@ -165,14 +181,20 @@ def report(
     degrees: Degrees = False,
 ) -> None:
     """Write a report of a saved motion as one HTML page."""
+    from brachis.apps.report import check_report_name
+
+    if out is not None:
+        check_report_name(out)
     result, trajectory = _load(result)
     out = out or result.with_suffix(".html")
+    check_output(out, (".html",), _inputs(result, trajectory))
     if title is None:
         title = ", ".join(filter(None, (trajectory.robot.name, result.name)))
     with show_progress(WRITING) as listener:
         listener(f"drawing {out}")
         page = brachis.report.make_report(trajectory, title=title, degrees=degrees)
-        write_one(out, page.save, (".html",), _inputs(result, trajectory))
+        with end_cleanly():
+            page.save(out)
     print_lines(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
         print_error(

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_IMPLAUSIBLE_SPEED = 10.0
+"""Factor by which a recorded motion is not faster than a plan within the same limits, whatever the limits are."""
+
+
 @dataclass(frozen=True)
 class Use:
     """How much of a limit both motions use.
@@ -149,6 +153,12 @@ class Comparison(Summary):
             f"may exceed it by up to {100.0 * (use.recorded_up_to - 1.0):.2g} % between the rows"
             for use in self.exceeded
         ]
+        speed = self.result.t_end / self.recorded.t_end
+        if speed > _IMPLAUSIBLE_SPEED:
+            remarks.append(
+                f"the recorded motion is {speed:.0f} times as fast as the plan: its times may have another unit "
+                "than was stated (--time, units)"
+            )
         if self.recorded.task.spline.rest != "full":
             remarks.append(
                 "the recorded rows begin or end with an acceleration, so the plan may do so as well (rest: velocity)"

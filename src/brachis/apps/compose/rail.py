@@ -16,12 +16,14 @@ import pinocchio as pin
 from brachis.apps.compose import elements
 from brachis.apps.compose.elements import Element
 from brachis.common import files
-from brachis.common.files import atomic_write, status_of, writing_errors
+from brachis.common.files import BEGINNINGS, atomic_write, status_of, writing_errors
 from brachis.errors import InputError
 from brachis.robot.urdf import check_inertias, read_file
 from brachis.robot.urdf_bodies import read_dynamics
 from brachis.robot.urdf_elements import UrdfTree, read_tree
 
+_MARK = "<!-- brachis compose -->"
+"""Second line of a composed URDF, by which it is known: `common.files.BEGINNINGS` has it too."""
 _NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
 
 
@@ -159,7 +161,8 @@ class Rail:
         relocate_meshes(arm.robot, source, target)
         arm.robot.set("name", f"{arm.robot.get('name') or source.stem}_{self.name}")
         arm.robot[:0] = self._elements(root)
-        return elements.robot_text(arm.robot)
+        declaration, _, rest = elements.robot_text(arm.robot).partition("\n")
+        return "\n".join((declaration, _MARK, rest.removeprefix(f"{_MARK}\n")))
 
     def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:
         """Refuse new names that the arm has already, be it for links or joints: frames are looked up by name."""
@@ -261,8 +264,9 @@ def on_rail(
     meshes : bool, optional
         False drops all visuals and collisions of the arm that are meshes.
     output : path, optional
-        File to write. Mesh files are then named relative to its folder; without `output` by absolute names. Those in
-        packages that ROS finds, or that are nowhere, stay as they are.
+        File to write; an older one is replaced if this function wrote it. Mesh files are then named relative to its
+        folder; without `output` by absolute names. Those in packages that ROS finds, or that are nowhere, stay as they
+        are.
 
     Returns
     -------
@@ -272,7 +276,7 @@ def on_rail(
     Raises
     ------
     InputError
-        A name is taken, or `output` cannot be written or would overwrite the arm's URDF.
+        A name is taken, or `output` cannot be written or would overwrite the arm's URDF or another one.
     UrdfError
         The arm's URDF is missing, broken, not one tree, or has bodies that are not physical.
 
@@ -302,6 +306,6 @@ def on_rail(
     carried = read_dynamics(composed, (rail.name,), {}, composed.root)
     check_inertias(composed, carried.bodies, str(source))
     if target is not None:
-        with atomic_write(target) as stream:
+        with atomic_write(target, BEGINNINGS[".urdf"]) as stream:
             stream.write(text.encode())
     return text

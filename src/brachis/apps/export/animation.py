@@ -153,13 +153,22 @@ def film_of(
             allowed="> 0: 10 is ten times slower",
         )
     most = 5000
-    usable = np.isfinite(dt) and dt > 0.0 and slower * trajectory.t_end / dt < most
+    usable = np.isfinite(dt) and dt > 0.0
     if not usable or abs(dt / step - round(dt / step)) > 1e-6:
         raise InputError(
             "an animation cannot have this period",
             where="dt",
             found=f"{dt} s",
-            allowed=f"a multiple of {step:g} s, with no more than {most} pictures in all",
+            allowed=f"a multiple of {step:g} s",
+        )
+    count = slower * trajectory.t_end / dt
+    if count >= most:
+        raise InputError(
+            "the animation would have too many pictures",
+            where="dt" if slower <= 1.0 else "slower",
+            found=f"{count:.6g} pictures: {slower:g} x {trajectory.t_end:.4g} s / {dt:g} s",
+            allowed=f"fewer than {most}",
+            hint="Lower slower, or raise dt",
         )
     found = frames(trajectory, trajectory.sample(dt / slower).t, slower)
     return Film((pixels[:, :, :3].copy() for _, pixels in found), dt)

@@ -27,8 +27,8 @@ class Format:
         What it is, in a few words.
     suffix : str
         By which it is known, with the dot.
-    beginnings : tuple of bytes
-        How its files begin; a file that begins otherwise is never overwritten.
+    beginning : bytes
+        Pattern of how its files begin; a file that begins otherwise is never overwritten.
     writer : callable
         Writes `JointRows`, or the `Film` of an animation, to a binary stream.
     dt : float
@@ -41,7 +41,7 @@ class Format:
 
     about: str
     suffix: str
-    beginnings: tuple[bytes, ...]
+    beginning: bytes
     writer: Callable[[Any, BinaryIO], None]
     dt: float = 0.001
     last: str = "exact"
@@ -52,46 +52,46 @@ FORMATS: dict[str, Format] = {
     "csv": Format(
         "table of t, q_, qd_, qdd_, tau_ of every joint",
         ".csv",
-        (b"t,q_", b"# brachis: "),
+        rb"t,q_|# brachis: ",
         write_csv,
     ),
     "parquet": Format(
-        "the same table in binary columns", ".parquet", (b"PAR1",), write_parquet
+        "the same table in binary columns", ".parquet", rb"PAR1", write_parquet
     ),
     "json": Format(
         "samples, with a schema",
         ".json",
-        (b'{\n  "$schema": "urn:brachis:',),
+        rb'\{\n  "\$schema": "urn:brachis:',
         write_json,
     ),
     "ros2": Format(
         "trajectory_msgs/JointTrajectory as YAML",
         ".yaml",
-        (b"# trajectory_msgs/msg/JointTrajectory",),
+        rb"# trajectory_msgs/msg/JointTrajectory",
         write_ros2_yaml,
         dt=0.01,
     ),
     "mcap": Format(
         "trajectory_msgs/JointTrajectory in an MCAP bag",
         ".mcap",
-        (b"\x89MCAP0",),
+        rb"\x89MCAP0",
         write_mcap,
         dt=0.01,
     ),
     "urscript": Format(
         "program of servoj commands",
         ".script",
-        (b"def brachis_motion():",),
+        rb"def brachis_motion\(\):",
         write_urscript,
         dt=0.002,
         last="hold",
     ),
     # GIF counts time in hundredths of a second.
-    "gif": Format("animation", ".gif", (b"GIF8",), write_gif, dt=0.04, step=0.01),
+    "gif": Format("animation", ".gif", rb"GIF8", write_gif, dt=0.04, step=0.01),
     "mp4": Format(
         "animation, where ffmpeg is installed",
         ".mp4",
-        (b"\0\0\0\x1cftyp", b"\0\0\0\x20ftyp"),
+        rb"\x00{3}[\x1c\x20]ftyp",
         write_mp4,
         dt=0.04,
         step=1e-3,
@@ -144,7 +144,7 @@ def write(
     trajectory : Trajectory, Result or path
         A motion, or its file.
     path : path
-        File to write; an older one is replaced, and kept if writing fails.
+        File to write. An older one is replaced if it begins as brachis writes this format, and kept if writing fails.
     form : str, optional
         Name of the format; that of the suffix unless given.
     dt : float, optional
@@ -162,8 +162,8 @@ def write(
     Raises
     ------
     InputError
-        The format is unknown or cannot hold the motion, `dt` or `last` cannot be used, a library is missing, or the
-        file cannot be written.
+        The format is unknown or cannot hold the motion, `dt` or `last` cannot be used, a joint is given twice, a
+        library is missing, or the file cannot be written or is not of brachis.
     UnknownNameError
         A format or a joint does not exist.
 
@@ -190,5 +190,5 @@ def write(
         )
     else:
         content = rows_of(motion, period, last or chosen.last, joints)
-    with atomic_write(path) as stream:
+    with atomic_write(path, chosen.beginning) as stream:
         chosen.writer(content, stream)

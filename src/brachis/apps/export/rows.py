@@ -10,7 +10,12 @@ from types import ModuleType
 
 import numpy as np
 
-from brachis.errors import BrachisWarning, NotInstalledError, UnknownNameError
+from brachis.errors import (
+    BrachisWarning,
+    InputError,
+    NotInstalledError,
+    UnknownNameError,
+)
 from brachis.trajectory import Trajectory
 from brachis.trajectory.samples import COLUMNS
 
@@ -80,7 +85,7 @@ def rows_of(
     Raises
     ------
     InputError
-        `dt` or `last` cannot be used.
+        `dt` or `last` cannot be used, or a joint is given twice.
     UnknownNameError
         A joint does not exist.
 
@@ -95,6 +100,12 @@ def rows_of(
     for name in chosen:
         if name not in names:
             raise UnknownNameError("joint", name, names, where="joints")
+        if chosen.count(name) > 1:
+            raise InputError(
+                f"joint {name!r} is given twice",
+                where="joints",
+                allowed="each joint once",
+            )
     index = [names.index(name) for name in chosen]
     samples = trajectory.sample(dt, last=last)
     left_out = []

@@ -277,15 +277,20 @@ def plot_fit(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide, one part for each file or array that the path was fitted to; dotted lines are corners. A path
-        that was not fitted gives a figure that says so.
+        One column wide, one part for each file or array that the path was fitted to; dotted lines are corners.
+
+    Raises
+    ------
+    InputError
+        The path was not fitted to points.
     """
     fits = [fit for fit in trajectory.task.fits if fit.profile]
-    figure = style.new_figure(style.COLUMN_WIDTH, 45.0 * max(len(fits), 1))
     if not fits:
-        text = "the path was not fitted to points"
-        size = style.LABEL_SIZE
-        figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=size)
+        raise InputError(
+            "the path was not fitted to points, so that there is no fit to draw",
+            allowed="the motion of a task with a path of points and a tolerance",
+        )
+    figure = style.new_figure(style.COLUMN_WIDTH, 45.0 * len(fits))
     for i, fit in enumerate(fits):
         ax = figure.add_subplot(len(fits), 1, i + 1)
         along, distances, angles = np.array(fit.profile).T

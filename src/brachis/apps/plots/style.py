@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brachis.common.files import atomic_write
+from brachis.common.files import BEGINNINGS, atomic_write
 from brachis.errors import InputError, NotInstalledError
 from brachis.trajectory import MotionPhase
 
@@ -45,12 +45,12 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     ----------
     figure : Figure
     path : path
-        File to write; an older one is replaced, and kept if writing fails.
+        File to write. An older figure of this format is replaced, and kept if writing fails.
 
     Raises
     ------
     InputError
-        The suffix is not one of `SUFFIXES`, or the file cannot be written.
+        The suffix is not one of `SUFFIXES`, or the file cannot be written or is not such a figure.
     """
     import matplotlib as mpl
 
@@ -61,7 +61,8 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
         "svg.hashsalt": "brachis",
     }
     # These three have no other way in; the context puts them back.
-    with mpl.rc_context(fonts), atomic_write(path) as stream:
+    beginning = BEGINNINGS[f".{suffix}"]
+    with mpl.rc_context(fonts), atomic_write(path, beginning) as stream:
         figure.savefig(stream, format=suffix, dpi=_DPI, metadata=_METADATA[suffix])
 
 

@@ -9,6 +9,6 @@ Examples
 '<!doctype html>'
 """
 
-from brachis.apps.report.page import Report, make_report
+from brachis.apps.report.page import Report, check_report_name, make_report
 
-__all__ = ["Report", "make_report"]
+__all__ = ["Report", "check_report_name", "make_report"]

@@ -19,7 +19,7 @@ from brachis.apps.plots.panels import joint_rows_of
 from brachis.apps.report import tables
 from brachis.apps.report.figures import motion_figure, scene, timeline_figure
 from brachis.apps.report.motion import ReportedMotion, reported_motion
-from brachis.common.files import atomic_write, check_suffix
+from brachis.common.files import BEGINNINGS, atomic_write, check_suffix
 from brachis.search.planned import PlannedMotion
 from brachis.trajectory import PHASE_COLUMNS, Trajectory
 
@@ -40,15 +40,15 @@ class Report:
     verified: bool
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the page to a file; an older one is replaced, and kept if writing fails.
+        """Write the page to a file; an older report is replaced, and kept if writing fails.
 
         Raises
         ------
         InputError
-            The suffix is another than html, or the file cannot be written.
+            The suffix is another than html, or the file cannot be written or is not a report.
         """
-        check_suffix(path, ".html", "A browser prints it as PDF")
-        with atomic_write(path) as stream:
+        check_report_name(path)
+        with atomic_write(path, BEGINNINGS[".html"]) as stream:
             stream.write(self.content)
 
     @property
@@ -70,6 +70,16 @@ class Report:
         """Show the page in a notebook."""
         frame = 'style="width:100%;height:80vh;border:1px solid #8888" sandbox="allow-scripts"'
         return f'<iframe {frame} srcdoc="{html.escape(self.html)}"></iframe>'
+
+
+def check_report_name(path: str | os.PathLike[str]) -> None:
+    """Refuse the name of a file of another format.
+
+    Raises
+    ------
+    InputError
+    """
+    check_suffix(path, ".html", "A browser prints it as PDF")
 
 
 def make_report(
