@@ -257,6 +257,25 @@ def test_wrong_slopes_of_the_margins_are_rejected(arm, plane, change, reason):
         check_answers(arm, plane, (2,), Sloped(inner, change))
 
 
+def test_margins_of_another_shape_are_rejected(arm, plane):
+    class Own(Wrapped):
+        def branch_margins(self, q, branch):
+            return self._inner.branch_margins(q, branch)[:, 0]
+
+    inner = find(arm, plane, ["j3"]).solver
+    with pytest.raises(NotApplicableError, match=r"shape \(100,\), not \(100, k\)"):
+        check_answers(arm, plane, (2,), Own(inner, lambda answers: answers))
+
+
+def test_a_family_that_returns_no_solver_says_so(arm, plane):
+    @ik_family("forgetful", source="this test")
+    def forgetful(_geometry, _task_map, _redundant):
+        """Forget to return the solver."""
+
+    reasons = find(arm, plane, ["j3"], families=[forgetful]).reasons
+    assert reasons["forgetful"] == "it returned None, not an IKSolver"
+
+
 def test_margins_that_are_not_analytic_are_rejected(arm, plane):
     class Own(Wrapped):
         margin_gradient = IKSolver.margin_gradient

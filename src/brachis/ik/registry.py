@@ -102,11 +102,10 @@ def check_families(families: Sequence[Family]) -> None:
     for number, family in enumerate(families):
         where = f"families[{number}]"
         if not isinstance(family, Family):
-            found = getattr(family, "__name__", None) or repr(family)
             raise InputError(
                 "this object is not a family of closed forms",
                 where=where,
-                found=f"{type(family).__name__} {found}",
+                found=repr(family),
                 allowed="a function with the decorator @brachis.ik.ik_family(name, source=...), which returns "
                 "an IKSolver (docs/own_closed_form.md)",
             )

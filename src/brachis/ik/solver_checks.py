@@ -19,10 +19,21 @@ _SLOPES = 10
 
 
 def _compute_margins(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
-    """Branch margins, (K, k), without recording a formula: a single call is faster that way."""
+    """Branch margins, (K, k), without recording a formula: a single call is faster that way.
+
+    Raises
+    ------
+    NotApplicableError
+        They have another shape.
+    """
     if isinstance(solver, FormulaMargins):
         return solver.margins(q) * solver.margin_signs(branch)
-    return solver.branch_margins(q, branch)
+    margins = solver.branch_margins(q, branch)
+    if np.ndim(margins) != 2 or len(margins) != len(q):
+        raise NotApplicableError(
+            f"its branch_margins have the shape {np.shape(margins)}, not ({len(q)}, k)"
+        )
+    return margins
 
 
 def _compute_answers(
@@ -58,6 +69,8 @@ def check_answers(
         Two branches have one label, an answer misses its target by more than 1e-8 m or rad, none of the answers is the
         posture itself, or the slopes of the branch margins are wrong.
     """
+    if not isinstance(solver, IKSolver):
+        raise NotApplicableError(f"it returned {solver!r:.60}, not an IKSolver")
     if len(set(solver.branches)) < len(solver.branches):
         raise NotApplicableError(
             f"two of its branches have the same label: {', '.join(solver.branches)}"
