@@ -17,7 +17,7 @@ from typing import Any, Unpack
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik
-from brachis.common.arguments import check_callable, check_list, count
+from brachis.common.arguments import check_callable, count
 from brachis.common.deadline import Deadline
 from brachis.common.interrupts import SigintHandler
 from brachis.common.progress import Listener, ignore, report_progress
@@ -151,7 +151,7 @@ def plan(
     True
     """
     check_callable(listener, "listener")
-    check_list(families, "families", "closed forms")
+    ik.check_families(families)
     # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     with (
         ThreadpoolController().limit(limits=1, user_api="blas"),
@@ -369,6 +369,7 @@ def transcribe(
     >>> program.variables, family
     (36, 'planar')
     """
+    ik.check_families(families)
     robot, asked = _read(robot_or_task, task, keywords)
     problem = Problem.of(robot, asked, own_limits)
     joint_maps, family = first_maps(problem, decompositions_of(problem, families))

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis.errors import DecompositionError, UnknownNameError
+import brachis
+from brachis.errors import DecompositionError, InputError, UnknownNameError
 from brachis.ik import (
     IKSolver,
     NotApplicableError,
@@ -145,6 +146,9 @@ class Wrapped(IKSolver):
     def branch_margins(self, q, branch):
         return self._inner.branch_margins(q, branch)
 
+    def margin_gradient(self, q, branch):
+        return self._inner.margin_gradient(q, branch)
+
 
 def third_party(arm, plane, change):
     """A family of another package that answers for redundant joint j3 only."""
@@ -224,6 +228,91 @@ def test_a_family_of_others_that_breaks_down_is_named_and_passed_over(arm, plane
     candidate = find(arm, plane, ["j3"], families=[broken])
     assert candidate.family == "planar"
     assert candidate.reasons["broken"] == "its code failed: KeyError: 'nothing'"
+
+
+class Sloped(Wrapped):
+    """A solver that changes another one's slopes of the margins."""
+
+    def margin_gradient(self, q, branch):
+        return self._change(self._inner.margin_gradient(q, branch))
+
+    def solve(self, targets, q_r):
+        return self._inner.solve(targets, q_r)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda slopes: slopes[:, 0], "its margin_gradient has the shape"),
+        (lambda _slopes: np.zeros((1, 1, 1)), "its margin_gradient has the shape"),
+        (lambda slopes: -slopes, "contradicts differences of its branch_margins"),
+        (lambda slopes: 1.01 * slopes, "contradicts differences"),
+        (lambda slopes: slopes * np.nan, "contradicts differences"),
+    ],
+)
+def test_wrong_slopes_of_the_margins_are_rejected(arm, plane, change, reason):
+    inner = find(arm, plane, ["j3"]).solver
+    check_answers(arm, plane, (2,), Sloped(inner, lambda slopes: slopes))
+    with pytest.raises(NotApplicableError, match=reason):
+        check_answers(arm, plane, (2,), Sloped(inner, change))
+
+
+def test_margins_of_another_shape_are_rejected(arm, plane):
+    class Own(Wrapped):
+        def branch_margins(self, q, branch):
+            return self._inner.branch_margins(q, branch)[:, 0]
+
+    inner = find(arm, plane, ["j3"]).solver
+    with pytest.raises(NotApplicableError, match=r"shape \(100,\), not \(100, k\)"):
+        check_answers(arm, plane, (2,), Own(inner, lambda answers: answers))
+
+
+def test_a_family_that_returns_no_solver_says_so(arm, plane):
+    @ik_family("forgetful", source="this test")
+    def forgetful(_geometry, _task_map, _redundant):
+        """Forget to return the solver."""
+
+    reasons = find(arm, plane, ["j3"], families=[forgetful]).reasons
+    assert reasons["forgetful"] == "it returned None, not an IKSolver"
+
+
+def test_margins_that_are_not_analytic_are_rejected(arm, plane):
+    class Own(Wrapped):
+        margin_gradient = IKSolver.margin_gradient
+
+        def branch_margins(self, q, branch):
+            return np.abs(np.cos(q[:, :1]))
+
+    inner = find(arm, plane, ["j3"]).solver
+    with pytest.raises(NotApplicableError, match="have to be analytic"):
+        check_answers(arm, plane, (2,), Own(inner, lambda answers: answers))
+
+
+def forget_the_decorator(_geometry, _task_map, _redundant):
+    raise NotApplicableError("never")
+
+
+@pytest.mark.parametrize("wrong", [forget_the_decorator, 3, Wrapped], ids=str)
+def test_what_is_no_family_is_refused(arm, plane, wrong):
+    with pytest.raises(InputError, match="not a family") as caught:
+        find(arm, plane, ["j3"], families=[wrong])
+    assert caught.value.where == "families[0]"
+    assert "@brachis.ik.ik_family" in str(caught.value)
+    with pytest.raises(InputError, match="not a family"):
+        brachis.plan(brachis.examples.scara_line, families=[wrong])
+
+
+@pytest.mark.parametrize("name", ["", "planar", None])
+def test_families_have_names_of_their_own(arm, plane, name):
+    family = ik_family(name, source="this test")(forget_the_decorator)
+    with pytest.raises(InputError, match=r"families\[0\]\.name: "):
+        find(arm, plane, ["j3"], families=[family])
+
+
+def test_two_families_have_two_names(arm, plane):
+    family = third_party(arm, plane, lambda answers: answers)
+    with pytest.raises(InputError, match=r"families\[1\]\.name: this name exists"):
+        find(arm, plane, ["j3"], families=[family, family])
 
 
 def test_a_choice_without_a_closed_form_names_those_that_have_one():

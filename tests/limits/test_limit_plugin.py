@@ -16,7 +16,7 @@ import pytest
 
 import brachis
 from brachis.errors import InputError, UnknownNameError
-from brachis.limits import Label, Limit, Partials
+from brachis.limits import Bound, Label, Limit, Partials
 from brachis.task import task_with
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
@@ -244,6 +244,188 @@ def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
         brachis.plan(LINE, own_limits=[Given(**parts)])
     assert str(caught.value).startswith(f"{where}: ")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "allowed"),
+    [
+        ("kind", None, "a name"),
+        ("kind", "", "a name"),
+        ("kind", 3, "a name"),
+        ("kind", "torque", "a kind of its own"),
+        ("order", 4, "2, or 3"),
+        ("order", "3", "2, or 3"),
+        ("guarantee", "mean", "Guarantee.AS_MEAN"),
+        ("role", "robot", "Role.PROCESS"),
+        ("breaks", 0.5, "from 0 to 1"),
+        ("breaks", (np.nan,), "from 0 to 1"),
+        ("breaks", (0.2, 1.5), "from 0 to 1"),
+        ("longer_time", "relieve", "'neither'"),
+        ("at_rest", "postures", "'posture'"),
+        ("refusal", None, "a text"),
+        ("bounds", (1,), "Bound"),
+        ("bounds", (Bound(1, 1.0, 1.0, 1.0),), "0 to c - 1"),
+        ("violation_scale", 0.0, "> 0"),
+        ("violation_scale", np.ones(3), "> 0"),
+        ("inset", -1.0, ">= 0"),
+        ("lower", [-1.0], "a numpy array"),
+        ("labels", (Label("j3", "rate", None),), "of texts"),
+    ],
+)
+def test_a_member_that_is_not_allowed_is_named(name, wrong, allowed):
+    with pytest.raises(InputError) as caught:
+        brachis.plan(LINE, own_limits=[Given(**{name: wrong})])
+    assert caught.value.where == f"own_limits[0].{name}"
+    assert allowed in str(caught.value)
+
+
+@pytest.mark.parametrize("centre", [np.zeros(3), np.array([5.0]), np.array([np.nan])])
+def test_a_centre_that_is_not_between_the_bounds_is_named(centre):
+    class Off(Rate):
+        @property
+        def centre(self):
+            return centre
+
+    class Model:
+        def bind(self, robot):
+            return Off(robot)
+
+    with pytest.raises(InputError, match=r"own_limits\[0\]\.centre: "):
+        brachis.plan(LINE, own_limits=[Model()])
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (lambda motion: motion.qdot[:, 2:].tolist(), "found list"),
+        (lambda motion: motion.qdot[:, 2:] + 0j, "an array of complex128"),
+        (lambda motion: motion.qdot[:, 2:].astype(str), "an array of <U"),
+    ],
+)
+def test_values_that_are_not_real_numbers_are_named(values, said):
+    with pytest.raises(InputError) as caught:
+        brachis.plan(LINE, own_limits=[Given(values=values)])
+    assert caught.value.where == "own_limits[0].values"
+    assert said in str(caught.value)
+
+
+def test_two_limits_have_different_kinds():
+    second = Given(labels=(Label("elbow", "rate", "rad/s"),))
+    said = r"own_limits\[1\]\.kind: own_limits\[0\] has this kind already"
+    with pytest.raises(InputError, match=said):
+        brachis.plan(LINE, own_limits=[Given(), second])
+
+
+@pytest.mark.parametrize(
+    ("ratios", "said"),
+    [
+        (lambda _q: None, "found NoneType"),
+        (lambda q: q[:, :1] * np.nan, "not finite"),
+        (lambda q: q[:, 0], "wrong shape"),
+    ],
+)
+def test_a_check_that_gives_no_ratios_is_refused_before_the_search(ratios, said):
+    class Checked(Given):
+        def check(self, robot, q, qdot, qddot, tau):
+            return ratios(q)
+
+    with pytest.raises(InputError, match=said) as caught:
+        brachis.plan(LINE, own_limits=[Checked()])
+    assert caught.value.where == "own_limits[0].check"
+
+
+class Failing(Given):
+    """A plug-in of which one part fails."""
+
+    def __init__(self, part):
+        if part == "__init__":
+            raise RuntimeError("no licence")
+        self.part = part
+        super().__init__()
+
+    def bind(self, robot):
+        if self.part == "bind":
+            raise ValueError("no licence")
+
+        class Own(Rate):
+            part = self.part
+
+            def values(self, motion):
+                if self.part == "values":
+                    raise ValueError("no licence")
+                return super().values(motion)
+
+            def partials(self, motion):
+                if self.part == "partials":
+                    raise ValueError("no licence")
+                return super().partials(motion)
+
+        return Own(robot)
+
+    def check(self, robot, q, qdot, qddot, tau):
+        if self.part == "check":
+            raise ValueError("no licence")
+        return np.abs(qdot[:, 2:])
+
+
+@pytest.mark.parametrize("part", ["__init__", "bind", "values", "partials", "check"])
+def test_a_failing_plugin_is_named(part, monkeypatch):
+    class Entry:
+        name = "failing"
+        value = "__init__"
+
+        def load(self):
+            return Failing
+
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: [Entry()])
+    with pytest.raises(InputError, match="no licence") as caught:
+        brachis.plan(LINE, custom_limits={"failing": {"part": part}})
+    kind = "RuntimeError" if part == "__init__" else "ValueError"
+    assert str(caught.value).startswith(
+        f"custom_limits.failing: the plug-in's {part} failed: {kind}: no licence"
+    )
+
+
+def test_a_plugin_that_fails_later_is_named(monkeypatch):
+    class Late(Rate):
+        def values(self, motion):
+            if np.isnan(motion.s).any() or len(motion.q) in {2, 6, 24}:
+                return super().values(motion)
+            raise ValueError("no licence")
+
+    class Model:
+        def bind(self, robot):
+            return Late(robot)
+
+    class Entry:
+        name = "late"
+        value = "late:Model"
+
+        def load(self):
+            return Model
+
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: [Entry()])
+    said = r"custom_limits\.late: the plug-in's values failed: ValueError: no licence"
+    with pytest.raises(InputError, match=said):
+        brachis.plan(LINE, custom_limits={"late": {}}, **QUICK)
+
+
+def test_an_exception_in_the_users_own_program_passes():
+    def fail(_motion):
+        raise ValueError("my own")
+
+    with pytest.raises(ValueError, match=r"^my own$"):
+        brachis.plan(LINE, own_limits=[Given(values=fail)])
+
+
+def test_the_verification_takes_a_list_as_well():
+    result = brachis.plan(LINE, **QUICK)
+    with pytest.raises(InputError, match="own_limits: this is not a list"):
+        verify_trajectory(result, own_limits=Given())
+    with pytest.raises(
+        InputError, match=r"own_limits\[0\]: this object is not a limit"
+    ):
+        verify_trajectory(result, own_limits=[3.0])
 
 
 @pytest.mark.parametrize("wrong", [Rate, 3.0, "torque"], ids=str)

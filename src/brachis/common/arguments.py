@@ -103,6 +103,53 @@ def check_list(value: object, where: str, of: str) -> None:
         )
 
 
+def check_array(
+    value: object, shape: tuple[int, ...], where: str, *, remark: str = ""
+) -> None:
+    """Raise an error unless the value is an array of real numbers with this shape.
+
+    `remark` follows the shape that was found, for example " for 2 moments".
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(value, np.ndarray):
+        found = f"{type(value).__name__} {value!r:.60}"
+        allowed = f"a numpy array, {shape}"
+        raise InputError("wrong type", where=where, found=found, allowed=allowed)
+    if value.dtype.kind not in "fiu":
+        raise InputError(
+            "the array does not hold real numbers",
+            where=where,
+            found=f"an array of {value.dtype}",
+            allowed="an array of float",
+        )
+    if value.shape != shape:
+        raise InputError(
+            "the array has the wrong shape",
+            where=where,
+            found=f"{value.shape}{remark}",
+            allowed=shape,
+        )
+
+
+def check_finite(value: np.ndarray, where: str) -> None:
+    """Raise an error unless all numbers of an array are finite.
+
+    Raises
+    ------
+    InputError
+    """
+    if not np.all(np.isfinite(value)):
+        raise InputError(
+            "the values are not finite",
+            where=where,
+            found=value.ravel().tolist(),
+            allowed="finite numbers",
+        )
+
+
 def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
     """Return a number, or an array of numbers, as floats.
 

@@ -21,13 +21,14 @@ from brachis.ik.registry import (
     NO_CLOSED_FORM,
     Match,
     TriedDecomposition,
-    check_answers,
+    check_families,
     default_task_space,
     find,
     find_all,
     missing_eaik,
 )
 from brachis.ik.screws import ChainGeometry, PosedScrews
+from brachis.ik.solver_checks import check_answers
 
 __all__ = [
     "BUILTIN",
@@ -41,6 +42,7 @@ __all__ = [
     "PosedScrews",
     "TriedDecomposition",
     "check_answers",
+    "check_families",
     "default_task_space",
     "find",
     "find_all",

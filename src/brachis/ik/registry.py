@@ -12,31 +12,30 @@ from __future__ import annotations
 import importlib.metadata
 import itertools
 import pickle
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arguments import check_list
 from brachis.common.words import write_count
-from brachis.errors import DecompositionError, UnknownNameError
+from brachis.errors import DecompositionError, InputError, UnknownNameError
 from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar, prismatic
 from brachis.ik.point_recipes import positioning
 from brachis.ik.protocol import (
     Family,
-    FormulaMargins,
-    FormulaSolver,
     IKSolver,
     NotApplicableError,
 )
 from brachis.ik.screws import ChainGeometry
 from brachis.ik.snapping import TOLERANCE, PolishedSolver, SnappedChain, snap_axes
+from brachis.ik.solver_checks import check_answers, ranges_to_check
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskMap
-from brachis.robot.joints import complement, difference
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES, POSE_ROWS
 
@@ -87,6 +86,46 @@ class Match(TriedDecomposition):
     solver: IKSolver
 
 
+def check_families(families: Sequence[Family]) -> None:
+    """Refuse what is not a list of families with names of their own.
+
+    Parameters
+    ----------
+    families : sequence of Family
+
+    Raises
+    ------
+    InputError
+    """
+    check_list(families, "families", "closed forms")
+    taken = {family.name for family in BUILTIN}
+    for number, family in enumerate(families):
+        where = f"families[{number}]"
+        if not isinstance(family, Family):
+            raise InputError(
+                "this object is not a family of closed forms",
+                where=where,
+                found=repr(family),
+                allowed="a function with the decorator @brachis.ik.ik_family(name, source=...), which returns "
+                "an IKSolver (docs/own_closed_form.md)",
+            )
+        if family in BUILTIN:  # to be tried first
+            continue
+        problem = _find_name_problem(family, taken)
+        if problem:
+            raise InputError(problem, where=f"{where}.name", found=repr(family.name))
+        taken.add(family.name)
+
+
+def _find_name_problem(family: Family, taken: Collection[str]) -> str:
+    """Say what is wrong with the name of a family; empty if nothing is."""
+    if not isinstance(family.name, str) or not family.name.strip():
+        return "a family needs a name"
+    if family.name in taken:
+        return "this name exists already; every family needs a name of its own"
+    return ""
+
+
 @cache
 def plugin_families() -> tuple[Family, ...]:
     """Families of other packages, from the entry-point group ``brachis.ik``; a broken one says so when it is tried."""
@@ -101,11 +140,13 @@ def _load(entry: importlib.metadata.EntryPoint) -> Family:
     except Exception as error:  # noqa: BLE001  (whatever another package's import raises)
         reason = f"the plug-in cannot be loaded: {type(error).__name__}: {error}"
     else:
-        if isinstance(family, Family):
-            return family
-        reason = (
-            f"the plug-in's entry point must be a Family, not {type(family).__name__}"
-        )
+        if not isinstance(family, Family):
+            reason = f"the plug-in's entry point must be a Family, not {type(family).__name__}"
+        else:
+            names = [own.name for own in BUILTIN]
+            reason = _find_name_problem(family, names)
+            if not reason:
+                return family
 
     def refuse(*_arguments: object) -> IKSolver:
         """Say why the family cannot be used."""
@@ -224,6 +265,7 @@ class _Matcher:
     ) -> None:
         self._robot = robot
         self._task_map = task_map
+        check_families(families)
         self._families = (*families, *BUILTIN, *plugin_families())
         self._geometry = ChainGeometry.of(robot)
 
@@ -245,7 +287,7 @@ class _Matcher:
         parts = (
             *(geometry.joint_names, geometry.revolute, geometry.axes, geometry.points),
             *(geometry.tool_position, geometry.tool_rotation),
-            *_ranges_to_check(self._robot),
+            *ranges_to_check(self._robot),
             type(task_map),
             *(getattr(task_map, own.name) for own in fields(task_map)[1:]),
         )
@@ -333,113 +375,6 @@ class _Choice:
 def _find_once(choice: _Choice) -> TriedDecomposition:
     """Keep closed forms, which have to be recorded, from one plan to the next."""
     return choice.matcher.match_anew(choice.redundant)
-
-
-def _compute_margins(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
-    """Branch margins, (K, k), without recording a formula: a single call is faster that way."""
-    if isinstance(solver, FormulaMargins):
-        return solver.margins(q) * solver.margin_signs(branch)
-    return solver.branch_margins(q, branch)
-
-
-def _compute_answers(
-    solver: IKSolver, targets: np.ndarray, q_r: np.ndarray
-) -> np.ndarray:
-    """Answers of all branches, (K, B, A, m), without recording a formula."""
-    if not isinstance(solver, FormulaSolver):
-        return solver.solve(targets, q_r)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return solver.answers(targets, q_r)
-
-
-def check_answers(
-    robot: Robot,
-    task_map: TaskMap,
-    redundant: tuple[int, ...],
-    solver: IKSolver,
-) -> None:
-    """Put a solver's answers for random postures into Pinocchio's forward kinematics.
-
-    Postures beside a branch's boundary are left out: there it is a matter of rounding whether there is an answer.
-
-    Parameters
-    ----------
-    robot, task_map : Robot, TaskMap
-    redundant : tuple of int
-        Indices of the redundant joints.
-    solver : IKSolver
-
-    Raises
-    ------
-    NotApplicableError
-        Two branches have one label, an answer misses its target by more than 1e-8 m or rad, or none of the answers is
-        the posture itself.
-    """
-    if len(set(solver.branches)) < len(solver.branches):
-        raise NotApplicableError(
-            f"two of its branches have the same label: {', '.join(solver.branches)}"
-        )
-    q = _postures_inside(robot, solver)
-    rest = complement(robot.n, redundant)
-    targets = task_map.of_placements(*robot.tool_placements(q))
-    answers = _compute_answers(solver, targets, q[:, list(redundant)])
-    expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
-    if answers.shape != expected:
-        raise NotApplicableError(
-            f"its answers have the shape {answers.shape}, not {expected}"
-        )
-    turning = robot.revolute[rest]
-    own = np.abs(difference(answers, q[:, None, None, rest], turning)).max(axis=3)
-    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < 1e-6):
-        raise NotApplicableError(
-            "its answers do not contain all postures that reach the target"
-        )
-    exists = np.isfinite(answers).all(axis=3)
-    sample = np.nonzero(exists)[0]
-    reached = q[sample]
-    reached[:, rest] = answers[exists]
-    placed = task_map.of_placements(*robot.tool_placements(reached))
-    miss = np.abs(task_map.difference(placed, targets[sample])).max()
-    if not miss < 1e-8:
-        raise NotApplicableError(
-            f"its answers miss the target by {miss:.1e} m or rad; allowed: less than 1e-8"
-        )
-
-
-def _postures_inside(robot: Robot, solver: IKSolver) -> np.ndarray:
-    """Return random postures, (K, n), that lie well inside a branch.
-
-    Raises
-    ------
-    NotApplicableError
-        No posture does.
-    """
-    low, high = _ranges_to_check(robot)
-    q = np.random.default_rng(1).uniform(low, high, (100, robot.n))
-    margins = [
-        _compute_margins(solver, q, b).min(axis=1, initial=np.inf)
-        for b in range(len(solver.branches))
-    ]
-    q = q[np.max(margins, axis=0) > 1e-2]
-    if not len(q):
-        raise NotApplicableError(
-            "none of 100 random postures lies inside a branch, so the solver was not checked"
-        )
-    return q
-
-
-def _ranges_to_check(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is.
-
-    Of far ranges what is within 20 m of zero: positions in kilometres are not precise to the tolerances.
-    """
-    lower = robot.limits.position_lower
-    upper = robot.limits.position_upper
-    ranged = ~robot.revolute & np.isfinite(lower) & np.isfinite(upper)
-    near = np.clip(0.0, lower, upper)
-    lower = np.maximum(lower, near - 20.0)
-    upper = np.minimum(upper, near + 20.0)
-    return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)
 
 
 def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:

@@ -237,6 +237,11 @@ class PolishedSolver(IKSolver):
         self._redundant = list(redundant)
         self._rest = complement(geometry.n, redundant)
 
+    @property
+    def ideal(self) -> IKSolver:
+        """Closed form of the ideal chain."""
+        return self._solver
+
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Polish the answers of the ideal chain."""
         return self._polish(self._solver.solve(targets, q_r), targets, q_r)

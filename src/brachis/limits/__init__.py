@@ -45,7 +45,7 @@ from brachis.limits.tool import (
     build_tool_speed,
 )
 from brachis.robot import Robot
-from brachis.robot.custom_limits import LimitModel, custom_limits
+from brachis.robot.custom_limits import LimitModel, list_models
 from brachis.task import LIMIT_KINDS, Task
 
 Build = Callable[[Robot, Task], Limit | None]
@@ -103,9 +103,8 @@ def limits_of(
     """
     built = [build(robot, task) for build in TABLE.values()]
     limits = [limit for limit in built if limit is not None]
-    limits += build_user_limits(custom_limits(task), robot, limits, "custom_limits")
-    limits += build_user_limits(user_limits, robot, limits, "own_limits")
-    return tuple(limits)
+    models = list_models(task, user_limits)
+    return (*limits, *build_user_limits(models, robot, limits, TABLE))
 
 
 def joint_limits_of(robot: Robot) -> tuple[Limit, ...]:

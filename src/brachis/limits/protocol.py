@@ -17,13 +17,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
-from typing import Literal, Protocol, Self
+from functools import cached_property, wraps
+from typing import Any, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 
 from brachis.robot import Robot
+from brachis.robot.custom_limits import name_failures
 from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
+
+_Found = TypeVar("_Found")
 
 _DEVIATION = 3e-5
 """Distance by which splines leave a joint path, about, rad or m."""
@@ -266,6 +269,9 @@ class Description:
     inset: np.ndarray | float = 0.0
     refusal: str = "is exceeded at rest"
 
+    origin: str = ""
+    """Where the user gives it, for messages; brachis sets it for limits that are not its own."""
+
     @property
     def name(self) -> str:
         """The kind in words."""
@@ -304,8 +310,29 @@ def compute_inset(measure: np.ndarray | float) -> np.ndarray | float:
     return np.minimum(_DEVIATION / measure, _LARGEST_INSET)
 
 
+def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
+    """Let a method of a limit say which plug-in's it is where it fails."""
+
+    @wraps(method)
+    def call(limit: Limit, motion: JointStates) -> _Found:
+        """Call the method."""
+        if not limit.origin:
+            return method(limit, motion)
+        with name_failures(limit.origin, method.__name__):
+            return method(limit, motion)
+
+    return call
+
+
 class Limit(Description, ABC):
     """c values of the joint motion at every moment, or their means over time, held between bounds."""
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Let the methods of plug-ins name the plug-in where they fail."""
+        super().__init_subclass__(**given)
+        for name in ("values", "partials"):
+            if name in vars(cls):
+                setattr(cls, name, _name_failures_of(vars(cls)[name]))
 
     @abstractmethod
     def values(self, motion: JointStates) -> np.ndarray:

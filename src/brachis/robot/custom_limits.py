@@ -1,20 +1,26 @@
-"""Limits of kinds that other packages add, named in a task under ``custom_limits``.
+"""Limits that are not of brachis: those of a user's program, and those of other packages.
 
-Their kinds are entry points of the group ``brachis.limits``: each loads to a callable that takes the parameters that
-the task gives, as keywords, and returns an object with ``bind(robot)``, which gives the limit for a robot (see
-`brachis.limits.Limit`).
+The kinds of other packages are named in a task under ``custom_limits``. They are entry points of the group
+``brachis.limits``: each loads to a callable that takes the parameters that the task gives, as keywords, and returns an
+object with ``bind(robot)``, which gives the limit for a robot (see `brachis.limits.Limit`).
 """
 
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, Protocol
 
-from brachis.errors import InputError, UnknownNameError, suggest
-from brachis.robot import Robot
+import numpy as np
+
+from brachis.common.arguments import check_array, check_finite, check_list
+from brachis.errors import BrachisError, InputError, UnknownNameError, suggest
+from brachis.robot.robot import Robot
 from brachis.task import Task
 
 GROUP = "brachis.limits"
+_SECTION = "custom_limits"
 
 
 class LimitModel(Protocol):
@@ -24,32 +30,48 @@ class LimitModel(Protocol):
         """Return the limit for a robot, a `brachis.limits.Limit`."""
 
 
-def custom_limits(task: Task) -> tuple[LimitModel, ...]:
-    """Make the limits that a task names under ``custom_limits``.
+def list_models(
+    task: Task, own_limits: Sequence[LimitModel] = ()
+) -> dict[str, LimitModel]:
+    """List the limits of a task's ``custom_limits`` and of a program by where they stand, such as ``own_limits[0]``.
 
     Raises
     ------
     UnknownNameError
-        No installed package has such a kind.
+        No installed package has a kind that the task names.
     InputError
-        The package cannot be loaded, or refuses the parameters.
+        A package cannot be loaded, or refuses the parameters; or an object is not a limit.
     """
-    if (
-        not task.custom_limits
-    ):  # looking through the installed packages takes milliseconds
-        return ()
+    check_list(own_limits, "own_limits", "limits")
+    models = _make_plugins(task)
+    models |= {f"own_limits[{i}]": model for i, model in enumerate(own_limits)}
+    for where, model in models.items():
+        if isinstance(model, type) or not callable(getattr(model, "bind", None)):
+            raise InputError(
+                "this object is not a limit",
+                where=where,
+                found=model,
+                allowed="an object whose bind(robot) returns a brachis.limits.Limit (docs/own_limit.md)",
+            )
+    return models
+
+
+def _make_plugins(task: Task) -> dict[str, LimitModel]:
+    """Make the limits that a task names under ``custom_limits``."""
+    if not task.custom_limits:
+        return {}  # looking through the installed packages takes milliseconds
     installed = {
         entry.name: entry for entry in importlib.metadata.entry_points(group=GROUP)
     }
-    made = []
+    made = {}
     for kind, parameters in task.custom_limits.items():
-        where = f"custom_limits.{kind}"
+        where = f"{_SECTION}.{kind}"
         if kind not in installed:
             raise UnknownNameError(
                 "kind of limit",
                 kind,
                 installed,
-                where="custom_limits",
+                where=_SECTION,
                 hint=suggest(kind, installed)
                 or "Install the package that provides this kind (entry point brachis.limits)",
             )
@@ -58,12 +80,102 @@ def custom_limits(task: Task) -> tuple[LimitModel, ...]:
         except Exception as error:
             problem = f"the plug-in {installed[kind].value} cannot be loaded: {type(error).__name__}: {error}"
             raise InputError(problem, where=where) from error
-        try:
-            made.append(factory(**parameters))
-        except (TypeError, ValueError) as error:
-            raise InputError(
-                f"the plug-in refuses its parameters: {error}",
-                where=where,
-                found=parameters,
-            ) from error
-    return tuple(made)
+        with name_failures(where, installed[kind].value):
+            made[where] = _make(factory, parameters, where)
+    return made
+
+
+def _make(factory: Any, parameters: Mapping[str, object], where: str) -> LimitModel:
+    """Make the limit of a plug-in, which may refuse its parameters."""
+    try:
+        made: LimitModel = factory(**parameters)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"the plug-in refuses its parameters: {error}",
+            where=where,
+            found=parameters,
+        ) from error
+    return made
+
+
+@contextmanager
+def name_failures(where: str, part: str) -> Iterator[None]:
+    """Say of an exception in the code of a plug-in which part of which limit failed.
+
+    An exception in the code of the user's own program, under ``own_limits``, passes as it is.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except BrachisError:
+        raise
+    except Exception as error:
+        if not where.startswith(f"{_SECTION}."):
+            raise
+        problem = f"the plug-in's {part} failed: {type(error).__name__}: {error}"
+        raise InputError(problem, where=where) from error
+
+
+def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
+    """Return a model's limit for a robot.
+
+    Raises
+    ------
+    InputError
+        It cannot be built.
+    """
+    try:
+        with name_failures(where, "bind"):
+            limit = model.bind(robot)
+    except (TypeError, ValueError) as error:
+        problem = f"the limit cannot be built for this robot: {error}"
+        found = type(model).__name__
+        raise InputError(problem, where=where, found=found) from error
+    if hasattr(limit, "origin"):
+        limit.origin = where
+    return limit
+
+
+def has_check(model: LimitModel) -> bool:
+    """Tell whether a model has a formula of its own for the verification."""
+    return getattr(model, "check", None) is not None
+
+
+def check_ratios(
+    where: str, model: Any, robot: Robot, motion: Sequence[np.ndarray], size: int
+) -> np.ndarray:
+    """Call a model's own ``check(robot, q, qdot, qddot, tau)``.
+
+    Parameters
+    ----------
+    where : str
+        Where the model stands; see `list_models`.
+    model : LimitModel
+    robot : Robot
+    motion : sequence of (K, n) ndarray
+        q, qdot, qddot and tau at K moments.
+    size : int
+        Number of the limit's values, c.
+
+    Returns
+    -------
+    (K, c) ndarray
+        Sizes of the ratios.
+
+    Raises
+    ------
+    InputError
+        What the method returns is not finite, or has another shape.
+    """
+    with name_failures(where, "check"):
+        found = model.check(robot, *motion)
+    if isinstance(found, list):
+        found = np.array(found)
+    here = f"{where}.check"
+    moments = len(motion[0])
+    check_array(found, (moments, size), here, remark=f" for {moments} moments")
+    check_finite(found, here)
+    return np.abs(found)

@@ -16,7 +16,7 @@ from brachis.task.fields import LARGEST
 from brachis.task.limit_models import per_joint_values
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Friction(Summary):
     """Armature, viscous and Coulomb terms of every joint. The arrays are read-only.
 

@@ -27,11 +27,15 @@ MAGNITUDES = tuple(kind for kind, row in LIMIT_KINDS.items() if row.form != "ran
 _ARRAYS = tuple(name for row in LIMIT_KINDS.values() for name in row.ends)
 
 _JointArrays: Any = make_dataclass(
-    "_JointArrays", [(name, np.ndarray) for name in _ARRAYS], frozen=True, repr=False
+    "_JointArrays",
+    [(name, np.ndarray) for name in _ARRAYS],
+    frozen=True,
+    repr=False,
+    eq=False,
 )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Limits(_JointArrays, Summary):  # type: ignore[misc]
     """Limits of every joint of the chain; infinite where a joint is not limited. The arrays are read-only.
 

@@ -11,6 +11,7 @@ from typing import Any, Self, TypedDict, Unpack
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from brachis.common.arguments import check_keywords
 from brachis.common.summary import Summary
@@ -20,7 +21,6 @@ from brachis.robot.chain import chain_of
 from brachis.robot.friction import Friction
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import (
-    FARTHEST,
     Limits,
     UrdfLimit,
     resolve_limits,
@@ -28,6 +28,7 @@ from brachis.robot.limits import (
     without_joints,
 )
 from brachis.robot.model import build_model
+from brachis.robot.posture import read_posture
 from brachis.robot.tool_joints import ToolJoint
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import UrdfDynamics, placement_matrix
@@ -41,7 +42,7 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
-from brachis.task.limit_models import map_by_joint, per_joint_values
+from brachis.task.limit_models import map_by_joint
 
 
 class RobotKeywords(TypedDict, total=False):
@@ -59,9 +60,11 @@ class RobotKeywords(TypedDict, total=False):
     speed_override: float
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Robot(Summary):
     """A serial chain of one-coordinate joints with limits.
+
+    Robots, like their limits, are equal only if they are the same object.
 
     Attributes
     ----------
@@ -398,35 +401,13 @@ class Robot(Summary):
         Raises
         ------
         InputError, UnknownNameError
-            A joint is missing, unknown or not finite, or the list has another length than the chain.
+            See `read_posture`.
         """
         still = {
             joint.name: float(np.clip(0.0, joint.lower, joint.upper))
             for joint in self.tool_joints
         }
-        if isinstance(joints, Mapping):
-            joints = {**still, **joints}
-        elif isinstance(joints, Sequence | np.ndarray):
-            are_real = len(joints) == len(self.urdf_joints)
-            joints = [*joints, *still.values()] if are_real else joints
-        values = per_joint_values(where, joints, self.joint_names, None)
-        pairs = zip(self.joint_names, values, strict=True)
-        missing = [name for name, value in pairs if value is None]
-        if missing:
-            raise InputError(
-                f"no position for {', '.join(missing)}",
-                where=where,
-                allowed="a position for each joint",
-            )
-        q = np.array(values, dtype=float)
-        if not np.all(np.abs(q) <= FARTHEST):
-            raise InputError(
-                "a joint position is out of range",
-                where=where,
-                found=q.tolist(),
-                allowed=f"finite numbers, within {FARTHEST:g} rad or m of zero",
-            )
-        return q
+        return read_posture(joints, self.joint_names, still, where)
 
     @cached_property
     def chain(self) -> Chain:
@@ -446,9 +427,20 @@ class Robot(Summary):
             pin.updateFramePlacement(model, data, tool)
             yield data
 
-    def tool_placement(self, q: np.ndarray) -> pin.SE3:
-        """Placement of the tool frame in the world frame at one posture `q`, (n,)."""
-        (data,) = self.place_joints(np.asarray(q)[None])
+    def tool_placement(self, q: ArrayLike | Mapping[str, float]) -> pin.SE3:
+        """Placement of the tool frame in the world frame at one posture.
+
+        Parameters
+        ----------
+        q : (n,) array or mapping of str to float
+            Joint positions, rad or m, in chain order or by joint name.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            See `posture`.
+        """
+        (data,) = self.place_joints(self.posture(q, "tool_placement")[None])
         return data.oMf[self.frame_id].copy()
 
     def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import InputError, PlanningError
+from brachis import ik
+from brachis.errors import DecompositionError, InputError, PlanningError
+from brachis.limits import Label, Limit, Partials
 
 
 def loaded(result, folder):
@@ -74,6 +76,7 @@ def test_a_motion_that_is_no_optimum_is_refused(slide, tmp_path):
     with pytest.raises(PlanningError, match="found a different optimum") as caught:
         brachis.bottleneck.report(slow)
     assert f"{trajectory.t_end:.3f}"[:4] in caught.value.found
+    assert "report(motion, own_limits=[...])" in str(caught.value)
 
 
 def test_a_motion_of_another_branch_is_refused(scara, tmp_path):
@@ -86,3 +89,62 @@ def test_the_trajectory_of_a_plan_need_not_be_saved(scara):
     result = scara("j1")
     again = brachis.bottleneck.solve_again(result.trajectory)
     np.testing.assert_allclose(again.x, result.candidate.refined.x, atol=1e-6)
+
+
+class ElbowRange(Limit):
+    """|q3| stays below a figure, rad."""
+
+    kind = "elbow_range"
+    labels = (Label("j3", "elbow range", "rad"),)
+    lower = -np.full(1, 1.95)
+    upper = np.full(1, 1.95)
+
+    def bind(self, _robot):
+        return self
+
+    def values(self, motion):
+        return motion.q[:, 2:]
+
+    def partials(self, motion):
+        return Partials(q=np.tile([[0.0, 0.0, 1.0]], (len(motion.q), 1, 1)))
+
+
+def test_own_limits_are_passed_again(tmp_path):
+    own = {"own_limits": [ElbowRange()]}
+    result = brachis.plan(
+        brachis.examples.scara_line,
+        redundant_joints=["j3"],
+        intervals=8,
+        effort="single",
+        start={"joints": [0.5236, -1.9, 1.9]},
+        **own,
+    )
+    motion = loaded(result, tmp_path)
+    assert_same(
+        brachis.bottleneck.report(motion, **own), brachis.bottleneck.report(result)
+    )
+
+
+def test_a_closed_form_of_the_users_own_is_passed_again(tmp_path):
+    @ik.ik_family("left and right", source="this test")
+    def family(geometry, task_map, redundant):
+        planar = {own.name: own for own in ik.BUILTIN}["planar"]
+        solver = planar.build(geometry, task_map, redundant)
+        solver.branches = ("left", "right")
+        return solver
+
+    result = brachis.plan(
+        brachis.examples.scara_line,
+        redundant_joints=["j3"],
+        intervals=8,
+        effort="single",
+        families=[family],
+    )
+    motion = loaded(result, tmp_path)
+    assert motion.branch in {"left", "right"}
+    with pytest.raises(DecompositionError, match=r"report\(motion, families=\[...\]\)"):
+        brachis.bottleneck.report(motion)
+    assert_same(
+        brachis.bottleneck.report(motion, families=[family]),
+        brachis.bottleneck.report(result),
+    )

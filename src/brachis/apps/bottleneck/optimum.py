@@ -8,13 +8,21 @@ plane has too many knots for that: its problem begins over a few, which are refi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis.common.arrays import spread
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore
-from brachis.errors import PlanningError, UnreachableError
+from brachis.errors import (
+    DecompositionError,
+    PlanningError,
+    UnknownNameError,
+    UnreachableError,
+)
+from brachis.ik import Family
 from brachis.kinematics import ChartRows, JointMap, JointSpaceMap, chart_around
 from brachis.limits.safeguards import MARGINS
 from brachis.optimise.backends import solvers_for
@@ -28,12 +36,19 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.optimise.retiming import is_timing_all, keep
 from brachis.optimise.transcription import maps_by_leg, program_over
-from brachis.problem.problem import Problem, decompositions_of
+from brachis.problem.problem import Decomposition, Problem, decompositions_of
+from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JOINTS
 from brachis.trajectory import Trajectory
 
 
-def solve_again(trajectory: Trajectory, listener: Listener = ignore) -> SolvedProgram:
+def solve_again(
+    trajectory: Trajectory,
+    listener: Listener = ignore,
+    *,
+    families: Sequence[Family] = (),
+    own_limits: Sequence[LimitModel] = (),
+) -> SolvedProgram:
     """Solve the problem of a saved motion from where it ended; a timing alone stays as it is.
 
     Parameters
@@ -42,6 +57,8 @@ def solve_again(trajectory: Trajectory, listener: Listener = ignore) -> SolvedPr
         As `brachis.plan` made it, or loaded.
     listener : callable, optional
         Is told of every iteration.
+    families, own_limits : sequence, optional
+        Those with which the motion was planned, as of `brachis.plan`: they are not saved with it.
 
     Returns
     -------
@@ -63,7 +80,7 @@ def solve_again(trajectory: Trajectory, listener: Listener = ignore) -> SolvedPr
     )
     ends = []
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
-        program, x = _problem(trajectory)
+        program, x = _problem(trajectory, families, own_limits)
         first = program.phases[0].joint_map
         longest = 1e-3
         is_timed = task.spline.intervals == "auto" and is_timing_all(program)
@@ -101,7 +118,9 @@ def solve_again(trajectory: Trajectory, listener: Listener = ignore) -> SolvedPr
     raise PlanningError(
         f"solving the saved motion (t_E = {trajectory.t_end:.6g} s) again found {what}: its sensitivities are unknown",
         found=", ".join(ends) or None,
-        hint="Run brachis bottleneck on the task file: it plans again",
+        hint="If the motion was planned with own_limits, pass them here too: they are not saved with it, as in "
+        "brachis.bottleneck.report(motion, own_limits=[...]). Otherwise run brachis bottleneck on the task file: it "
+        "plans again",
     )
 
 
@@ -123,27 +142,31 @@ def _over_few_knots(
     return first, shortest_time(first, np.concatenate(parts))
 
 
-def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
+def _problem(
+    trajectory: Trajectory,
+    families: Sequence[Family],
+    own_limits: Sequence[LimitModel],
+) -> tuple[Program, np.ndarray]:
     """Build the problem over the saved knots; the motion is its point x."""
     task = trajectory.task
     robot = trajectory.robot
     joint_map: JointMap
     if len(trajectory.chart_rows):
-        problem = Problem.of(robot, task)
+        problem = Problem.of(robot, task, own_limits)
         rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
         s = trajectory.path_coordinate(trajectory.times)
         path = problem.path
         joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
     elif task.task_space == JOINTS:
-        problem = Problem.of(robot, task)
+        problem = Problem.of(robot, task, own_limits)
         joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
         names = [
             name for name in trajectory.redundant_joints if name in robot.urdf_joints
         ]
         chosen = {"redundant_joints": tuple(names), "branch": trajectory.branch}
-        own = Problem.of(robot, task.model_copy(update=chosen))
-        (decomposition,) = decompositions_of(own)
+        own = Problem.of(robot, task.model_copy(update=chosen), own_limits)
+        decomposition = _find_decomposition(own, families)
         problem = decomposition.problem
         joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
     parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)
@@ -164,3 +187,23 @@ def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
         if program.safeguard_slack(x) >= -1e-4:
             break
     return program, x
+
+
+def _find_decomposition(problem: Problem, families: Sequence[Family]) -> Decomposition:
+    """Find the closed form and the branch of a saved motion, which its problem names.
+
+    Raises
+    ------
+    DecompositionError
+        There is none: the motion was planned with one that is not known here.
+    """
+    try:
+        (decomposition,) = decompositions_of(problem, families)
+    except (DecompositionError, UnknownNameError) as error:
+        raise DecompositionError(
+            "the motion was planned with a closed form that is not known here; pass it as to brachis.plan, as in "
+            "brachis.bottleneck.report(motion, families=[...]), or install the package that has it",
+            redundant_joints=problem.task.redundant_joints,
+            found=f"{error}",
+        ) from error
+    return decomposition

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,9 @@ from brachis.apps.bottleneck.sensitivities import (
 from brachis.common.progress import Listener, ignore
 from brachis.common.summary import LINES
 from brachis.errors import InputError
+from brachis.ik import Family
 from brachis.optimise.retiming import SOLVER
+from brachis.robot.custom_limits import LimitModel
 from brachis.robot.joints import shown_unit
 from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory, phase_rows
@@ -137,6 +140,8 @@ def report(
     *,
     check: bool = False,
     reference: bool = False,
+    families: Sequence[Family] = (),
+    own_limits: Sequence[LimitModel] = (),
     listener: Listener = ignore,
 ) -> BottleneckReport:
     """Find out what holds a planned motion back.
@@ -150,6 +155,9 @@ def report(
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
         Plan again with discontinuous torque allowed on a fine mesh: the best value known, not a proven bound.
+    families, own_limits : sequence, optional
+        Those with which the motion was planned, as of `brachis.plan`; they are not saved with it. A result needs them
+        only if its solver was the timing of the joint path.
     listener : callable, optional
         Is told what is being done, in one line of text.
 
@@ -160,7 +168,8 @@ def report(
     Raises
     ------
     InputError
-        The result was made without keeping its solved program, or a trajectory's closed form is not known here.
+        The result was made without keeping its solved program; a trajectory's closed form is not known here; or
+        families or limits are not valid.
     PlanningError
         A trajectory is not an optimum of its problem; or, with `check`, no solver could solve the problem again.
 
@@ -187,7 +196,9 @@ def report(
         return BottleneckReport(trajectory.t_end, None, active, phases)
     if isinstance(motion, Trajectory):
         listener("solving the problem of the motion again")
-        refined = optimum = solve_again(trajectory, listener)
+        refined = optimum = solve_again(
+            trajectory, listener, families=families, own_limits=own_limits
+        )
     elif motion.candidate.refined is None:
         raise InputError(
             "the result contains no solved optimisation problem",
@@ -198,7 +209,9 @@ def report(
         refined = optimum = motion.candidate.refined
         if refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r:
             listener("solving the problem of the motion again")
-            optimum = solve_again(trajectory, listener)
+            optimum = solve_again(
+                trajectory, listener, families=families, own_limits=own_limits
+            )
     listener("computing what every limit costs")
     found = sensitivities(optimum)
     tolerance = trajectory.task.refinement.tolerance

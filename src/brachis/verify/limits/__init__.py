@@ -10,8 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from brachis.errors import InputError
-from brachis.robot.custom_limits import LimitModel, custom_limits
+from brachis.robot.custom_limits import (
+    LimitModel,
+    bind_model,
+    check_ratios,
+    has_check,
+    list_models,
+)
 from brachis.task import LIMIT_KINDS
 from brachis.verify.limits.clearance import worst_clearance
 from brachis.verify.limits.joint import (
@@ -46,8 +51,8 @@ TABLE["clearance"] = worst_clearance
 def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]:
     """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the user's."""
     found = [(kind.replace("_", " "), find(given)) for kind, find in TABLE.items()]
-    models = (*custom_limits(given.task), *user_limits)
-    found += [_check_model(model, given) for model in models]
+    models = list_models(given.task, user_limits)
+    found += [_check_model(where, model, given) for where, model in models.items()]
     allowed = 1.0 + given.options.ratio_tolerance
     return [
         Check(
@@ -66,31 +71,21 @@ def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]
     ]
 
 
-def _check_model(model: LimitModel, given: Given) -> tuple[str, Worst]:
+def _check_model(where: str, model: LimitModel, given: Given) -> tuple[str, Worst]:
     """Find the worst ratio to a limit of the user's, and its name.
 
     A model may have a method ``check(robot, q, qdot, qddot, tau)`` that returns ratios, (K, c), by a formula other
     than the limit's. Without one, the limit's own values are checked densely.
     """
-    limit = model.bind(given.robot)
+    limit = bind_model(where, model, given.robot)
     subjects = [label.subject for label in limit.labels]
-    formula = getattr(model, "check", None)
-    if formula is None:
+    if not has_check(model):
         return limit.name, _check_values(limit, given, subjects)
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return the ratios by the model's own check, (K, c)."""
         motion = (states.q, states.qdot, states.qddot, states.tau)
-        found = np.abs(formula(given.robot, *motion))
-        shape = (len(states.t), len(subjects))
-        if found.shape != shape:
-            raise InputError(
-                "the array has the wrong shape",
-                where=f"{type(model).__name__}.check",
-                found=found.shape,
-                allowed=f"{shape}, a ratio for every moment and label",
-            )
-        return found
+        return check_ratios(where, model, given.robot, motion, len(subjects))
 
     return limit.name, worst_between(given, ratios, subjects)
 

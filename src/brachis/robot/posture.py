@@ -1,0 +1,81 @@
+"""A posture as a user gives it: joint positions in chain order, or by joint name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from brachis.errors import InputError
+from brachis.robot.limits import FARTHEST
+from brachis.task.limit_models import per_joint_values
+
+_ALLOWED = "a list of numbers, one for each joint, or a mapping of joint names to numbers; rad or m"
+
+
+def read_posture(
+    joints: Any, names: Sequence[str], defaults: Mapping[str, float], where: str
+) -> np.ndarray:
+    """Check joint positions and return them in chain order.
+
+    Parameters
+    ----------
+    joints : (n,) array, sequence or mapping of str to float
+        rad or m.
+    names : sequence of str
+        The chain's joints.
+    defaults : mapping of str to float
+        Positions of the last joints, which may be left out.
+    where : str
+        Where the posture stands, for messages.
+
+    Returns
+    -------
+    (n,) ndarray
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        A joint is missing, unknown, not a number or not finite, or the list has another length than the chain.
+    """
+    if isinstance(joints, Mapping):
+        joints = {**defaults, **joints}
+    else:
+        joints = _read_list(joints, where)
+        is_short = len(joints) == len(names) - len(defaults)
+        joints = [*joints, *defaults.values()] if is_short else joints
+    values = per_joint_values(where, joints, names, None)
+    pairs = zip(names, values, strict=True)
+    missing = [name for name, value in pairs if value is None]
+    if missing:
+        raise InputError(
+            f"no position for {', '.join(missing)}",
+            where=where,
+            allowed="a position for each joint",
+        )
+    try:
+        q = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        problem = "a joint position is not a number"
+        raise InputError(problem, where=where, found=values, allowed=_ALLOWED) from None
+    if not np.all(np.abs(q) <= FARTHEST):
+        raise InputError(
+            "a joint position is out of range",
+            where=where,
+            found=q.tolist(),
+            allowed=f"finite numbers, within {FARTHEST:g} rad or m of zero",
+        )
+    return q
+
+
+def _read_list(joints: Any, where: str) -> list[Any]:
+    """Return a list or a one-dimensional array as a list."""
+    try:
+        dimensions = np.ndim(joints)
+    except ValueError:  # lists of different lengths
+        dimensions = 2
+    if dimensions != 1:
+        found = repr(joints)
+        raise InputError("wrong type", where=where, found=found, allowed=_ALLOWED)
+    return list(joints)

@@ -1,0 +1,187 @@
+"""Partial derivatives of a user's limit are compared with its values before anything is planned."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import InputError
+from brachis.limits import Label, Limit, Partials
+from brachis.problem.problem import Problem
+from brachis.task import task_with
+
+ROBOT = brachis.robots.scara3
+TASK = task_with(brachis.examples.scara_line, redundant_joints=["j1"])
+
+
+def rows(motion, *weights):
+    return np.broadcast_to(np.array([weights]), (len(motion.q), 1, len(weights)))
+
+
+class Sum(Limit):
+    """q2^2 + 0.1 q3, and 0.5 qdot1; the functions are replaced one by one below."""
+
+    kind = "sum"
+    labels = (Label("arm", "sum", "rad"),)
+
+    def __init__(self, values, partials, **members):
+        self.lower = -np.ones(1)
+        self.upper = np.ones(1)
+        self.given = values, partials
+        for name, member in members.items():
+            setattr(self, name, member)
+
+    def bind(self, _robot):
+        return self
+
+    def values(self, motion):
+        return self.given[0](motion)
+
+    def partials(self, motion):
+        return self.given[1](motion)
+
+
+def right_values(motion):
+    q = motion.q
+    return q[:, 1:2] ** 2 + 0.1 * q[:, 2:] + 0.5 * motion.qdot[:, :1]
+
+
+def right_partials(motion):
+    by_q = np.zeros((len(motion.q), 1, 3))
+    by_q[:, 0, 1] = 2.0 * motion.q[:, 1]
+    by_q[:, 0, 2] = 0.1
+    return Partials(q=by_q, qdot=rows(motion, 0.5, 0.0, 0.0))
+
+
+def changed(motion, **parts):
+    return Partials(**{**vars(right_partials(motion)), **parts})
+
+
+def bind(limit):
+    return Problem.of(ROBOT, TASK, [limit])
+
+
+@pytest.mark.parametrize(
+    ("partials", "where", "joint"),
+    [
+        (lambda m: changed(m, q=-right_partials(m).q), "q", "j2"),
+        (lambda m: changed(m, q=1.1 * right_partials(m).q), "q", "j2"),
+        (lambda m: changed(m, q=right_partials(m).q[:, :, [0, 2, 1]]), "q", "j2"),
+        (lambda m: Partials(qdot=right_partials(m).q), "q", "j2"),
+        (lambda m: changed(m, q=right_partials(m).q * [1.0, 1.0, 0.0]), "q", "j3"),
+        (lambda m: changed(m, qdot=None), "qdot", "j1"),
+        (lambda m: changed(m, qddot=rows(m, 0.0, 0.1, 0.0)), "qddot", "j2"),
+        (lambda m: changed(m, s=np.ones((len(m.q), 1))), "s", ""),
+    ],
+)
+def test_a_wrong_partial_derivative_is_named(partials, where, joint):
+    with pytest.raises(InputError, match="contradicts the values") as caught:
+        bind(Sum(right_values, partials))
+    assert caught.value.where == f"own_limits[0].partials.{where}"
+    assert "arm sum" in str(caught.value)
+    if joint:
+        assert f"by {where} of joint '{joint}'" in str(caught.value)
+
+
+def test_the_numbers_are_those_of_the_joint():
+    with pytest.raises(InputError) as caught:
+        bind(Sum(right_values, lambda m: changed(m, qdot=rows(m, -0.5, 0.0, 0.0))))
+    assert "found -0.5 at q" in str(caught.value)
+    assert "allowed: 0.5, by differences" in str(caught.value)
+
+
+def test_values_that_use_the_jerk_need_order_3():
+    def values(motion):
+        return motion.qdddot[:, :1] / 10.0
+
+    def partials(motion):
+        return Partials(qdddot=rows(motion, 0.1, 0.0, 0.0))
+
+    with pytest.raises(InputError, match="depends on qdddot") as caught:
+        bind(Sum(values, partials))
+    assert caught.value.where == "own_limits[0].order"
+    bind(Sum(values, partials, order=3))
+
+
+def speed_in_steps(motion):
+    return motion.qdot[:, :1] / np.where(motion.s > 0.5, 0.7, 1.0)[:, None]
+
+
+@pytest.mark.parametrize(
+    ("values", "partials"),
+    [
+        (right_values, right_partials),
+        (
+            lambda m: np.abs(m.qdot[:, :1]),
+            lambda m: Partials(qdot=np.sign(m.qdot[:, :1, None]) * [1.0, 0.0, 0.0]),
+        ),
+        (
+            lambda m: right_values(m).astype(np.float32),
+            right_partials,
+        ),
+        (
+            lambda m: 1e6 * right_values(m),
+            lambda m: right_partials(m).map(lambda part: 1e6 * part),
+        ),
+        (
+            speed_in_steps,
+            lambda m: Partials(
+                qdot=np.where(m.s > 0.5, 1.0 / 0.7, 1.0)[:, None, None] * [1.0, 0, 0]
+            ),
+        ),
+        (
+            lambda m: np.floor(4.0 * m.q[:, :1]) + m.q[:, 1:2],
+            lambda m: Partials(q=rows(m, 0.0, 1.0, 0.0)),
+        ),
+        (
+            lambda m: np.tanh(m.qdot[:, :1] / 1e-3) + m.q[:, 1:2],
+            lambda m: Partials(
+                q=rows(m, 0.0, 1.0, 0.0),
+                qdot=1e3
+                * (1.0 - np.tanh(m.qdot[:, :1, None] / 1e-3) ** 2)
+                * [1.0, 0.0, 0.0],
+            ),
+        ),
+        (
+            lambda m: right_values(m) + 1e-6 * np.sin(1e9 * m.q[:, :1]),
+            right_partials,
+        ),
+    ],
+    ids=["smooth", "kink", "float32", "large", "s step", "steps", "steep", "noisy"],
+)
+def test_right_derivatives_pass(values, partials):
+    bind(Sum(values, partials))
+
+
+def test_built_in_limits_pass():
+    from brachis.limits import limits_of
+    from brachis.limits.derivatives import check_partials, sample_moments
+
+    task = task_with(
+        brachis.examples.scara_line,
+        limits={"torque": 10, "velocity": 2, "acceleration": 9, "power": 30},
+        tool_limits={"speed": 0.5, "acceleration": 2.0},
+    )
+    robot = ROBOT.with_limits(velocity=2.0, acceleration=9.0, power=30.0)
+    limits = limits_of(robot, task)
+    assert len(limits) >= 6
+    for limit in limits:
+        check_partials(limit, sample_moments(robot), robot, limit.kind)
+
+
+def test_values_that_are_not_finite_in_some_postures_are_refused():
+    def values(motion):
+        with np.errstate(invalid="ignore"):
+            return np.sqrt(motion.q[:, :1]) + right_values(motion)
+
+    with pytest.raises(InputError, match=r"not finite; found nan for arm sum at q = "):
+        bind(Sum(values, right_partials))
+
+
+def test_values_for_another_number_of_moments_are_refused():
+    def values(motion):
+        return right_values(motion)[:12]
+
+    with pytest.raises(InputError, match=r"found \(12, 1\) for 24 moments"):
+        bind(Sum(values, right_partials))
