@@ -141,7 +141,7 @@ def build_user_limits(
     others : sequence of Limit
         Those that exist already: labels are unique.
     kinds : collection of str
-        Kinds that exist already.
+        Those of the built-in limits.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def build_user_limits(
     """
     limits: list[Limit] = []
     labels = {str(label) for other in others for label in other.labels}
-    names = {kind.replace("_", " "): "a built-in limit" for kind in kinds}
+    names = {kind.replace("_", " ") for kind in kinds}
     for where, model in models.items():
         limit = bind_model(where, model, robot)
         if not isinstance(limit, Limit):
@@ -163,10 +163,10 @@ def build_user_limits(
         _check_members(limit, where)
         if limit.name in names:
             raise InputError(
-                f"{names[limit.name]} has this kind already",
+                "a built-in limit has this kind already",
                 where=f"{where}.kind",
                 found=limit.kind,
-                allowed="a kind of its own for every limit",
+                allowed="a kind of its own",
             )
         for label in limit.labels:
             if str(label) in labels:
@@ -176,7 +176,6 @@ def build_user_limits(
         if has_check(model):
             _try_check(model, limit, robot, where)
         labels |= {str(label) for label in limit.labels}
-        names[limit.name] = where
         limits.append(limit)
     return limits
 

@@ -228,7 +228,7 @@ class Description:
     Attributes
     ----------
     kind : str
-        Name of the kind, unique.
+        Name of the kind; not that of a built-in limit.
     labels : tuple of Label
         Of each of the c values.
     lower, upper : (c,) ndarray
