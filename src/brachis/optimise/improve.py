@@ -404,7 +404,7 @@ class SolverSession:
             report = backend.solve(problem, x, options, self.progress)
             learnt = report.learnt
             self._last[:] = [report]
-            return report
+            return dataclasses.replace(report, learnt=None)  # results stay small
 
         is_large = isinstance(program, PathProgram) and len(x) > _LARGE_PROGRAM
         if is_large and self.for_large not in (None, self.backend):
