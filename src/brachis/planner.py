@@ -295,8 +295,9 @@ def _find_smoother(
     found = find_least_motion(best, deadline, report)
     assert best.start is not None
     is_exact = best.start.problem.robot.n != problem.robot.n
-    is_new = found.trajectory is not best.trajectory
-    return with_tolerances(found, problem) if is_exact and is_new else found
+    if is_exact and found.trajectory is not best.trajectory:
+        return with_tolerances(found, problem)
+    return found
 
 
 def _read(
