@@ -292,7 +292,7 @@ def forget_the_decorator(_geometry, _task_map, _redundant):
     raise NotApplicableError("never")
 
 
-@pytest.mark.parametrize("wrong", [forget_the_decorator, 3, Wrapped], ids=str)
+@pytest.mark.parametrize("wrong", [forget_the_decorator, 3, Wrapped])
 def test_what_is_no_family_is_refused(arm, plane, wrong):
     with pytest.raises(InputError, match="not a family") as caught:
         find(arm, plane, ["j3"], families=[wrong])
