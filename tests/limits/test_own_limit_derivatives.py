@@ -8,6 +8,7 @@ import pytest
 import brachis
 from brachis.errors import InputError
 from brachis.limits import Label, Limit, Partials
+from brachis.limits.derivatives import sample_moments
 from brachis.problem.problem import Problem
 from brachis.task import task_with
 
@@ -170,11 +171,17 @@ def test_built_in_limits_pass():
         check_partials(limit, sample_moments(robot), robot, limit.kind)
 
 
-def test_values_that_are_not_finite_in_some_postures_are_refused():
-    def values(motion):
-        with np.errstate(invalid="ignore"):
-            return np.sqrt(motion.q[:, :1]) + right_values(motion)
+@pytest.mark.parametrize(("left_out", "is_refused"), [(2, False), (4, True)])
+def test_values_may_be_undefined_in_some_postures_and_not_in_most(left_out, is_refused):
+    angles = np.sort(sample_moments(ROBOT).q[:, 0])
+    least = 0.5 * (angles[left_out - 1] + angles[left_out])
 
+    def values(motion):
+        return np.where(motion.q[:, :1] < least, np.nan, right_values(motion))
+
+    if not is_refused:
+        bind(Sum(values, right_partials))
+        return
     with pytest.raises(InputError, match=r"not finite; found nan for arm sum at q = "):
         bind(Sum(values, right_partials))
 

@@ -104,7 +104,7 @@ def test_auto_asks_for_processes_when_what_is_left_takes_long(monkeypatch):
 
     assert plan_three() == [1, 2, 3]
     assert here == ["1", "2", "3"]
-    monkeypatch.setattr(processes, "_PAYS", 0.0)
+    monkeypatch.setattr(processes, "_WORTH_STARTING", 0.0)
     assert plan_three() == [1, 2, 3]
     assert here == ["1", "3"]
 

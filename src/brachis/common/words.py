@@ -22,7 +22,11 @@ def write_count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+_NAMED = 3
+"""Names that a sentence lists; the others are counted."""
+
+
 def name_first(names: Sequence[str], separator: str) -> str:
     """Join the first three names, and say how many more there are."""
-    others = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return separator.join(names[:3]) + others
+    others = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return separator.join(names[:_NAMED]) + others

@@ -13,8 +13,8 @@ import importlib.metadata
 import itertools
 import pickle
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, fields
-from functools import cache, cached_property, lru_cache
+from dataclasses import dataclass, fields, replace
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -48,6 +48,7 @@ BUILTIN: tuple[Family, ...] = (
     eaik,
 )
 """In the order in which they are tried."""
+_FAILED = "its code failed"
 NO_CLOSED_FORM = (
     "no choice of redundant joints has a closed form: "
     "motions are planned from differential inverse kinematics"
@@ -98,7 +99,7 @@ def check_families(families: Sequence[Family]) -> None:
     InputError
     """
     check_list(families, "families", "closed forms")
-    taken = {family.name for family in BUILTIN}
+    taken = {family.name for family in (*BUILTIN, *plugin_families())}
     for number, family in enumerate(families):
         where = f"families[{number}]"
         if not isinstance(family, Family):
@@ -296,10 +297,19 @@ class _Matcher:
     def match(self, names: tuple[str, ...]) -> TriedDecomposition:
         """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
         redundant = tuple(sorted(self._robot.joint_names.index(name) for name in names))
-        return _find_once(_Choice(redundant, self._families, self._content, self))
+        key = (redundant, self._content, *map(id, self._families))
+        if key in _KNOWN:
+            _, found = _KNOWN[key]
+        else:
+            found = self._find(redundant)
+            if len(_KNOWN) >= _MOST_KNOWN:
+                _KNOWN.clear()
+            if _lasts(found):
+                _KNOWN[key] = (self._families, found)
+        return replace(found, reasons=dict(found.reasons))
 
-    def match_anew(self, redundant: tuple[int, ...]) -> TriedDecomposition:
-        """Do what `match` does if nobody has asked before."""
+    def _find(self, redundant: tuple[int, ...]) -> TriedDecomposition:
+        """Try the families on the robot, then on the ideal arm."""
         reasons: dict[str, str] = {}
         match = self._match(redundant, reasons, None)
         if match is None and self._ideal:
@@ -334,9 +344,7 @@ class _Matcher:
                 if family in BUILTIN:
                     raise
                 # Another package's fault.
-                reasons[family.name] = (
-                    f"its code failed: {type(error).__name__}: {error}"
-                )
+                reasons[family.name] = f"{_FAILED}: {type(error).__name__}: {error}"
             else:
                 reasons.pop(family.name, None)
                 chosen = tuple(self._robot.joint_names[i] for i in redundant)
@@ -361,20 +369,16 @@ class _Matcher:
             )
 
 
-@dataclass(frozen=True)
-class _Choice:
-    """Redundant joints, and what their closed form depends on."""
-
-    redundant: tuple[int, ...]
-    families: tuple[Family, ...]
-    content: bytes
-    matcher: _Matcher = field(compare=False)
+_MOST_KNOWN = 256
+"""Choices of redundant joints whose closed forms are kept."""
+_KNOWN: dict[tuple[object, ...], tuple[tuple[Family, ...], TriedDecomposition]] = {}
+"""Closed forms, for their formulas have to be recorded once only; and families, whose ids are in the keys."""
 
 
-@lru_cache(maxsize=256)
-def _find_once(choice: _Choice) -> TriedDecomposition:
-    """Keep closed forms, which have to be recorded, from one plan to the next."""
-    return choice.matcher.match_anew(choice.redundant)
+def _lasts(found: TriedDecomposition) -> bool:
+    """Tell whether an answer stays: no library was missing, and no code of another package failed."""
+    reasons = found.reasons.values()
+    return not any(own.startswith((NOT_INSTALLED, _FAILED)) for own in reasons)
 
 
 def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:

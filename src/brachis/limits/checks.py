@@ -105,11 +105,15 @@ _MEMBERS = {
         "path coordinates from 0 to 1, (b,)",
     ),
     "violation_scale": _Member(
-        lambda scale, limit: _is_per_value(scale, limit) and np.all(scale > 0.0),
+        lambda scale, limit: (
+            _is_per_value(scale, limit) and np.all(np.asarray(scale) > 0.0)
+        ),
         "numbers > 0, (c,), or one number",
     ),
     "inset": _Member(
-        lambda inset, limit: _is_per_value(inset, limit) and np.all(inset >= 0.0),
+        lambda inset, limit: (
+            _is_per_value(inset, limit) and np.all(np.asarray(inset) >= 0.0)
+        ),
         "numbers >= 0, (c,), or one number",
     ),
     "centre": _Member(
@@ -154,12 +158,6 @@ def build_user_limits(
     names = {kind.replace("_", " ") for kind in kinds}
     for where, model in models.items():
         limit = bind_model(where, model, robot)
-        if not isinstance(limit, Limit):
-            raise InputError(
-                "bind did not return a brachis.limits.Limit",
-                where=where,
-                found=type(limit).__name__,
-            )
         _check_members(limit, where)
         if limit.name in names:
             raise InputError(
@@ -204,7 +202,7 @@ def _check_members(limit: Limit, where: str) -> None:
             is_allowed = False
         if not is_allowed:
             raise InputError(
-                "this value is not allowed",
+                f"{name} is not valid",
                 where=f"{where}.{name}",
                 found=f"{value!r:.200}",
                 allowed=member.allowed,
@@ -231,35 +229,42 @@ def _check_labels(limit: Limit, where: str) -> None:
 
 
 def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
-    """Refuse values and partial derivatives of the wrong type or shape, not finite, or that contradict each other."""
+    """Refuse values and partial derivatives of the wrong type or shape, not finite, or that contradict each other.
+
+    A limit may be undefined in some postures: those are left out, if they are not most of them.
+    """
     few = sample_moments(robot, _MOMENTS)
     _check_values(limit, few, where)
     _check_shapes(limit, few, where)
     moments = sample_moments(robot)
-    _check_values(limit, moments, where)
-    _check_shapes(limit, moments, where)
-    check_partials(limit, moments, robot, where)
-
-
-def _check_values(limit: Limit, moments: Moments, where: str) -> None:
-    values = limit.values(moments)
-    count = len(moments.q)
-    here = f"{where}.values"
-    shape = (count, len(limit.labels))
-    check_array(values, shape, here, remark=f" for {count} moments")
-    bad = np.argwhere(~np.isfinite(values))
-    if len(bad):
-        moment, column = bad[0]
+    values = _check_values(limit, moments, where)
+    is_known = np.isfinite(values).all(axis=1)
+    if 2 * np.count_nonzero(is_known) <= len(is_known):
+        moment, column = np.argwhere(~np.isfinite(values))[0]
         posture = write_posture(moments, moment)
         raise InputError(
             "the values are not finite",
-            where=here,
+            where=f"{where}.values",
             found=f"{values[moment, column]} for {limit.labels[column]!s} at {posture}",
-            allowed="finite numbers in all postures within the joints' ranges, at moderate speeds",
+            allowed="finite numbers in most postures within the joints' ranges, at moderate speeds",
         )
+    known = Moments(*(part[is_known] for part in vars(moments).values()))
+    for name, part in _check_shapes(limit, known, where).items():
+        check_finite(part, f"{where}.partials.{name}")
+    check_partials(limit, known, robot, where)
 
 
-def _check_shapes(limit: Limit, moments: Moments, where: str) -> None:
+def _check_values(limit: Limit, moments: Moments, where: str) -> np.ndarray:
+    """Return the values, (K, c), which may not be finite."""
+    values = limit.values(moments)
+    count = len(moments.q)
+    shape = (count, len(limit.labels))
+    check_array(values, shape, f"{where}.values", remark=f" for {count} moments")
+    return values
+
+
+def _check_shapes(limit: Limit, moments: Moments, where: str) -> dict[str, np.ndarray]:
+    """Return the partial derivatives that are not None."""
     partials = limit.partials(moments)
     here = f"{where}.partials"
     if not isinstance(partials, Partials):
@@ -276,7 +281,7 @@ def _check_shapes(limit: Limit, moments: Moments, where: str) -> None:
     for name, part in given.items():
         own = shape if name == "s" else (*shape, n)
         check_array(part, own, f"{here}.{name}", remark=f" for {count} moments")
-        check_finite(part, f"{here}.{name}")
+    return given
 
 
 def _try_check(model: LimitModel, limit: Limit, robot: Robot, where: str) -> None:

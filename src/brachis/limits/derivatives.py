@@ -27,7 +27,7 @@ _FURTHEST = 1.0
 _PRECISION = 2e-3
 """Difference between stated and found slope, as a fraction of the largest slope, above which the stated is wrong."""
 _ROUNDING = 1e-3
-"""Slopes below this, as a fraction of the values, are not told from zero."""
+"""Slopes smaller than this fraction of the values count as zero."""
 _MARGIN = 5.0
 """Factor on the difference between slopes with two steps, which is allowed too."""
 

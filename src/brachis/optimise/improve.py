@@ -402,7 +402,8 @@ class SolverSession:
                 learnt=learnt,
             )
             report = backend.solve(problem, x, options, self.progress)
-            learnt = report.learnt
+            if report.learnt is not None:
+                learnt = report.learnt
             self._last[:] = [report]
             return dataclasses.replace(report, learnt=None)  # results stay small
 

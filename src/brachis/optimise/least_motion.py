@@ -153,7 +153,7 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
         before.t_end * (1.0 + slower),
     )
     # Rounds of refinement begin near enough, and end sooner.
-    solve = dataclasses.replace(solve, options=_options(patience=2))
+    solve = dataclasses.replace(solve, options=_make_options(patience=2))
     found = refine_and_verify(fastest, program, (first,), solve, options)
     if found.trajectory is None or found.refined is None or not found.verified:
         status = "the fastest motion is kept: a smoother one was not verified"
@@ -214,8 +214,8 @@ def least_acceleration(
     )
 
 
-def _options(patience: int) -> SolverOptions:
-    """Bound a solve; for `patience` see there."""
+def _make_options(patience: int) -> SolverOptions:
+    """Return the bounds on a solve; `patience` is the number of iterates without gain after which it ends."""
     return SolverOptions(
         tolerance=1e-6,
         max_iterations=60,
@@ -235,5 +235,5 @@ def _session(name: str, deadline: Deadline, listener: Listener) -> SolverSession
         text = f"iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
         listener(Iteration(f"least motion: {text}"))
 
-    options = _options(patience=5)
+    options = _make_options(patience=5)
     return SolverSession(backend, options, deadline, progress, acceptable=FEASIBLE)

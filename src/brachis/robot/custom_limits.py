@@ -125,7 +125,7 @@ def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
     Raises
     ------
     InputError
-        It cannot be built.
+        It cannot be built, or is none.
     """
     try:
         with name_failures(where, "bind"):
@@ -134,8 +134,13 @@ def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
         problem = f"the limit cannot be built for this robot: {error}"
         found = type(model).__name__
         raise InputError(problem, where=where, found=found) from error
-    if hasattr(limit, "origin"):
-        limit.origin = where
+    if isinstance(limit, type) or not hasattr(limit, "origin"):
+        raise InputError(
+            "bind did not return a brachis.limits.Limit",
+            where=where,
+            found=type(limit).__name__,
+        )
+    object.__setattr__(limit, "origin", where)  # it may be frozen
     return limit
 
 
@@ -172,9 +177,13 @@ def check_ratios(
     """
     with name_failures(where, "check"):
         found = model.check(robot, *motion)
-    if isinstance(found, list):
-        found = np.array(found)
     here = f"{where}.check"
+    if isinstance(found, list):
+        try:
+            found = np.array(found)
+        except ValueError as error:
+            problem = f"the array has the wrong shape: {error}"
+            raise InputError(problem, where=here) from error
     moments = len(motion[0])
     check_array(found, (moments, size), here, remark=f" for {moments} moments")
     check_finite(found, here)

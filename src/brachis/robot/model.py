@@ -48,7 +48,8 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
             "Pinocchio cannot build the model", where=where, found=str(error)
         ) from error
     for frame in model.frames:
-        frame.name = frame.name.removeprefix(LINK)
+        if frame.type == pin.FrameType.BODY:
+            frame.name = frame.name.removeprefix(LINK)
     names = tuple(str(name) for name in list(model.names)[1:])
     if names != chain.joint_names or model.nq != model.nv:
         raise UrdfError(

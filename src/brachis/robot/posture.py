@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -54,11 +55,10 @@ def read_posture(
             where=where,
             allowed="a position for each joint",
         )
-    try:
-        q = np.array(values, dtype=float)
-    except (TypeError, ValueError):
+    if not all(isinstance(own, Real) and not isinstance(own, bool) for own in values):
         problem = "a joint position is not a number"
-        raise InputError(problem, where=where, found=values, allowed=_ALLOWED) from None
+        raise InputError(problem, where=where, found=values, allowed=_ALLOWED)
+    q = np.array(values, dtype=float)
     if not np.all(np.abs(q) <= FARTHEST):
         raise InputError(
             "a joint position is out of range",

@@ -35,7 +35,7 @@ from brachis.robot.urdf_elements import (
 )
 
 LINK = "link:"
-"""With this names of links begin in what Pinocchio reads."""
+"""Prefix of link names in the URDF that Pinocchio reads; it keeps them apart from joint names."""
 _MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 

@@ -1,6 +1,6 @@
-"""Work for several processes: this one, and others that help it as soon as they are ready.
+"""Work is shared between this process and others.
 
-Nothing waits for a process to start. Nothing waits for a process either while there is work that nobody does.
+This process works while the others start, and waits only when all work is handed out.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from brachis.common.progress import Listener, ignore
 from brachis.errors import BrachisError
 
 _MAIN = "MainProcess"
-_PAYS = 3.0
+_WORTH_STARTING = 3.0
 """Seconds of work for which other processes are started; that takes them a second or two."""
-_STAY = 300.0
+_IDLE_TIME = 300.0
 """Seconds after which a process without work ends."""
 _HEARTBEAT = 0.1
 """Seconds until Ctrl-C is noticed."""
@@ -43,6 +43,8 @@ def run_in_processes(
 ) -> Generator[_Made, None, None]:
     """Do a piece of work for every item, in up to `jobs` processes.
 
+    What was handed out is done even if its result is no longer asked for.
+
     Parameters
     ----------
     function : callable
@@ -53,8 +55,7 @@ def run_in_processes(
         The same for all items.
     jobs : int or "auto"
         With 1, and within another program's workers, the work is done here, item by item as it is asked for. With
-        ``auto`` it is, until what is left takes longer than to start other processes. What cannot be sent to others is
-        done here too.
+        ``auto`` it is, until the rest is going to take longer than 3 s. What cannot be sent to others is done here too.
     listener : callable
         Only heard of work that is done here.
 
@@ -71,43 +72,55 @@ def run_in_processes(
     count = process_count(jobs)
     is_alone = count == 1 or len(given) <= 1 or _is_within_a_worker()
     outcomes: list[Future[_Made]] = []
-    taken = 0.0
+    elapsed = 0.0
     done = 0
-    try:
-        for number in range(len(given)):
-            while number == len(outcomes) or not outcomes[number].done():
-                interrupts.check()
-                left = taken / max(done, 1) * (len(given) - len(outcomes))
-                if not is_alone and (jobs != "auto" or left > _PAYS):
-                    workers = _start_workers(count - 1, os.getpid())
-                    waiting = given[len(outcomes) :]
-                    share = len(waiting) * (count - 1) // count
-                    most = min(share, workers.count_free())
-                    outcomes.extend(
-                        workers.submit(function, item, *others)
-                        for item in waiting[:most]
-                    )
-                if len(outcomes) < len(given):
-                    began = time.perf_counter()
-                    item = given[len(outcomes)]
-                    outcomes.append(_do_here(function, item, *others, listener))
-                    taken += time.perf_counter() - began
-                    done += 1
-                else:
-                    wait([outcomes[number]], _HEARTBEAT)
-            if isinstance(outcomes[number].exception(), PicklingError):
-                outcomes[number] = _do_here(function, given[number], *others, listener)
-            yield outcomes[number].result()
-    except BrokenExecutor as error:
+    for number in range(len(given)):
+        while number == len(outcomes) or not outcomes[number].done():
+            interrupts.check()
+            waiting = given[len(outcomes) :]
+            is_long = elapsed / max(done, 1) * len(waiting) > _WORTH_STARTING
+            if not is_alone and (jobs != "auto" or is_long):
+                outcomes += _hand_out(count - 1, waiting, function, *others)
+            if len(outcomes) < len(given):
+                began = time.perf_counter()
+                item = given[len(outcomes)]
+                outcomes.append(_do_here(function, item, *others, listener))
+                elapsed += time.perf_counter() - began
+                done += 1
+            else:
+                wait([outcomes[number]], _HEARTBEAT)
+        failure = outcomes[number].exception()
+        if isinstance(failure, BrokenExecutor | PicklingError):
+            _refuse_lost_work(failure)
+            outcomes[number] = _do_here(function, given[number], *others, listener)
+        yield outcomes[number].result()
+
+
+def _hand_out(
+    count: int,
+    waiting: Sequence[_Given],
+    function: Callable[..., _Made],
+    *others: object,
+) -> list[Future[_Made]]:
+    """Give the first items to `count` other processes, as many as they are free for, and no more than their share."""
+    workers = _start_workers(count, os.getpid())
+    share = len(waiting) * count // (count + 1)
+    most = min(share, workers.count_free())
+    return [workers.submit(function, item, *others) for item in waiting[:most]]
+
+
+def _refuse_lost_work(failure: Exception) -> None:
+    """Raise an error where a process ended, perhaps by its work; what could not be sent can be done here."""
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    if isinstance(failure, BrokenExecutor):
         _start_workers.cache_clear()
+    if isinstance(failure, TerminatedWorkerError):
         raise BrachisError(
             "a process that helped with the plan ended before its work was done",
-            found=str(error).partition("\n")[0].rstrip("."),
+            found=str(failure).partition("\n")[0].rstrip("."),
             hint="Set search.jobs: 1",
-        ) from error
-    finally:
-        for outcome in outcomes:
-            outcome.cancel()
+        ) from failure
 
 
 def process_count(jobs: int | str) -> int:
@@ -130,18 +143,18 @@ class _Workers:
         from joblib.externals.loky import ProcessPoolExecutor
 
         self._executor = ProcessPoolExecutor(
-            count, timeout=_STAY, initializer=interrupts.ignore
+            count, timeout=_IDLE_TIME, initializer=interrupts.ignore
         )
         atexit.register(self._end, os.getpid())
         self._under_way: list[Future[Any]] = []
-        self._starting = [self.submit(_get_ready) for _ in range(count)]
+        self._starting = [self.submit(_import_planner) for _ in range(count)]
 
     def submit(
         self, function: Callable[..., _Made], *arguments: object
     ) -> Future[_Made]:
         """Hand out a piece of work."""
         with interrupts.block_in_children():
-            future = self._executor.submit(_apart, function, *arguments)
+            future = self._executor.submit(_run_in_worker, function, *arguments)
         self._under_way.append(future)
         return future
 
@@ -163,7 +176,7 @@ def _start_workers(count: int, _owner: int) -> _Workers:
     return _Workers(count)
 
 
-def _get_ready(_listener: Listener) -> None:
+def _import_planner(_listener: Listener) -> None:
     """Load what plans need."""
     import_module("brachis.search.portfolio")
 
@@ -178,7 +191,7 @@ def _do_here(function: Callable[..., _Made], *arguments: object) -> Future[_Made
     return outcome
 
 
-def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
+def _run_in_worker(function: Callable[..., _Made], *arguments: object) -> _Made:
     """Do a piece of work in a process of its own: one thread for linear algebra, nobody listening."""
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         return function(*arguments, ignore)

@@ -255,15 +255,14 @@ def _along_joints(
             )
     names = "the names of the joints"
     table, _ = read_table(text, str(path), names, lambda _header, _where: None)
-    for column in table.header:
-        if _HAS_UNIT.search(column):
-            raise TaskError(
-                "a path of joints is in rad and m",
-                found=f"column {column!r}",
-                allowed="the names of the joints, without a unit",
-                where=f"{path}: line {table.header_line}",
-                hint="Convert the numbers to rad and m, and name the columns as the joints",
-            )
+    if all(_HAS_UNIT.search(column) for column in table.header):  # one may be a name
+        raise TaskError(
+            "a path of joints is in rad and m",
+            found=f"columns {', '.join(table.header)}",
+            allowed="the names of the joints, without a unit",
+            where=f"{path}: line {table.header_line}",
+            hint="Convert the numbers to rad and m, and name the columns as the joints",
+        )
     _check_count(len(table.values), path)
     nothing = table.values[:, :0]
     refuse_repetitions(Points(table.values, nothing, None, table.lines, str(path)))

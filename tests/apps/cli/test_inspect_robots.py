@@ -120,17 +120,9 @@ def test_solvers_of_published_robots(run):
     assert decompositions(run, published("UR5")) == {"none": "parallel_axes"}
 
 
-@pytest.fixture
-def without_eaik(monkeypatch):
-    """Make as if EAIK were not installed; what was found with it, or without it, is forgotten."""
+def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
-    registry._find_once.cache_clear()
-    yield
-    registry._find_once.cache_clear()
-
-
-@pytest.mark.usefixtures("without_eaik")
-def test_without_eaik_it_is_said_what_is_missing(run):
+    monkeypatch.setattr(registry, "_KNOWN", {})
     panda = decompositions(run, published("Panda"))
     assert [joint for joint, solver in panda.items() if solver != "-"] == [
         "panda_joint4",

@@ -208,6 +208,14 @@ def test_what_is_raised_within_a_backend_comes_out(name, function, monkeypatch):
         solve(name, problem, [40.0, -30.0])
 
 
+def test_what_a_listener_raises_comes_out(name):
+    def progress(_iteration, _objective):
+        raise ZeroDivisionError("a listener of the user's own")
+
+    with pytest.raises(ZeroDivisionError, match="own"):
+        solve(name, disc(), [40.0, -30.0], progress=progress)
+
+
 # The objective is not the first variable here, as it is in a program of one phase.
 def test_progress_tells_iteration_and_objective(name):
     problem, calls = bounded(), []

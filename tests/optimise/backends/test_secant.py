@@ -113,3 +113,14 @@ def test_what_one_solve_learnt_the_next_one_knows():
     hessian = SecantHessian.of(problem, np.zeros(SIZE), learnt)
     found = hessian(np.zeros(SIZE), 1.0, multipliers)
     np.testing.assert_allclose(found, 2.0 * SQUARES, atol=1e-12)
+
+
+def test_what_a_hessian_raises_comes_out():
+    def fail(*_given):
+        raise ZeroDivisionError("a limit of the user's own")
+
+    program = ellipsoid(1.0)
+    program.curvature = lambda _x: Curvature(fail, np.array([-1.0]))
+    (uno,) = solvers_for("uno")
+    with pytest.raises(ZeroDivisionError, match="own"):
+        uno.solve(program, np.zeros(SIZE), SolverOptions(), None)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 _IMPLAUSIBLE_SPEED = 10.0
-"""Factor by which a recorded motion is not faster than a plan within the same limits, whatever the limits are."""
+"""Ratio of end times above which a recorded motion is implausibly fast."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ restoration.
 from __future__ import annotations
 
 import multiprocessing
+import pickle
 import signal
 import sys
 import threading
@@ -210,4 +211,13 @@ def _work(
         with ThreadpoolController().limit(limits=1, user_api="blas"):
             sender.send(run(SolveMonitor(problem, options, progress), x))
     except Exception as error:  # noqa: BLE001  (raised where the solve was asked for)
-        sender.send(error)
+        sender.send(_make_sendable(error))
+
+
+def _make_sendable(error: Exception) -> Exception:
+    """Return an error as it is, or one with its text if it cannot be sent to another process."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301  (its own)
+    except Exception:  # noqa: BLE001  (whatever a class of the user's own does)
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error

@@ -53,7 +53,7 @@ class SolveMonitor:
         self.problem = problem
         self.options = options
         self.iterations = 0
-        self.interrupt: BaseException | None = None
+        self.failure: BaseException | None = None
         self.timed_out = False
         self.exhausted = False
         self._evaluations = 0
@@ -74,7 +74,7 @@ class SolveMonitor:
             self._handler = signal.signal(signal.SIGINT, self._during)
             remembers = isinstance(self._handler, SigintHandler)
             if remembers and self._handler.pending:  # nobody has looked until now
-                self.interrupt = KeyboardInterrupt()
+                self.failure = KeyboardInterrupt()
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -83,7 +83,7 @@ class SolveMonitor:
             signal.signal(signal.SIGINT, self._handler)
 
     def _keep_interrupt(self, _signal: int, _frame: object) -> None:
-        self.interrupt = KeyboardInterrupt()
+        self.failure = KeyboardInterrupt()
         if isinstance(self._handler, SigintHandler):
             self._handler.remember()
 
@@ -98,8 +98,8 @@ class SolveMonitor:
         if self._progress is not None:
             try:
                 self._progress(self.iterations, objective)
-            except KeyboardInterrupt as interrupt:
-                self.interrupt = interrupt
+            except (KeyboardInterrupt, Exception) as error:  # noqa: BLE001  (`report` raises it)
+                self.failure = error
         return self.must_stop()
 
     def has_lost(self, objective: float) -> bool:
@@ -132,7 +132,7 @@ class SolveMonitor:
         self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
         # A solver that needs more cannot leave a point out of reach.
         self.exhausted = self._evaluations > 10 * self.options.max_iterations
-        return self.timed_out or self.exhausted or self.interrupt is not None
+        return self.timed_out or self.exhausted or self.failure is not None
 
     def objective(self, x: np.ndarray) -> float:
         """Objective at x, finite; raises UnreachableError else."""
@@ -159,6 +159,14 @@ class SolveMonitor:
         self._evaluations += 1
         return self._finite(function, x)
 
+    def hessian(
+        self, function: Callable[..., np.ndarray], x: np.ndarray, *multipliers: Any
+    ) -> np.ndarray:
+        """Hessian at x by a function of x and multipliers; raises as `rows` does."""
+        if self.must_stop():
+            raise UnreachableError("the solve has to stop")
+        return self._finite(lambda at: function(at, *multipliers), x)
+
     def _finite(self, function: Function, x: np.ndarray) -> np.ndarray:
         if not is_usable(x):
             raise UnreachableError("the solver asked for a point that is not finite")
@@ -169,7 +177,7 @@ class SolveMonitor:
             raise
         except (KeyboardInterrupt, Exception) as error:
             # Compiled backends lose what is raised within them, for example by a limit of the user's own.
-            self.interrupt = error
+            self.failure = error
             raise UnreachableError("the solve has to stop") from error
         if not is_usable(values):
             raise UnreachableError("a value or a slope is not a finite number there")
@@ -187,11 +195,11 @@ class SolveMonitor:
 
         Raises
         ------
-        KeyboardInterrupt
-            If one was kept.
+        BaseException
+            The error, or the KeyboardInterrupt, that was kept.
         """
-        if self.interrupt is not None:
-            raise self.interrupt
+        if self.failure is not None:
+            raise self.failure
         violation = residual(self.problem, x)
         if self.stagnated and not status.usable:
             status = SolveStatus.STAGNATED

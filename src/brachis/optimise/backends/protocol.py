@@ -124,8 +124,8 @@ class SolverOptions:
         Whether the solve runs in a process of its own, which is ended when nothing is heard of it for long. That takes
         some 0.07 s more.
     learnt : (v, v) ndarray, optional
-        Of the report of a solve with the same variables and nearly the same rows: Uno begins with this Hessian, where
-        a problem knows a part of it.
+        `SolverReport.learnt` of an earlier solve with the same variables. Uno starts with it if the problem knows a
+        part of its Hessian.
     """
 
     tolerance: float = 1e-6

@@ -89,7 +89,7 @@ class SecantHessian:
             factor = objective_multiplier or 1.0
             known = self._known.hessian(x, factor, multipliers)
             if objective_multiplier == 0.0:
-                # In a restoration the least that is enough: feasible points may be far.
+                # In a restoration more curvature would keep steps short, and feasible points may be far.
                 known *= self._least_trace / np.trace(known)
         if objective_multiplier > 0.0:
             self._multipliers = multipliers

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -63,7 +63,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             ending = result.optimization_status.name
             found = result.solution_status.name
             if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
-                monitor.interrupt = KeyboardInterrupt()
+                monitor.failure = KeyboardInterrupt()
             small = found == "FEASIBLE_SMALL_STEP"
             has_failed = stall.seen or small or ending == "ALGORITHMIC_ERROR"
             if not has_failed or monitor.is_beaten or monitor.must_stop():
@@ -78,7 +78,9 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     message = f"{ending.lower()}, {found.lower()}"
     multipliers = np.array(result.constraint_dual_solution)
     report = monitor.report(NAME, status, x, multipliers, message)
-    return report if hessian is None else replace(report, learnt=hessian.learnt)
+    if hessian is None or not report.status.usable:
+        return report
+    return replace(report, learnt=hessian.learnt)
 
 
 @cache
@@ -211,7 +213,7 @@ def _run(
         scale(monitor.jacobian, units[problem.jacobian_columns]),
     )
     if hessian is not None:
-        _set_hessian(model, hessian, units)
+        _set_hessian(model, partial(monitor.hessian, hessian), units)
     model.set_initial_primal_iterate((x / units).tolist())
     settings = {
         "primal_tolerance": options.tolerance,
@@ -225,7 +227,9 @@ def _run(
     return backend.optimize(model)
 
 
-def _set_hessian(model: Any, hessian: SecantHessian, units: np.ndarray) -> None:
+def _set_hessian(
+    model: Any, hessian: Callable[..., np.ndarray], units: np.ndarray
+) -> None:
     """Let Uno take a Hessian in place of its own approximation."""
     import unopy
 
