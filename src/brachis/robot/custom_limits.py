@@ -125,7 +125,7 @@ def bind_model(where: str, model: LimitModel, robot: Robot) -> Any:
     Raises
     ------
     InputError
-        It cannot be built, or is none.
+        It cannot be built, or is not a limit.
     """
     try:
         with name_failures(where, "bind"):

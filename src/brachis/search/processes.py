@@ -43,7 +43,7 @@ def run_in_processes(
 ) -> Generator[_Made, None, None]:
     """Do a piece of work for every item, in up to `jobs` processes.
 
-    What was handed out is done even if its result is no longer asked for.
+    What was handed out is done even if nobody asks for its result any more.
 
     Parameters
     ----------

@@ -195,7 +195,7 @@ def _find_decomposition(problem: Problem, families: Sequence[Family]) -> Decompo
     Raises
     ------
     DecompositionError
-        There is none: the motion was planned with one that is not known here.
+        No closed form fits: the motion was planned with one that is not known here.
     """
     try:
         (decomposition,) = decompositions_of(problem, families)

@@ -287,7 +287,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
     fits = [fit for fit in trajectory.task.fits if fit.profile]
     if not fits:
         raise InputError(
-            "the path was not fitted to points, so that there is no fit to draw",
+            "the path was not fitted to points: it has no fit to draw",
             allowed="the motion of a task with a path of points and a tolerance",
         )
     figure = style.new_figure(style.COLUMN_WIDTH, 45.0 * len(fits))
