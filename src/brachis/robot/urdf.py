@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -178,6 +179,20 @@ def read_chain(
     UnknownNameError
         A frame or joint does not exist.
     """
+    locked = tuple(locked_joints.items())
+    return _read_chain(text, where, tool_frame, base_frame, locked)
+
+
+@lru_cache(maxsize=16)
+def _read_chain(
+    text: str,
+    where: str,
+    tool_frame: str | None,
+    base_frame: str | None,
+    held: tuple[tuple[str, float], ...],
+) -> UrdfChain:
+    """Read a URDF as `read_chain` does; plans of the same robot follow each other."""
+    locked_joints = dict(held)
     tree = read_tree(text, where)
     for key, frame in (("tool_frame", tool_frame), ("base_frame", base_frame)):
         if frame is not None:
