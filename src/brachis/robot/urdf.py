@@ -37,11 +37,19 @@ from brachis.robot.urdf_elements import (
 
 LINK = "link:"
 """Prefix of link names in the URDF that Pinocchio reads; it keeps them apart from joint names."""
+_WORLD = "universe"
 _MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
 def _check_joints(tree: UrdfTree, chain: Sequence[str], where: str) -> None:
     """Refuse joints that a serial chain of one-coordinate joints cannot have."""
+    if _WORLD in tree.joints:
+        raise UrdfError(
+            "a joint has the name that Pinocchio gives to the world",
+            where=where,
+            found=f"joint {_WORLD!r}",
+            hint="Rename the joint",
+        )
     for name in chain:
         joint = tree.joints[name]
         kind = joint.get("type")
