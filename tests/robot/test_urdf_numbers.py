@@ -240,7 +240,7 @@ def test_joints_may_have_the_names_of_links():
 
 def test_a_joint_with_the_name_of_the_world_is_refused():
     text = changed("name='j1'", "name='universe'")
-    with pytest.raises(UrdfError, match="'universe'.*Rename the joint"):
+    with pytest.raises(UrdfError, match=r"'universe'.*Rename the joint"):
         Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool")
 
 
