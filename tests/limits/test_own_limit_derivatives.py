@@ -152,7 +152,23 @@ def speed_in_steps(motion):
     ids=["smooth", "kink", "float32", "large", "s step", "steps", "steep", "noisy"],
 )
 def test_right_derivatives_pass(values, partials):
-    bind(Sum(values, partials))
+    limit = Sum(values, partials)
+    assert any(own is limit for own in bind(limit).limits)
+
+
+def test_a_limit_on_torques_passes():
+    """A motion keeps its torques once they are computed."""
+
+    def values(motion):
+        return 0.01 * motion.torque(ROBOT)[:, :1]
+
+    def partials(motion):
+        exact = motion.torque_derivatives(ROBOT)
+        parts = (exact.q, exact.qdot, exact.qddot)
+        return Partials(*(0.01 * part[:, :1] for part in parts))
+
+    limit = Sum(values, partials)
+    assert any(own is limit for own in bind(limit).limits)
 
 
 def test_built_in_limits_pass():

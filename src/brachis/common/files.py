@@ -28,6 +28,8 @@ from brachis.errors import InputError, TaskError
 LARGEST_TEXT = 16_000_000
 """Bytes of a text file that is read."""
 
+COMPOSED = "<!-- brachis compose -->"
+"""Second line of a composed URDF, by which it is known."""
 BEGINNINGS = {
     ".html": rb"<!doctype html>\n<!-- brachis report -->",
     ".json": rb'\{\n  "(t_end"|\$schema": "https://json-schema\.org/draft/2020-12/schema",\n  "\$id": "urn:brachis:)',
@@ -35,7 +37,7 @@ BEGINNINGS = {
     ".pdf": rb"%PDF",
     ".png": rb"\x89PNG",
     ".svg": rb"<\?xml|<svg",
-    ".urdf": rb'<\?xml version="1\.0"\?>\n<!-- brachis compose -->',
+    ".urdf": rb'<\?xml version="1\.0"\?>\n' + re.escape(COMPOSED).encode(),
 }
 """Patterns of how files begin that brachis writes, by their suffix; `brachis.export.FORMATS` has those of exports."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -248,7 +248,8 @@ def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
             found=f"{values[moment, column]} for {limit.labels[column]!s} at {posture}",
             allowed="finite numbers in most postures within the joints' ranges, at moderate speeds",
         )
-    known = Moments(*(part[is_known] for part in vars(moments).values()))
+    parts = (getattr(moments, own.name)[is_known] for own in fields(moments))
+    known = Moments(*parts)
     for name, part in _check_shapes(limit, known, where).items():
         check_finite(part, f"{where}.partials.{name}")
     check_partials(limit, known, robot, where)

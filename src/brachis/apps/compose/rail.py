@@ -16,14 +16,18 @@ import pinocchio as pin
 from brachis.apps.compose import elements
 from brachis.apps.compose.elements import Element
 from brachis.common import files
-from brachis.common.files import BEGINNINGS, atomic_write, status_of, writing_errors
+from brachis.common.files import (
+    BEGINNINGS,
+    COMPOSED,
+    atomic_write,
+    status_of,
+    writing_errors,
+)
 from brachis.errors import InputError
 from brachis.robot.urdf import check_inertias, read_file
 from brachis.robot.urdf_bodies import read_dynamics
 from brachis.robot.urdf_elements import UrdfTree, read_tree
 
-_MARK = "<!-- brachis compose -->"
-"""Second line of a composed URDF, by which it is known: `common.files.BEGINNINGS` has it too."""
 _NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
 
 
@@ -162,7 +166,7 @@ class Rail:
         arm.robot.set("name", f"{arm.robot.get('name') or source.stem}_{self.name}")
         arm.robot[:0] = self._elements(root)
         declaration, _, rest = elements.robot_text(arm.robot).partition("\n")
-        return "\n".join((declaration, _MARK, rest.removeprefix(f"{_MARK}\n")))
+        return "\n".join((declaration, COMPOSED, rest.removeprefix(f"{COMPOSED}\n")))
 
     def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:
         """Refuse new names that the arm has already, be it for links or joints: frames are looked up by name."""
