@@ -234,7 +234,8 @@ def _search(
         exact = _plan_exactly(problem, robot, families, deadline, report)
     with search.end_early():
         search.run(known, exact if exact is not None and exact.verified else None)
-    if search.best is None and search.interrupted:
+    if search.best is None and search.interrupted and exact is not None:
+        search.candidates.append(exact)
         search.best = exact
     if search.best is None:
         raise search.explain().error()

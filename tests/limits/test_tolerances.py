@@ -228,6 +228,7 @@ def test_if_the_time_is_up_the_motion_without_tolerances_is_not_lost(
     monkeypatch.setattr(Search, "run", run)
     found = brachis.plan(result.task)
     assert found.interrupted
+    assert [each.t_end for each in found.candidates] == [found.t_end]
     assert found.t_end == pytest.approx(plain.t_end, rel=1e-9)
 
 
