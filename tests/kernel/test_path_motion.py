@@ -5,11 +5,8 @@ import pytest
 
 from brachis.kernel import (
     Conditions,
-    MotionSlopes,
     PathMotion,
     Prescribed,
-    apply_chain_rule,
-    find_entries,
     find_least_singular,
     largest_parts,
     tool_derivatives,
@@ -155,6 +152,25 @@ def test_singular_slopes(case):
     np.testing.assert_allclose(found_s, known, atol=1e-11)
 
 
+def test_rows_that_are_the_same_everywhere_are_given_once():
+    n, asked = 7, Prescribed()
+    rng = np.random.default_rng(4)
+    chain = chain_of(*random_model(n, n))
+    row = rng.normal(size=(1, n))
+    q = rng.normal(size=(POINTS, n))
+    path = tuple(rng.normal(size=(3, POINTS, 6)))
+    curves = tuple(rng.normal(size=(2, POINTS, 2)))
+    many = np.broadcast_to(row, (POINTS, 1, n))
+    motions = [
+        PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
+        for rows in (many.copy(), many, row)
+    ]
+    for name in ("gradient", "qdot", "qddot", "determinants"):
+        first, *others = (getattr(own, name) for own in motions)
+        for own in others:
+            np.testing.assert_array_equal(own, first)
+
+
 def test_a_singular_matrix_has_determinant_zero():
     chain = chain_of(*random_model(3, 1))
     rows = np.zeros((1, 1, 3))
@@ -194,67 +210,6 @@ def test_least_singular_values():
     np.testing.assert_allclose(values, known[:, -1], rtol=1e-12)
     along = np.abs(np.sum(vectors * right[:, -1], axis=1))
     np.testing.assert_allclose(along, 1.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("width", [1, 2, 3, 4, 5, 6])
-@pytest.mark.parametrize("with_jerk", [False, True])
-def test_the_chain_rule(with_jerk, width):
-    rng = np.random.default_rng(8)
-    n = 5
-    parts = [rng.normal(size=(POINTS, n, width)) for _ in range(5)]
-    gradient, qdot_y, qddot_y, qddot_ydot, qdddot_y = parts
-    motion = MotionSlopes(*parts[:4], qdddot_y if with_jerk else None)
-    first = [rng.normal(size=(POINTS, 4, n)) for _ in range(4 if with_jerk else 3)]
-    first += [None] * (4 - len(first))
-    constant = np.broadcast_to(rng.normal(size=(2, n)), (POINTS, 2, n))
-    by_s = rng.normal(size=(POINTS, 2))
-    groups = [(first, None), ((None, constant, None, None), by_s)]
-    found = apply_chain_rule(groups, [4, 2], motion)
-    p_q, p_v, p_a, p_j = first
-    known = [
-        p_q @ gradient + p_v @ qdot_y + p_a @ qddot_y,
-        p_v @ gradient + p_a @ qddot_ydot,
-        p_a @ gradient,
-    ]
-    if with_jerk:
-        known[0] += p_j @ qdddot_y
-        known[1] += 3.0 * p_j @ qddot_y
-        known[2] += 3.0 * p_j @ qdot_y
-        known.append(p_j @ gradient)
-    for order, own in enumerate(known):
-        np.testing.assert_allclose(found[order, :, :4], own, atol=1e-12)
-    by_y = constant @ qdot_y
-    by_y[:, :, 0] += by_s
-    np.testing.assert_allclose(found[0, :, 4:], by_y, atol=1e-12)
-    np.testing.assert_allclose(found[1, :, 4:], constant @ gradient, atol=1e-12)
-    assert not found[2:, :, 4:].any()
-
-    points = np.array([0, 0, 4, POINTS - 1])
-    basis = rng.normal(size=(len(found), 4))
-    curves = np.array([1, 0, 2, 1]) % width
-    every = rng.normal(size=(2, len(found), POINTS, width))
-    entries = find_entries(found, every, points, curves, basis)
-    known = np.einsum("bokw,okcw->bkc", every, found).reshape(2 * POINTS, -1)
-    np.testing.assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
-    by_one = np.einsum("oz,zoc->zc", basis, found[:, points, :, curves])
-    np.testing.assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
-    with pytest.raises(ValueError, match="point"):
-        find_entries(found, every, points + 1, curves, basis)
-    with pytest.raises(ValueError, match="curve"):
-        find_entries(found, every, points, curves + width, basis)
-    with pytest.raises(ValueError, match="as many"):
-        find_entries(found, every, points, curves[:-1], basis)
-    with pytest.raises(TypeError, match="cast"):
-        find_entries(found, every, 1.0 * points, curves, basis)
-
-
-def test_partials_by_the_jerk_need_its_slopes():
-    parts = np.zeros((4, POINTS, 2, 3))
-    partials = np.zeros((POINTS, 1, 2))
-    with pytest.raises(ValueError, match="qdddot_y"):
-        apply_chain_rule(
-            [((None, None, None, partials), None)], [1], MotionSlopes(*parts)
-        )
 
 
 def test_largest_parts_of_steps():

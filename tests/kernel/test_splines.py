@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 
-from brachis.kernel import Spline, blossom, collocation, sum_basis
+from brachis.kernel import Basis, Spline, blossom, collocation
 
 KNOTS = np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.5, 0.5, 0.5, 0.5, 0.9, 1.0, 1.0, 1.0, 1.0])
 """Of a cubic spline; two phases meet at 0.5."""
@@ -92,11 +92,12 @@ def test_numbers_that_do_not_exist():
         with pytest.raises(ValueError, match="a piece does not exist"):
             blossom(KNOTS, points, np.array([piece]), [np.zeros(1)] * 3)
     basis = np.ones((4, 1, 4))
-    for first in (-1, len(points) - 3):
-        with pytest.raises(ValueError, match="a control point does not exist"):
-            sum_basis(basis, np.array([first]), points.T)
+    with pytest.raises(ValueError, match="a control point does not exist"):
+        Basis(basis, np.array([len(points) - 3])).sum(points.T)
+    with pytest.raises(ValueError, match="negative"):
+        Basis(basis, np.array([-1]))
     with pytest.raises(ValueError, match="one number for each place"):
-        sum_basis(basis, np.array([0, 1]), points.T)
+        Basis(basis, np.array([0, 1]))
 
 
 @pytest.mark.parametrize(

@@ -6,15 +6,18 @@ import sys
 import numpy as np
 
 from brachis.kernel import (
+    Basis,
     Chain,
     Conditions,
+    CurvePlaces,
     Formula,
+    Groups,
     MotionSlopes,
     PathMotion,
     Prescribed,
+    ScaledQuantity,
     Spline,
-    apply_chain_rule,
-    find_entries,
+    VariableSlopes,
     find_least_singular,
     find_postures,
     follow_turns,
@@ -22,7 +25,6 @@ from brachis.kernel import (
     library,
     pick_nearest,
     set_turns,
-    sum_basis,
 )
 
 POINTS, N = 61, 7
@@ -56,15 +58,21 @@ def work() -> None:
     path = tuple(rng.normal(size=(3, POINTS, 6)))
     curves = tuple(rng.normal(size=(2, POINTS, 2)))
     motion = PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
-    slopes = motion.derivatives()
+    motion.derivatives()
     motion.singular_slopes(*find_least_singular(motion.inverse))
     for quantity in ("speed", "angular speed", "acceleration"):
         chain.tool_size_slopes(quantity, q, qdot, qddot)
-    whole = MotionSlopes(motion.gradient, *slopes)
-    table = apply_chain_rule([((*partials, None), None)], [N], whole)
-    every = np.ones((2, 3, POINTS, 2))
+    every = np.arange(N)
+    torque = ScaledQuantity("torque", every, np.zeros(N), np.ones(N), chain)
+    groups = Groups([torque, None], [N, N])
+    groups.values((q, qdot, qddot))
+    slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
     places = np.arange(POINTS)
-    find_entries(table, every, places, places % 2, np.ones((3, POINTS)))
+    of_curves = CurvePlaces(places, places % 2, POINTS, 2)
+    shared = np.ones((2, 3, POINTS, 2))
+    variables = VariableSlopes(shared, of_curves, np.ones((3, POINTS)))
+    states = (q, qdot, qddot)
+    groups.differentiate(slopes, states, [((*partials, None), None)], variables)
     mask = np.ones(N)
     follow_turns(q.copy(), mask, q[0])
     set_turns(q.copy(), (qdot, qddot), places, q[0], mask, 0.0 * mask)
@@ -84,7 +92,8 @@ def work() -> None:
     )
     spline = Spline.through(np.linspace(0.0, 1.0, POINTS), q)
     spline(np.linspace(0.0, 1.0, POINTS), nu=1)
-    sum_basis(rng.normal(size=(4, POINTS, 4)), places % 10, rng.normal(size=(2, 14)))
+    basis = Basis(rng.normal(size=(4, POINTS, 4)), places % 10)
+    basis.sum(rng.normal(size=(2, 14)))
     Formula.of(lambda a: formula.sqrt(a * a + 1.0) / formula.cos(a), N)(q)
 
 

@@ -189,10 +189,8 @@ def test_solves_with_few_rows_begin_with_small_steps(rows, monkeypatch):
         steps.append(monitor.options.first_step)
         return monitor.report("fake", SolveStatus.OPTIMAL, x, None, "")
 
-    def solve_some(problem, x, solve, _tolerance):
-        return solve(
-            problem if rows is None else NearRows(problem, np.array(rows), 1e-6), x
-        )
+    def solve_some(problem, x, solve):
+        return solve(problem if rows is None else NearRows(problem, np.array(rows)), x)
 
     monkeypatch.setattr(module, "solve_near_rows", solve_some)
     SolverSession(Solver("fake", run), SolverOptions(), NEVER)(program, x)

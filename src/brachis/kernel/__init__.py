@@ -5,7 +5,13 @@ formulas.
 """
 
 from brachis.kernel.chain import Chain
-from brachis.kernel.chain_rule import MotionSlopes, apply_chain_rule, find_entries
+from brachis.kernel.chain_rule import (
+    CurvePlaces,
+    Groups,
+    MotionSlopes,
+    ScaledQuantity,
+    VariableSlopes,
+)
 from brachis.kernel.formula import Formula
 from brachis.kernel.halving import halve_intervals
 from brachis.kernel.lattice import largest_parts
@@ -13,24 +19,27 @@ from brachis.kernel.newton import Prescribed, find_postures
 from brachis.kernel.passes import bounds_of_pairs, go_backwards, go_forwards
 from brachis.kernel.path_motion import Conditions, PathMotion, find_least_singular
 from brachis.kernel.rotations import body_twists, rotation_derivatives
-from brachis.kernel.splines import Spline, blossom, collocation, sum_basis
+from brachis.kernel.splines import Basis, Spline, blossom, collocation
 from brachis.kernel.tool import rotation_vectors, tool_derivatives
 from brachis.kernel.turns import follow_turns, pick_nearest, set_turns
 
 __all__ = [
+    "Basis",
     "Chain",
     "Conditions",
+    "CurvePlaces",
     "Formula",
+    "Groups",
     "MotionSlopes",
     "PathMotion",
     "Prescribed",
+    "ScaledQuantity",
     "Spline",
-    "apply_chain_rule",
+    "VariableSlopes",
     "blossom",
     "body_twists",
     "bounds_of_pairs",
     "collocation",
-    "find_entries",
     "find_least_singular",
     "find_postures",
     "follow_turns",
@@ -42,6 +51,5 @@ __all__ = [
     "rotation_derivatives",
     "rotation_vectors",
     "set_turns",
-    "sum_basis",
     "tool_derivatives",
 ]

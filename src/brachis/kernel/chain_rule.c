@@ -1,5 +1,9 @@
 /* From slopes by the joints to slopes by the curves, and from these to entries of a sparse Jacobian. */
 
+#include <stddef.h>
+
+#include "motion.h"
+
 /* Partial derivatives, (K, values, n), of values by the joints' positions, or rates, ...; null where they vanish. `step` is 0
 where they are the same at all points, else values * n. */
 typedef struct {
@@ -7,18 +11,19 @@ typedef struct {
     long step;
 } partial;
 
-/* A group of values: its partials by q, qdot, qddot and qdddot, and by s, (K, values), or null. */
+enum { TORQUE = 4 };
+
+/* A group of values. Either quantities of one joint each, less an offset, times a factor: the derivative of q of the order
+`quantity`, up to 3, or the torque. Or, where `quantity` is negative, their partials by q, qdot, qddot and qdddot, and by s,
+(K, values), or null. */
 typedef struct {
+    long values;
+    long quantity;
+    const long *joints;             /* (values) */
+    const double *offsets, *factors; /* (values) */
     partial by[4];
     const double *by_s;
-    long values;
 } group;
-
-/* Derivatives of the joint motion by the curves, (K, n, width) each; see kinematics/joint_map.py. The last one counts only
-where a partial by the jerk is given. */
-typedef struct {
-    const double *gradient, *qdot_y, *qddot_y, *qddot_ydot, *qdddot_y;
-} motion_slopes;
 
 /* Call a function with the width as a constant for widths of 2 to 5: the compiler unrolls the loops over the curves. */
 #define WITH_WIDTH(function, ...) \
@@ -50,6 +55,16 @@ UNROLLED add_product(
     }
 }
 
+/* found += factor times the slopes of single joints, (values, width). */
+UNROLLED add_rows(long width, const group *own, double factor, const double *slopes, double *found)
+{
+    for (long i = 0; i < own->values; i++) {
+        for (long l = 0; l < width; l++) {
+            found[i * width + l] += factor * own->factors[i] * slopes[own->joints[i] * width + l];
+        }
+    }
+}
+
 UNROLLED chain_rule(
     long width, long count, long n, long groups, const group *of, const motion_slopes *motion, long orders, long columns,
     double *table
@@ -58,74 +73,77 @@ UNROLLED chain_rule(
     for (long i = 0; i < orders * count * columns * width; i++) {
         table[i] = 0.0;
     }
+    /* Slopes of q, its derivatives and the torque by y, ydot, ...; those of the jerk follow Leibniz' rule. */
+    const double *torque = motion->torque;
+    const double *slopes[5][4] = {
+        {motion->gradient},
+        {motion->qdot_y, motion->gradient},
+        {motion->qddot_y, motion->qddot_ydot, motion->gradient},
+        {motion->qdddot_y, motion->qddot_y, motion->qdot_y, motion->gradient},
+        {torque, torque + count * n * width, torque + 2 * count * n * width},
+    };
     for (long k = 0; k < count; k++) {
-        double *found[4];
-        for (long order = 0; order < orders; order++) {
-            found[order] = table + (order * count + k) * columns * width;
-        }
         long at = k * n * width;
+        long column = 0;
         for (const group *own = of; own < of + groups; own++) {
-            const partial *by = own->by;
             long values = own->values;
             for (long i = 0; i < values && own->by_s; i++) {
-                found[0][i * width] = own->by_s[k * values + i];
+                table[(k * columns + column + i) * width] = own->by_s[k * values + i];
             }
-            if (by[0].numbers) {
-                add_product(width, &by[0], k, values, n, 1.0, motion->gradient + at, found[0]);
+            for (int quantity = 0; quantity <= TORQUE; quantity++) {
+                const partial *by = quantity < TORQUE ? &own->by[quantity] : NULL;
+                int is_own = own->quantity == quantity;
+                if (!is_own && !(by && by->numbers)) {
+                    continue;
+                }
+                for (int order = 0; order < 4 && slopes[quantity][order]; order++) {
+                    double factor = quantity == 3 && (order == 1 || order == 2) ? 3.0 : 1.0;
+                    double *found = table + ((order * count + k) * columns + column) * width;
+                    if (is_own) {
+                        add_rows(width, own, factor, slopes[quantity][order] + at, found);
+                    } else {
+                        add_product(width, by, k, values, n, factor, slopes[quantity][order] + at, found);
+                    }
+                }
             }
-            if (by[1].numbers) {
-                add_product(width, &by[1], k, values, n, 1.0, motion->qdot_y + at, found[0]);
-                add_product(width, &by[1], k, values, n, 1.0, motion->gradient + at, found[1]);
-            }
-            if (by[2].numbers) {
-                add_product(width, &by[2], k, values, n, 1.0, motion->qddot_y + at, found[0]);
-                add_product(width, &by[2], k, values, n, 1.0, motion->qddot_ydot + at, found[1]);
-                add_product(width, &by[2], k, values, n, 1.0, motion->gradient + at, found[2]);
-            }
-            if (by[3].numbers) {
-                add_product(width, &by[3], k, values, n, 1.0, motion->qdddot_y + at, found[0]);
-                add_product(width, &by[3], k, values, n, 3.0, motion->qddot_y + at, found[1]);
-                add_product(width, &by[3], k, values, n, 3.0, motion->qdot_y + at, found[2]);
-                add_product(width, &by[3], k, values, n, 1.0, motion->gradient + at, found[3]);
-            }
-            for (long order = 0; order < orders; order++) {
-                found[order] += values * width;
-            }
+            column += values;
         }
     }
 }
 
-/* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width). */
-void brachis_chain_rule(
-    long count, long n, long width, long groups, const group *of, const motion_slopes *motion, long orders, long columns,
-    double *table
-)
-{
-    WITH_WIDTH(chain_rule, count, n, groups, of, motion, orders, columns, table)
-}
+/* Where variables move the curves and their time derivatives up to an order below `orders`. First those that move all curves, at each of the K points: `shared`, (broad, orders, K,
+width), are slopes of the curves and their time derivatives by them. Each of the others moves one curve at one point, by
+`basis`, (orders, z). */
+typedef struct {
+    long orders;
+    long broad;
+    const double *shared;
+    long entries; /* z */
+    const long *points, *curves;
+    const double *basis;
+} variables;
 
 UNROLLED entries_of(
-    long width, long orders, long count, long columns, const double *table, long broad, const double *shared,
-    long entries, const long *points, const long *curves, const double *basis, double *found
+    long width, long count, long columns, const double *table, const variables *by, double *found
 )
 {
-    double *of_one = found + broad * count * columns;
-    for (double *own = found; own < of_one + entries * columns; own++) {
+    double *of_one = found + by->broad * count * columns;
+    for (double *own = found; own < of_one + by->entries * columns; own++) {
         *own = 0.0;
     }
-    for (long order = 0; order < orders; order++) {
-        for (long row = 0; row < broad * count; row++) {
+    for (long order = 0; order < by->orders; order++) {
+        for (long row = 0; row < by->broad * count; row++) {
             const double *slopes = table + (order * count + row % count) * columns * width;
-            const double *factors = shared + ((row / count * orders + order) * count + row % count) * width;
+            const double *factors = by->shared + ((row / count * by->orders + order) * count + row % count) * width;
             for (long i = 0; i < columns; i++) {
                 for (long j = 0; j < width; j++) {
                     found[row * columns + i] += slopes[i * width + j] * factors[j];
                 }
             }
         }
-        for (long z = 0; z < entries; z++) {
-            const double *slopes = table + (order * count + points[z]) * columns * width + curves[z];
-            double factor = basis[order * entries + z];
+        for (long z = 0; z < by->entries; z++) {
+            const double *slopes = table + (order * count + by->points[z]) * columns * width + by->curves[z];
+            double factor = by->basis[order * by->entries + z];
             for (long i = 0; i < columns; i++) {
                 of_one[z * columns + i] += factor * slopes[i * width];
             }
@@ -133,13 +151,57 @@ UNROLLED entries_of(
     }
 }
 
-/* Entries of a Jacobian, (broad K + z, columns). First those of variables that move all curves, at each of the K points:
-`shared`, (broad, orders, K, width), are slopes of the curves and their time derivatives by them. Each of the others moves one
-curve at one point, by `basis`, (orders, z). */
+/* Entries of a Jacobian, (broad K + z, columns), from slopes by the curves. */
 void brachis_entries(
-    long orders, long count, long columns, long width, const double *table, long broad, const double *shared,
-    long entries, const long *points, const long *curves, const double *basis, double *found
+    long count, long columns, long width, const double *table, const variables *by, double *found
 )
 {
-    WITH_WIDTH(entries_of, orders, count, columns, table, broad, shared, entries, points, curves, basis, found)
+    WITH_WIDTH(entries_of, count, columns, table, by, found)
+}
+
+/* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width); and entries
+by variables, if they are asked for. Along a path the motion is `along`, and differentiated if that has not been done; else its
+slopes are given, and `states` are q, qdot and qddot. Torques are those of the arm, with room for their slopes. */
+void brachis_differentiate(
+    long count, long n, long width, path_motion *along, const chain *arm, const double **states, motion_slopes *motion,
+    long groups, const group *of, long orders, long columns, double *table, const variables *by, double *found
+)
+{
+    if (along) {
+        brachis_path_derivatives(along);
+        states[0] = along->q;
+        states[1] = along->qdot;
+        states[2] = along->qddot;
+        motion->gradient = along->gradients;
+        motion->qdot_y = along->qdot_y;
+        motion->qddot_y = along->qddot_y;
+        motion->qddot_ydot = along->qddot_ydot;
+    }
+    if (arm) {
+        brachis_torque_slopes(arm, count, width, states, motion);
+    }
+    WITH_WIDTH(chain_rule, count, n, groups, of, motion, orders, columns, table)
+    if (by) {
+        brachis_entries(count, columns, width, table, by, found);
+    }
+}
+
+/* Values of the groups that are quantities of joints, each (K, values), one behind the other; `quantities` are q and its three
+derivatives and the torque, (K, n), which is computed with an arm. */
+void brachis_values(
+    long count, long n, const chain *arm, double *const *quantities, long groups, const group *of, double *found
+)
+{
+    if (arm) {
+        brachis_torques(arm, count, quantities[0], quantities[1], quantities[2], quantities[TORQUE]);
+    }
+    for (const group *own = of; own < of + groups; own++) {
+        for (long k = 0; k < count && own->quantity >= 0; k++) {
+            const double *quantity = quantities[own->quantity] + k * n;
+            for (long i = 0; i < own->values; i++) {
+                found[k * own->values + i] = (quantity[own->joints[i]] - own->offsets[i]) * own->factors[i];
+            }
+        }
+        found += count * own->values;
+    }
 }

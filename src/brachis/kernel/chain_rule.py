@@ -1,18 +1,58 @@
-"""Slopes by curves from slopes by joints, and entries of a Jacobian; see `brachis.optimise.evaluator`."""
+"""Values of limits, their slopes by curves from slopes by joints, and entries of a Jacobian.
+
+See `brachis.optimise.evaluator`.
+"""
 
 from __future__ import annotations
 
-import itertools
-import math
+import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.chain import Chain
+from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
+from brachis.kernel.path_motion import PathMotion
 
-_PARTIAL = (("numbers", np.intp), ("step", "l"))
-"""`partial` of chain_rule.c."""
+QUANTITIES = ("q", "qdot", "qddot", "qdddot", "torque")
+"""In the order of chain_rule.c."""
+_TORQUE = len(QUANTITIES) - 1
+_PARTIAL = ("q", "qdot", "qddot", "qdddot")
+_GROUP = np.dtype(
+    [
+        ("values", "l"),
+        ("quantity", "l"),
+        *((name, np.intp) for name in ("joints", "offsets", "factors")),
+        *((f"{name}_{part}", "l") for name in _PARTIAL for part in ("at", "step")),
+        ("s", np.intp),
+    ]
+)
+"""`group` of chain_rule.c."""
+
+Partial = np.ndarray | None
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledQuantity:
+    """Values that are each a quantity of one joint, less an offset, times a factor.
+
+    Attributes
+    ----------
+    quantity : str
+        One of `QUANTITIES`.
+    joints : (c,) int ndarray
+    offsets, factors : (c,) ndarray
+    chain : Chain
+        Of the joints; of which torques are.
+    """
+
+    quantity: str
+    joints: np.ndarray
+    offsets: np.ndarray
+    factors: np.ndarray
+    chain: Chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +64,8 @@ class MotionSlopes:
     gradient, qdot_y, qddot_y, qddot_ydot : (K, n, c) ndarray
     qdddot_y : (K, n, c) ndarray or None
         Where a value depends on the jerk.
+    path_motion : PathMotion or None
+        Along a path the motion whose slopes they are, which is differentiated when they are needed.
     """
 
     gradient: np.ndarray
@@ -31,138 +73,309 @@ class MotionSlopes:
     qddot_y: np.ndarray
     qddot_ydot: np.ndarray
     qdddot_y: np.ndarray | None = None
+    path_motion: PathMotion | None = None
 
 
-Partial = np.ndarray | None
-_PARTS = ("q", "qdot", "qddot", "qdddot")
-_GROUP = np.dtype(
-    [
-        *((f"{part}_{name}", kind) for part in _PARTS for name, kind in _PARTIAL),
-        ("s", np.intp),
-        ("values", "l"),
-    ]
-)
-"""`group` of chain_rule.c."""
-
-
-def apply_chain_rule(
-    partials: Sequence[tuple[Sequence[Partial], Partial]],
-    sizes: Sequence[int],
-    motion: MotionSlopes,
-) -> np.ndarray:
-    """Differentiate values by the curves and their time derivatives.
+class CurvePlaces:
+    """Where each of z variables matters: at which of K points, and for which of c curves.
 
     Parameters
     ----------
-    partials : sequence of (sequence of ndarray or None, ndarray or None)
-        Of groups of values, (K, size, n), by q, qdot, qddot and qdddot, and (K, size) by the first curve.
-    sizes : sequence of int
-        Numbers of values in the groups.
-    motion : MotionSlopes
-
-    Returns
-    -------
-    (3 or 4, K, sum of sizes, c) ndarray
-        Slopes by y, ydot, yddot and, with `qdddot_y`, ydddot.
+    points, curves : (z,) int ndarray
+    count, width : int
+        K and c.
     """
-    count, n, width = motion.gradient.shape
-    asks_for_jerk = any(by_joints[-1] is not None for by_joints, _ in partials)
-    if asks_for_jerk and motion.qdddot_y is None:
-        raise ValueError("partials by qdddot need qdddot_y")
-    kept: list[np.ndarray] = []
-    groups = []
-    for (by_joints, by_s), size in zip(partials, sizes, strict=True):
-        places = [_place_partials(own, (count, size, n), kept) for own in by_joints]
-        along = _place(by_s, (count, size), kept)
-        groups.append((*itertools.chain.from_iterable(places), along, size))
-    own_groups = np.array(groups, dtype=_GROUP)
-    slopes = np.array(
-        [_place(own, (count, n, width), kept) for own in vars(motion).values()],
-        dtype=np.intp,
-    )
-    orders = 3 if motion.qdddot_y is None else 4
-    table = np.empty((orders, count, sum(sizes), width))
-    load().brachis_chain_rule(
-        count,
-        n,
-        width,
-        len(groups),
-        address(own_groups),
-        address(slopes),
-        orders,
-        table.shape[2],
-        address(table),
-    )
-    return table
+
+    def __init__(
+        self, points: np.ndarray, curves: np.ndarray, count: int, width: int
+    ) -> None:
+        if points.shape != curves.shape:
+            raise ValueError("points and curves are not as many")
+        for numbers, most, name in (points, count, "point"), (curves, width, "curve"):
+            if len(numbers) and not 0 <= numbers.min() <= numbers.max() < most:
+                raise ValueError(f"a {name} does not exist; there are {most}")
+        self.size = len(points)
+        self.shape = count, width
+        self._kept = [
+            own.astype("l", order="C", casting="same_kind") for own in (points, curves)
+        ]
+
+    @property
+    def addresses(self) -> list[int]:
+        """Where the library finds points and curves."""
+        return [address(own) for own in self._kept]
 
 
-def _place(values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]) -> int:
-    """Return where numbers are, 0 without any; what is added to `kept` has to stay alive."""
+@dataclass(frozen=True, eq=False)
+class VariableSlopes:
+    """Slopes of c curves and their time derivatives, at K points, by variables.
+
+    Orders that values do not depend on are left out.
+
+    Attributes
+    ----------
+    shared : (b, orders, K, c) ndarray
+        By the b variables that move all curves, at all points.
+    places : CurvePlaces
+        Of the other z variables.
+    basis : (orders, z) ndarray
+        Slopes of the curve of each, and of its time derivatives, by it.
+    """
+
+    shared: np.ndarray
+    places: CurvePlaces
+    basis: np.ndarray
+
+    @property
+    def entries(self) -> int:
+        """How many entries a value has in the Jacobian, b K + z."""
+        return len(self.shared) * self.places.shape[0] + self.places.size
+
+    def arguments(self, orders: int, kept: list[np.ndarray]) -> Any:
+        """`variables` of chain_rule.c; what is added to `kept` has to stay alive."""
+        orders = min(orders, len(self.basis))
+        broad = len(self.shared)
+        shared = as_doubles(
+            self.shared[:, :orders], (broad, orders, *self.places.shape)
+        )
+        basis = as_doubles(self.basis[:orders], (orders, self.places.size))
+        kept += [shared, basis]
+        size = self.places.size
+        points, curves = self.places.addresses
+        return (ctypes.c_long * 7)(
+            orders, broad, address(shared), size, points, curves, address(basis)
+        )
+
+    def find_entries(self, slopes: np.ndarray) -> np.ndarray:
+        """Entries of a Jacobian, (b K + z, values), of values with slopes by the curves, (orders, K, values, c)."""
+        orders, count, columns, width = slopes.shape
+        if (count, width) != self.places.shape:
+            raise ValueError("slopes are of other points or curves")
+        kept: list[np.ndarray] = []
+        table = as_doubles(slopes, slopes.shape)
+        found = np.empty((self.entries, columns))
+        load().brachis_entries(
+            count,
+            columns,
+            width,
+            address(table),
+            self.arguments(orders, kept),
+            address(found),
+        )
+        return found
+
+
+class Groups:
+    """Groups of values of a joint motion.
+
+    Parameters
+    ----------
+    scaled : sequence of ScaledQuantity or None
+        Groups of which nothing is given here have partials.
+    sizes : sequence of int
+        How many values are in each.
+
+    Attributes
+    ----------
+    chain : Chain or None
+        Of which torques are; None where no group needs them.
+    has_jerk : bool
+        Whether a scaled quantity is a jerk.
+    """
+
+    def __init__(
+        self, scaled: Sequence[ScaledQuantity | None], sizes: Sequence[int]
+    ) -> None:
+        self._scaled = tuple(scaled)
+        self._sizes = tuple(sizes)
+        self._kept: list[np.ndarray] = []
+        self._first = np.cumsum([0, *sizes]).tolist()
+        self._table = np.zeros(len(self._sizes), dtype=_GROUP)
+        self._table["values"] = self._sizes
+        self._table["quantity"] = -1
+        self.chain: Chain | None = None
+        self.has_jerk = False
+        self._open = [number for number, own in enumerate(scaled) if own is None]
+        for row, own in zip(self._table, scaled, strict=True):
+            if own is not None:
+                self._set(row, own)
+
+    def __reduce__(self) -> tuple[type[Groups], tuple[Any, ...]]:
+        """Leave addresses behind."""
+        return Groups, (self._scaled, self._sizes)
+
+    def _set(self, row: np.void, own: ScaledQuantity) -> None:
+        """Set what the library reads of a scaled quantity."""
+        quantity = QUANTITIES.index(own.quantity)
+        joints = np.ascontiguousarray(own.joints, dtype="l")
+        count = row["values"]
+        if len(joints) and not 0 <= joints.min() <= joints.max() < own.chain.n:
+            raise ValueError(f"a joint does not exist; there are {own.chain.n}")
+        offsets = as_doubles(own.offsets, (count,))
+        factors = as_doubles(own.factors, (count,))
+        if joints.shape != (count,):
+            raise ValueError("joints are not as many as values")
+        row["quantity"] = quantity
+        row["joints"] = address(joints)
+        row["offsets"] = address(offsets)
+        row["factors"] = address(factors)
+        self._kept += [joints, offsets, factors]
+        self.has_jerk |= own.quantity == "qdddot"
+        if quantity == _TORQUE:
+            self.chain = own.chain
+
+    def values(
+        self, states: Sequence[np.ndarray], torque: Partial = None
+    ) -> tuple[tuple[np.ndarray, ...], Partial]:
+        """Compute the values of scaled quantities.
+
+        Parameters
+        ----------
+        states : sequence of (K, n) ndarray
+            q, qdot, qddot and, where a group needs it, qdddot.
+        torque : (K, n) ndarray, optional
+            If it is known.
+
+        Returns
+        -------
+        values : tuple of (K, size) ndarray
+            Of every group; nothing is set where it has partials.
+        torque : (K, n) ndarray or None
+            If it is known now.
+        """
+        count, n = states[0].shape
+        arm = None
+        given = [as_doubles(own, (count, n)) for own in states]
+        if self.has_jerk and len(given) < _TORQUE:
+            raise ValueError("a group needs qdddot")
+        if torque is None and self.chain is not None:
+            torque = np.empty((count, n))
+            arm = self.chain.address
+        places = [address(own) for own in given] + [0] * (_TORQUE - len(given))
+        if torque is not None:
+            places.append(address(as_doubles(torque, (count, n))))
+        found = np.empty(count * self._first[-1])
+        load().brachis_values(
+            count,
+            n,
+            arm,
+            (ctypes.c_void_p * len(places))(*places),
+            len(self._table),
+            address(self._table),
+            address(found),
+        )
+        parts = zip(self._first, self._sizes, strict=False)
+        values = [
+            found[count * first : count * (first + size)].reshape(count, size)
+            for first, size in parts
+        ]
+        return tuple(values), torque
+
+    def differentiate(
+        self,
+        motion: MotionSlopes,
+        states: Sequence[np.ndarray],
+        partials: Sequence[tuple[Sequence[Partial], Partial]],
+        variables: VariableSlopes | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Differentiate the values by the curves and their time derivatives.
+
+        Parameters
+        ----------
+        motion : MotionSlopes
+        states : sequence of (K, n) ndarray
+            q, qdot and qddot.
+        partials : sequence of (sequence of ndarray or None, ndarray or None)
+            Of the groups that are no scaled quantities, (K, size, n), by q, qdot, qddot and qdddot, and (K, size) by
+            the first curve.
+        variables : VariableSlopes, optional
+
+        Returns
+        -------
+        slopes : (3 or 4, K, sum of sizes, c) ndarray
+            By y, ydot, yddot and, with `qdddot_y`, ydddot.
+        entries : (b K + z, sum of sizes) ndarray
+            See `VariableSlopes.find_entries`; (0, 0) without variables.
+        """
+        count, n, width = motion.gradient.shape
+        kept: list[np.ndarray] = []
+        table = self._table
+        has_jerk = self.has_jerk
+        if self._open:
+            table = table.copy()
+            for number, (by_joints, by_s) in zip(self._open, partials, strict=True):
+                has_jerk |= by_joints[-1] is not None
+                _set_partials(table[number], by_joints, by_s, (count, n), kept)
+        if has_jerk and motion.qdddot_y is None:
+            raise ValueError("values that depend on qdddot need qdddot_y")
+        shape = count, n, width
+        along = motion.path_motion
+        slopes: list[int | None] = [None] * 4
+        of_states: list[int | None] = [None] * 3
+        if along is None:
+            parts = motion.gradient, motion.qdot_y, motion.qddot_y, motion.qddot_ydot
+            slopes = [_place(own, shape, kept) for own in parts]
+            of_states = [_place(own, (count, n), kept) for own in states]
+        slopes.append(_place(motion.qdddot_y, shape, kept))
+        arm = None
+        if self.chain is not None:
+            torque = np.empty((3, *shape))
+            slopes.append(address(torque))
+            arm = self.chain.address
+        columns = self._first[-1]
+        orders = 3 if motion.qdddot_y is None else 4
+        found = np.empty((orders, count, columns, width))
+        entries = np.empty((0, columns))
+        by = None
+        if variables is not None:
+            if variables.places.shape != (count, width):
+                raise ValueError("variables are of other points or curves")
+            entries = np.empty((variables.entries, columns))
+            by = variables.arguments(orders, kept)
+        load().brachis_differentiate(
+            count,
+            n,
+            width,
+            None if along is None else along.address,
+            arm,
+            (ctypes.c_void_p * 3)(*of_states),
+            (ctypes.c_void_p * 6)(*slopes),
+            len(table),
+            address(table),
+            orders,
+            columns,
+            address(found),
+            by,
+            address(entries),
+        )
+        return found, entries
+
+
+def _place(
+    values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]
+) -> int | None:
+    """Return where numbers are, None without any; what is added to `kept` has to stay alive."""
     if values is None:
-        return 0
+        return None
     kept.append(as_doubles(values, shape))
     return address(kept[-1])
 
 
-def _place_partials(
-    values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]
-) -> tuple[int, int]:
-    """Return where partials are, and how far those of one point are from those of the next; see `_place`."""
-    if values is None:
-        return 0, 0
-    is_constant = values.strides[0] == 0 and shape[0] > 1
-    if is_constant and values.shape == shape:
-        return _place(values[0], shape[1:], kept), 0
-    return _place(values, shape, kept), math.prod(shape[1:])
-
-
-def find_entries(
-    slopes: np.ndarray,
-    shared: np.ndarray,
-    points: np.ndarray,
-    curves: np.ndarray,
-    basis: np.ndarray,
-) -> np.ndarray:
-    """Entries of a Jacobian, (b K + z, c): first of b variables that move all curves, then of variables of one curve.
-
-    Parameters
-    ----------
-    slopes : (orders, K, c, width) ndarray
-        As of `apply_chain_rule`.
-    shared : (b, orders, K, width) ndarray
-        Slopes of the curves and their time derivatives by the b variables, at all points.
-    points, curves : (z,) int64 ndarray
-        At which point the others matter, and for which curve.
-    basis : (orders, z) ndarray
-        Slopes of this curve and its time derivatives by them.
-    """
-    orders, count, columns, width = slopes.shape
-    if not points.shape == curves.shape == basis.shape[1:]:
-        raise ValueError("points, curves and basis are not as many")
-    for numbers, most, name in (points, count, "point"), (curves, width, "curve"):
-        if len(numbers) and not 0 <= numbers.min() <= numbers.max() < most:
-            raise ValueError(f"a {name} does not exist; there are {most}")
-    broad = len(shared)
-    entries = len(points)
-    table = as_doubles(slopes, slopes.shape)
-    factors = as_doubles(shared, (broad, orders, count, width))
-    places = [
-        own.astype("l", order="C", casting="same_kind", copy=False)
-        for own in (points, curves)
-    ]
-    own_basis = as_doubles(basis, (orders, entries))
-    found = np.empty((broad * count + entries, columns))
-    load().brachis_entries(
-        orders,
-        count,
-        columns,
-        width,
-        address(table),
-        broad,
-        address(factors),
-        entries,
-        *map(address, places),
-        address(own_basis),
-        address(found),
-    )
-    return found
+def _set_partials(
+    row: np.void,
+    by_joints: Sequence[Partial],
+    by_s: Partial,
+    points: tuple[int, int],
+    kept: list[np.ndarray],
+) -> None:
+    """Set what the library reads of partials at K points of n joints; see `_place`."""
+    count, n = points
+    size = int(row["values"])
+    for name, partial in zip(_PARTIAL, by_joints, strict=True):
+        if partial is None:
+            continue
+        own, step = as_doubles_at_points(partial, (count, size, n))
+        kept.append(own)
+        row[f"{name}_at"] = address(own)
+        row[f"{name}_step"] = step
+    row["s"] = _place(by_s, (count, size), kept) or 0

@@ -16,7 +16,7 @@ Jacobi's identity. E and l are summed over the bodies.
 
 Rotors and friction of each joint come on top: armature qddot + viscous qdot + coulomb tanh(qdot / speed). */
 
-#include "chain.h"
+#include "motion.h"
 
 /* Symmetric matrix. */
 typedef struct {
@@ -225,73 +225,110 @@ void brachis_torques(
     }
 }
 
-/* Derivatives of the torques by q, qdot and qddot, (K, n, n) each: row joint torque, column joint. */
+/* Derivatives of the torques of LANES states by q, qdot and qddot, (n, n) each: row joint torque, column joint. */
+static void differentiate(
+    const chain *arm, long count, long k, const double **states, pack *by_q, pack *by_qdot, pack *by_qddot
+)
+{
+    long n = arm->joints;
+    twist axes[n], psi[n], phi[n];
+    bodies moved[n];
+    pack slopes[n];
+    displacement placed = at_zero();
+    twist v = {0};
+    twist a = gravity_upwards(arm);
+    for (long i = 0; i < n; i++) {
+        pack rate = gather(states[1], count, n, k, i);
+        pack acceleration = gather(states[2], count, n, k, i);
+        resist(arm, i, rate, acceleration, &slopes[i]);
+        axes[i] = move_axis(arm, i, gather(states[0], count, n, k, i), &placed);
+        psi[i] = cross_twists(v, axes[i]);
+        phi[i] = add_twists(cross_twists(a, axes[i]), cross_twists(v, psi[i]));
+        pass_joint(arm, i, &placed, axes[i], psi[i], rate, acceleration, &v, &a, &moved[i]);
+        moved[i].E = coriolis(&moved[i], v);
+    }
+    for (long i = n - 1; i >= 0; i--) {
+        if (i < n - 1) {
+            add_bodies(&moved[i], &moved[i + 1]);
+        }
+        bodies *own = &moved[i];
+        twist S = axes[i];
+        vec h = own->moment;
+        vec l = scale(own->momentum, all(2.0));
+        /* Rows: joints before this one, and itself. */
+        vec turning = add(times(&own->J, S.w), cross(h, S.v));
+        vec pushing = subtract(scale(S.v, own->mass), cross(h, S.w));
+        vec bent = {dot(own->E.x, S.w), dot(own->E.y, S.w), dot(own->E.z, S.w)};
+        bent = add(bent, cross(l, S.v));
+        for (long j = 0; j <= i; j++) {
+            long place = i * n + j;
+            by_q[place] = pair(phi[j], turning, pushing) + dot(bent, psi[j].w);
+            by_qdot[place] = 2.0 * pair(psi[j], turning, pushing) + dot(bent, axes[j].w);
+            by_qddot[place] = pair(axes[j], turning, pushing);
+            if (j == i) {
+                by_qdot[place] += slopes[i];
+                by_qddot[place] += arm->friction[4 * i];
+            }
+            by_qddot[j * n + i] = by_qddot[place];
+        }
+        /* Columns: what this joint does to those before it. */
+        vec torque = add(times(&own->J, phi[i].w), cross(h, phi[i].v));
+        torque = add(torque, apply(&own->E, psi[i].w));
+        torque = add(torque, add(cross(S.w, own->torque), cross(S.v, own->force)));
+        vec force = subtract(scale(phi[i].v, own->mass), cross(h, phi[i].w));
+        force = add(force, add(cross(psi[i].w, l), cross(S.w, own->force)));
+        vec rate_torque = scale(add(times(&own->J, psi[i].w), cross(h, psi[i].v)), all(2.0));
+        rate_torque = add(rate_torque, apply(&own->E, S.w));
+        vec rate_force = scale(subtract(scale(psi[i].v, own->mass), cross(h, psi[i].w)), all(2.0));
+        rate_force = add(rate_force, cross(S.w, l));
+        for (long j = 0; j < i; j++) {
+            by_q[j * n + i] = pair(axes[j], torque, force);
+            by_qdot[j * n + i] = pair(axes[j], rate_torque, rate_force);
+        }
+    }
+}
+
+/* Derivatives of the torques by q, qdot and qddot, (K, n, n) each. */
 void brachis_torque_derivatives(
     const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *by_q,
     double *by_qdot, double *by_qddot
 )
 {
-    long n = arm->joints;
-    long size = n * n;
+    long size = arm->joints * arm->joints;
+    const double *states[3] = {q, qdot, qddot};
     for (long k = 0; k < count; k += LANES) {
-        twist axes[n], psi[n], phi[n];
-        bodies moved[n];
-        pack slopes[n];
-        displacement placed = at_zero();
-        twist v = {0};
-        twist a = gravity_upwards(arm);
-        for (long i = 0; i < n; i++) {
-            pack rate = gather(qdot, count, n, k, i);
-            pack acceleration = gather(qddot, count, n, k, i);
-            resist(arm, i, rate, acceleration, &slopes[i]);
-            axes[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
-            psi[i] = cross_twists(v, axes[i]);
-            phi[i] = add_twists(cross_twists(a, axes[i]), cross_twists(v, psi[i]));
-            pass_joint(arm, i, &placed, axes[i], psi[i], rate, acceleration, &v, &a, &moved[i]);
-            moved[i].E = coriolis(&moved[i], v);
-        }
-        for (long i = n - 1; i >= 0; i--) {
-            if (i < n - 1) {
-                add_bodies(&moved[i], &moved[i + 1]);
-            }
-            bodies *own = &moved[i];
-            twist S = axes[i];
-            vec h = own->moment;
-            vec l = scale(own->momentum, all(2.0));
-            /* Rows: joints before this one, and itself. */
-            vec turning = add(times(&own->J, S.w), cross(h, S.v));
-            vec pushing = subtract(scale(S.v, own->mass), cross(h, S.w));
-            vec bent = {dot(own->E.x, S.w), dot(own->E.y, S.w), dot(own->E.z, S.w)};
-            bent = add(bent, cross(l, S.v));
-            for (long j = 0; j <= i; j++) {
-                long place = i * n + j;
-                pack q_part = pair(phi[j], turning, pushing) + dot(bent, psi[j].w);
-                pack rate_part = 2.0 * pair(psi[j], turning, pushing) + dot(bent, axes[j].w);
-                pack mass_part = pair(axes[j], turning, pushing);
-                if (j == i) {
-                    rate_part += slopes[i];
-                    mass_part += arm->friction[4 * i];
-                }
-                scatter(q_part, by_q, count, size, k, place);
-                scatter(rate_part, by_qdot, count, size, k, place);
-                scatter(mass_part, by_qddot, count, size, k, place);
-                scatter(mass_part, by_qddot, count, size, k, j * n + i);
-            }
-            /* Columns: what this joint does to those before it. */
-            vec torque = add(times(&own->J, phi[i].w), cross(h, phi[i].v));
-            torque = add(torque, apply(&own->E, psi[i].w));
-            torque = add(torque, add(cross(S.w, own->torque), cross(S.v, own->force)));
-            vec force = subtract(scale(phi[i].v, own->mass), cross(h, phi[i].w));
-            force = add(force, add(cross(psi[i].w, l), cross(S.w, own->force)));
-            vec rate_torque = scale(add(times(&own->J, psi[i].w), cross(h, psi[i].v)), all(2.0));
-            rate_torque = add(rate_torque, apply(&own->E, S.w));
-            vec rate_force = scale(subtract(scale(psi[i].v, own->mass), cross(h, psi[i].w)), all(2.0));
-            rate_force = add(rate_force, cross(S.w, l));
-            for (long j = 0; j < i; j++) {
-                scatter(pair(axes[j], torque, force), by_q, count, size, k, j * n + i);
-                scatter(pair(axes[j], rate_torque, rate_force), by_qdot, count, size, k, j * n + i);
-            }
-        }
+        pack parts[3 * size];
+        differentiate(arm, count, k, states, parts, parts + size, parts + 2 * size);
+        write_block(parts, by_q, count, size, k);
+        write_block(parts + size, by_qdot, count, size, k);
+        write_block(parts + 2 * size, by_qddot, count, size, k);
+    }
+}
+
+/* Slopes of the torques by y, ydot and yddot, in `motion`; `states` are q, qdot and qddot. */
+void brachis_torque_slopes(
+    const chain *arm, long count, long width, const double **states, const motion_slopes *motion
+)
+{
+    long n = arm->joints;
+    long size = n * width;
+    for (long k = 0; k < count; k += LANES) {
+        pack by_q[n * n], by_qdot[n * n], by_qddot[n * n];
+        pack G[size], rates[size], accelerations[size], found[size];
+        differentiate(arm, count, k, states, by_q, by_qdot, by_qddot);
+        read_block(motion->gradient, count, size, k, G);
+        read_block(motion->qdot_y, count, size, k, rates);
+        read_block(motion->qddot_y, count, size, k, accelerations);
+        multiply(by_q, n, G, n, n, width, SET, found);
+        multiply(by_qdot, n, rates, n, n, width, ADD, found);
+        multiply(by_qddot, n, accelerations, n, n, width, ADD, found);
+        write_block(found, motion->torque, count, size, k);
+        read_block(motion->qddot_ydot, count, size, k, accelerations);
+        multiply(by_qdot, n, G, n, n, width, SET, found);
+        multiply(by_qddot, n, accelerations, n, n, width, ADD, found);
+        write_block(found, motion->torque + count * size, count, size, k);
+        multiply(by_qddot, n, G, n, n, width, SET, found);
+        write_block(found, motion->torque + 2 * count * size, count, size, k);
     }
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -33,14 +34,15 @@ FUNCTIONS = {
     "brachis_go_forwards": "- llppppp",
     "brachis_rotations": "- llpp",
     "brachis_body_twists": "- llpp",
-    "brachis_newton": "- ppllpplpplddip",
+    "brachis_newton": "- ppllpplplplddip",
     "brachis_halve": "l plddlpp",
-    "brachis_path_motion": "- ppplppppppp",
-    "brachis_path_derivatives": "- lpplpppppppp",
+    "brachis_path_motion": "- p",
+    "brachis_path_derivatives": "- p",
     "brachis_least_singular": "- llppp",
-    "brachis_singular_slopes": "- lpplpppppp",
-    "brachis_chain_rule": "- llllppllp",
-    "brachis_entries": "- llllplplpppp",
+    "brachis_singular_slopes": "- ppppp",
+    "brachis_entries": "- lllppp",
+    "brachis_differentiate": "- lllpppplpllppp",
+    "brachis_values": "- llpplpp",
     "brachis_pick_nearest": "- lllppipp",
     "brachis_follow_turns": "- llppp",
     "brachis_set_turns": "i llppppppp",
@@ -138,3 +140,18 @@ def as_doubles(values: Any, shape: tuple[int, ...]) -> np.ndarray:
     if found.shape != shape:
         raise ValueError(f"an array has the shape {found.shape}; needed: {shape}")
     return found
+
+
+def as_doubles_at_points(
+    values: np.ndarray, shape: tuple[int, ...]
+) -> tuple[np.ndarray, int]:
+    """Return numbers at K points, (K, ...), as contiguous doubles, and how far it is from a point to the next one.
+
+    Where they are the same at all points, they are those of one, and the distance is 0. `values` may then be those of
+    one point too. Raises as `as_doubles` does.
+    """
+    if values.ndim == len(shape) - 1:
+        return as_doubles(values, shape[1:]), 0
+    if values.strides[0] == 0 and values.shape == shape and shape[0]:
+        return as_doubles(values[0], shape[1:]), 0
+    return as_doubles(values, shape), math.prod(shape[1:])

@@ -114,13 +114,13 @@ static int all_finite(const double *values, long count)
     return 1;
 }
 
-/* Find postures, (K, n), that meet targets, (K, c), and C q = levels with rows C, (K, r, n), from `starts`, (K, n); NaN where
-the method does not converge. A step is no longer than `largest_step`. `beside` gives a posture up whose steps do not
+/* Find postures, (K, n), that meet targets, (K, c), and C q = levels with rows C, (r, n), at every point, from `starts`, (K, n); NaN
+where the method does not converge. A step is no longer than `largest_step`. `beside` gives a posture up whose steps do not
 halve; tolerance and largest step are then in proportion to its size where that is above 1. */
 void brachis_newton(
     const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
-    const double *starts, long conditions, const double *rows, const double *levels, long steps, double tolerance,
-    double largest_step, int beside, double *found
+    const double *starts, long conditions, const double *rows, long rows_step, const double *levels, long steps,
+    double tolerance, double largest_step, int beside, double *found
 )
 {
     long n = arm->joints;
@@ -160,7 +160,7 @@ void brachis_newton(
                 long width = n + 1;
                 long m = write_task(asked, &tool, columns, n, lane, targets + own * coordinates, system);
                 for (long j = 0; j < conditions; j++) {
-                    const double *row = rows + (own * conditions + j) * n;
+                    const double *row = rows + own * rows_step + j * n;
                     double aside = levels[own * conditions + j];
                     for (long i = 0; i < n; i++) {
                         system[(m + j) * width + i] = row[i];

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from brachis.kernel.chain import Chain
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
 
 
 class _Prescribed(ctypes.Structure):
@@ -80,9 +80,9 @@ def find_postures(
     largest_step: float,
     beside: bool,
 ) -> np.ndarray:
-    """Find postures, (K, n), that meet targets, (K, c), under linear conditions: rows (K, r, n) and levels (K, r).
+    """Find postures, (K, n), that meet targets, (K, c), under linear conditions.
 
-    The others are as of `brachis.ik.newton.Newton.solve`.
+    These are rows, (K, r, n), and levels, (K, r). The others are as of `brachis.ik.newton.Newton.solve`.
     """
     rows, levels = conditions
     count = len(starts)
@@ -90,10 +90,10 @@ def find_postures(
     given = [
         as_doubles(targets, (count, prescribed.coordinates)),
         as_doubles(starts, (count, chain.n)),
-        as_doubles(rows, (count, free, chain.n)),
         as_doubles(levels, (count, free)),
     ]
-    targets_at, starts_at, rows_at, levels_at = map(address, given)
+    targets_at, starts_at, levels_at = map(address, given)
+    own_rows, step = as_doubles_at_points(rows, (count, free, chain.n))
     found = np.empty((count, chain.n))
     load().brachis_newton(
         chain.address,
@@ -103,7 +103,8 @@ def find_postures(
         targets_at,
         starts_at,
         free,
-        rows_at,
+        address(own_rows),
+        step,
         levels_at,
         steps,
         tolerance,

@@ -84,4 +84,47 @@ static inline void scatter(pack values, double *table, long rows, long columns, 
     }
 }
 
+/* A block of `count` numbers of LANES points of a table, (K, count). */
+static inline void read_block(const double *table, long points, long count, long k, pack *block)
+{
+    for (long i = 0; i < count; i++) {
+        block[i] = gather(table, points, count, k, i);
+    }
+}
+
+static inline void write_block(const pack *block, double *table, long points, long count, long k)
+{
+    for (long i = 0; i < count; i++) {
+        scatter(block[i], table, points, count, k, i);
+    }
+}
+
+static inline pack inner_product(const pack *a, const pack *b, long count)
+{
+    pack sum = all(0.0);
+    for (long i = 0; i < count; i++) {
+        sum += a[i] * b[i];
+    }
+    return sum;
+}
+
+enum { SET, ADD, SUBTRACT };
+
+/* c = A b, c += A b or c -= A b, for A (rows, inner) in rows of `width`, and b (inner, columns). */
+static inline void multiply(
+    const pack *A, long width, const pack *b, long rows, long inner, long columns, int how, pack *c
+)
+{
+    for (long i = 0; i < rows; i++) {
+        for (long j = 0; j < columns; j++) {
+            pack sum = how == SET ? all(0.0) : c[i * columns + j];
+            for (long l = 0; l < inner; l++) {
+                pack term = A[i * width + l] * b[l * columns + j];
+                sum = how == SUBTRACT ? sum - term : sum + term;
+            }
+            c[i * columns + j] = sum;
+        }
+    }
+}
+
 #endif

@@ -1,17 +1,7 @@
 /* Motion of all joints along a path, and its derivatives; the formulas stand in kinematics/path_map.py. */
 #include <math.h>
 
-#include "tool.h"
-
-/* What is known at K points; see path_motion.py. m rows of the tool are prescribed, r conditions are linear in the joints,
-and J_aug has the m rows of the task Jacobian, then those of the conditions. */
-typedef struct {
-    const double *xi, *xi_ds, *xi_dds; /* (K, m): motion of the tool per unit of the path coordinate s */
-    const double *rows;                /* (K, r, n): of the conditions */
-    const double *ydot, *yddot;        /* (K, 1 + r) */
-    const double *turning;             /* (2, K, r, n): first and second derivative of the rows by s; null where none */
-    const double *drift;               /* (3, K, r): e, e' and e''; null likewise */
-} course;
+#include "motion.h"
 
 /* Invert a matrix, (n, n), in place by elimination with pivots (Gauss, Jordan); returns its determinant, and infinite
 numbers where it is singular. */
@@ -57,54 +47,12 @@ static double invert(long n, double *A)
     return determinant;
 }
 
-/* Read a block of numbers of LANES points, (K, count). */
-static void read_block(const double *table, long points, long count, long k, pack *block)
+/* The motion in postures q. */
+void brachis_path_motion(path_motion *own)
 {
-    for (long i = 0; i < count; i++) {
-        block[i] = gather(table, points, count, k, i);
-    }
-}
-
-static void write_block(const pack *block, double *table, long points, long count, long k)
-{
-    for (long i = 0; i < count; i++) {
-        scatter(block[i], table, points, count, k, i);
-    }
-}
-
-/* c = A b, or c -= A b, for A (rows, inner) in rows of `width`, and b (inner, columns). */
-static void multiply(
-    const pack *A, long width, const pack *b, long rows, long inner, long columns, double sign, pack *c
-)
-{
-    for (long i = 0; i < rows; i++) {
-        for (long j = 0; j < columns; j++) {
-            pack sum = sign < 0.0 ? c[i * columns + j] : all(0.0);
-            for (long l = 0; l < inner; l++) {
-                pack term = A[i * width + l] * b[l * columns + j];
-                sum = sign < 0.0 ? sum - term : sum + term;
-            }
-            c[i * columns + j] = sum;
-        }
-    }
-}
-
-static pack inner_product(const pack *a, const pack *b, long count)
-{
-    pack sum = all(0.0);
-    for (long i = 0; i < count; i++) {
-        sum += a[i] * b[i];
-    }
-    return sum;
-}
-
-/* Columns, (6, K, n), of the tool's Jacobian at postures q, (K, n); inverse, (K, n, n), and determinant, (K), of J_aug;
-gradient G, (K, n, 1 + r), qdot and qddot, (K, n). */
-void brachis_path_motion(
-    const chain *arm, const prescribed *asked, const course *along, long count, const double *q, double *twists,
-    double *inverses, double *determinants, double *gradients, double *qdot, double *qddot
-)
-{
+    const chain *arm = own->arm;
+    const prescribed *asked = own->asked;
+    long count = own->count;
     long n = arm->joints;
     long used[6];
     double signs[6];
@@ -114,13 +62,15 @@ void brachis_path_motion(
     for (long k = 0; k < count; k += LANES) {
         twist columns[n];
         pack posture[n], J[n * n], inverse[n * n], G[n * c], rate[n], more[n], right[n], ydot[c], yddot[c];
-        read_block(q, count, n, k, posture);
-        read_block(along->ydot, count, c, k, ydot);
-        read_block(along->yddot, count, c, k, yddot);
+        read_block(own->q, count, n, k, posture);
+        read_block(own->ydot, count, c, k, ydot);
+        read_block(own->yddot, count, c, k, yddot);
         place_tool(arm, posture, asked->is_pose != 0, columns);
-        read_block(along->rows, count, r * n, k, J + m * n);
+        for (long i = 0; i < r * n; i++) {
+            J[m * n + i] = own->rows_step ? gather(own->rows, count, r * n, k, i) : all(own->rows[i]);
+        }
         for (long i = 0; i < n; i++) {
-            write_twist(columns[i], twists, count, n, k, i);
+            write_twist(columns[i], own->twists, count, n, k, i);
             for (long row = 0; row < m; row++) {
                 J[row * n + i] = signs[row] * part_of(&columns[i], used[row]);
             }
@@ -130,17 +80,17 @@ void brachis_path_motion(
             for (long i = 0; i < n * n; i++) {
                 matrix[i] = J[i][lane];
             }
-            determinants[k + lane] = invert(n, matrix);
+            own->determinants[k + lane] = invert(n, matrix);
             for (long i = 0; i < n * n; i++) {
-                inverses[(k + lane) * n * n + i] = matrix[i];
+                own->inverses[(k + lane) * n * n + i] = matrix[i];
             }
         }
-        read_block(inverses, count, n * n, k, inverse);
+        read_block(own->inverses, count, n * n, k, inverse);
 
         /* G = J_aug^-1 [xi, 0; -e, 1] */
-        read_block(along->xi, count, m, k, right);
+        read_block(own->xi, count, m, k, right);
         for (long i = 0; i < r; i++) {
-            right[m + i] = along->drift ? -gather(along->drift, count, r, k, i) : all(0.0);
+            right[m + i] = own->drift ? -gather(own->drift, count, r, k, i) : all(0.0);
         }
         for (long i = 0; i < n; i++) {
             G[i * c] = inner_product(inverse + i * n, right, n);
@@ -154,36 +104,39 @@ void brachis_path_motion(
         twist bias = bias_of(n, columns, rate, asked->is_pose != 0);
         pack sdot = ydot[0];
         for (long row = 0; row < m; row++) {
-            pack wanted = gather(along->xi_ds, count, m, k, row) * sdot * sdot;
+            pack wanted = gather(own->xi_ds, count, m, k, row) * sdot * sdot;
             right[row] = wanted - signs[row] * part_of(&bias, used[row]);
         }
         for (long i = 0; i < r; i++) {
             right[m + i] = all(0.0);
-            if (along->turning) {
+            if (own->turning) {
                 pack row[n];
                 for (long j = 0; j < n; j++) {
-                    row[j] = gather(along->turning, count, r * n, k, i * n + j);
+                    row[j] = gather(own->turning, count, r * n, k, i * n + j);
                 }
-                pack drift = gather(along->drift + count * r, count, r, k, i);
+                pack drift = gather(own->drift + count * r, count, r, k, i);
                 right[m + i] = -sdot * (2.0 * inner_product(row, rate, n) + drift * sdot);
             }
         }
         for (long i = 0; i < n; i++) {
             more[i] = inner_product(G + i * c, yddot, c) + inner_product(inverse + i * n, right, n);
         }
-        write_block(G, gradients, count, n * c, k);
-        write_block(rate, qdot, count, n, k);
-        write_block(more, qddot, count, n, k);
+        write_block(G, own->gradients, count, n * c, k);
+        write_block(rate, own->qdot, count, n, k);
+        write_block(more, own->qddot, count, n, k);
     }
 }
 
-/* Derivatives of qdot by y, and of qddot by ydot and by y, (K, n, 1 + r) each, of what `brachis_path_motion` found. */
-void brachis_path_derivatives(
-    long n, const prescribed *asked, const course *along, long count, const double *twists, const double *inverses,
-    const double *gradients, const double *qdot, const double *qddot, double *qdot_y, double *qddot_ydot,
-    double *qddot_y
-)
+/* Derivatives of qdot by y, and of qddot by y and by ydot, of what `brachis_path_motion` found; nothing where they are known. */
+void brachis_path_derivatives(path_motion *own)
 {
+    const prescribed *asked = own->asked;
+    long count = own->count;
+    long n = own->arm->joints;
+    if (own->is_differentiated) {
+        return;
+    }
+    own->is_differentiated = 1;
     long used[6];
     double signs[6];
     long m = rows_of(asked, used, signs);
@@ -193,14 +146,14 @@ void brachis_path_derivatives(
         twist columns[n], slopes[n], by_q[n], by_qdot[n];
         pack inverse[n * n], G[n * c], rate[n], more[n], right[n * c], V[n * n], A_q[n * n], A_v[n * n];
         pack first[n * c], second[n * c], third[n * c];
-        read_block(inverses, count, n * n, k, inverse);
-        read_block(gradients, count, n * c, k, G);
-        read_block(qdot, count, n, k, rate);
-        read_block(qddot, count, n, k, more);
-        pack sdot = gather(along->ydot, count, c, k, 0);
-        pack sddot = gather(along->yddot, count, c, k, 0);
+        read_block(own->inverses, count, n * n, k, inverse);
+        read_block(own->gradients, count, n * c, k, G);
+        read_block(own->qdot, count, n, k, rate);
+        read_block(own->qddot, count, n, k, more);
+        pack sdot = gather(own->ydot, count, c, k, 0);
+        pack sddot = gather(own->yddot, count, c, k, 0);
         for (long i = 0; i < n; i++) {
-            columns[i] = read_twist(twists, count, n, k, i);
+            columns[i] = read_twist(own->twists, count, n, k, i);
         }
         differentiate_tool(n, columns, rate, more, asked->is_pose != 0, slopes, by_q, by_qdot);
         for (long row = 0; row < m; row++) {
@@ -214,22 +167,22 @@ void brachis_path_derivatives(
         pack *C_s = V + m * n;
         pack *C_ss = A_q + m * n;
         pack e_s[r > 0 ? r : 1], e_ss[r > 0 ? r : 1];
-        if (along->turning) {
-            read_block(along->turning, count, r * n, k, C_s);
-            read_block(along->turning + count * r * n, count, r * n, k, C_ss);
-            read_block(along->drift + count * r, count, r, k, e_s);
-            read_block(along->drift + 2 * count * r, count, r, k, e_ss);
+        if (own->turning) {
+            read_block(own->turning, count, r * n, k, C_s);
+            read_block(own->turning + count * r * n, count, r * n, k, C_ss);
+            read_block(own->drift + count * r, count, r, k, e_s);
+            read_block(own->drift + 2 * count * r, count, r, k, e_ss);
         }
-        long rows = along->turning ? n : m;
+        long rows = own->turning ? n : m;
 
         /* (-V_q G + [xi_ds sdot, 0];  -C' G sdot - [C' qdot + e' sdot, 0]) */
         for (long i = 0; i < m * c; i++) {
             right[i] = all(0.0);
         }
         for (long row = 0; row < m; row++) {
-            right[row * c] = gather(along->xi_ds, count, m, k, row) * sdot;
+            right[row * c] = gather(own->xi_ds, count, m, k, row) * sdot;
         }
-        multiply(V, n, G, m, n, c, -1.0, right);
+        multiply(V, n, G, m, n, c, SUBTRACT, right);
         for (long i = 0; i < rows - m; i++) {
             for (long j = 0; j < c; j++) {
                 pack sum = all(0.0);
@@ -240,20 +193,20 @@ void brachis_path_derivatives(
             }
             right[(m + i) * c] -= inner_product(C_s + i * n, rate, n) + e_s[i] * sdot;
         }
-        multiply(inverse, n, right, n, rows, c, 1.0, first);
+        multiply(inverse, n, right, n, rows, c, SET, first);
 
         /* (-A_v G + [2 xi_ds sdot, 0];  twice the rows above) */
         for (long i = 0; i < m * c; i++) {
             right[i] = all(0.0);
         }
         for (long row = 0; row < m; row++) {
-            right[row * c] = 2.0 * gather(along->xi_ds, count, m, k, row) * sdot;
+            right[row * c] = 2.0 * gather(own->xi_ds, count, m, k, row) * sdot;
         }
-        multiply(A_v, n, G, m, n, c, -1.0, right);
+        multiply(A_v, n, G, m, n, c, SUBTRACT, right);
         for (long i = m * c; i < rows * c; i++) {
             right[i] *= 2.0;
         }
-        multiply(inverse, n, right, n, rows, c, 1.0, second);
+        multiply(inverse, n, right, n, rows, c, SET, second);
 
         /* (-A_q G - A_v dqdot/dy + [xi_dds sdot^2 + xi_ds sddot, 0];
             -2 C' sdot dqdot/dy - (C'' sdot^2 + C' sddot) G - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0]) */
@@ -261,11 +214,11 @@ void brachis_path_derivatives(
             right[i] = all(0.0);
         }
         for (long row = 0; row < m; row++) {
-            pack bend = gather(along->xi_dds, count, m, k, row);
-            right[row * c] = bend * sdot * sdot + gather(along->xi_ds, count, m, k, row) * sddot;
+            pack bend = gather(own->xi_dds, count, m, k, row);
+            right[row * c] = bend * sdot * sdot + gather(own->xi_ds, count, m, k, row) * sddot;
         }
-        multiply(A_q, n, G, m, n, c, -1.0, right);
-        multiply(A_v, n, first, m, n, c, -1.0, right);
+        multiply(A_q, n, G, m, n, c, SUBTRACT, right);
+        multiply(A_v, n, first, m, n, c, SUBTRACT, right);
         for (long i = 0; i < rows - m; i++) {
             for (long j = 0; j < c; j++) {
                 pack sum = all(0.0);
@@ -275,13 +228,13 @@ void brachis_path_derivatives(
                 }
                 right[(m + i) * c + j] = -sum;
             }
-            pack own = inner_product(C_s + i * n, more, n) + 2.0 * sdot * inner_product(C_ss + i * n, rate, n);
-            right[(m + i) * c] -= own + e_ss[i] * sdot * sdot + e_s[i] * sddot;
+            pack turned = inner_product(C_s + i * n, more, n) + 2.0 * sdot * inner_product(C_ss + i * n, rate, n);
+            right[(m + i) * c] -= turned + e_ss[i] * sdot * sdot + e_s[i] * sddot;
         }
-        multiply(inverse, n, right, n, rows, c, 1.0, third);
-        write_block(first, qdot_y, count, n * c, k);
-        write_block(second, qddot_ydot, count, n * c, k);
-        write_block(third, qddot_y, count, n * c, k);
+        multiply(inverse, n, right, n, rows, c, SET, third);
+        write_block(first, own->qdot_y, count, n * c, k);
+        write_block(second, own->qddot_ydot, count, n * c, k);
+        write_block(third, own->qddot_y, count, n * c, k);
     }
 }
 
@@ -351,21 +304,23 @@ void brachis_least_singular(long count, long n, const double *inverses, double *
 /* Slopes of the least singular values by the joints, (K, n), and by s, (K), where the matrices are J_aug of what
 `brachis_path_motion` found: with the left singular vector u = value J_aug^-T v, a value changes by u^T dJ_aug v. */
 void brachis_singular_slopes(
-    long n, const prescribed *asked, const course *along, long count, const double *twists, const double *inverses,
-    const double *values, const double *vectors, double *by_q, double *by_s
+    const path_motion *own, const double *values, const double *vectors, double *by_q, double *by_s
 )
 {
+    const prescribed *asked = own->asked;
+    long count = own->count;
+    long n = own->arm->joints;
     long used[6];
     double signs[6];
     long m = rows_of(asked, used, signs);
     for (long k = 0; k < count; k += LANES) {
         twist columns[n], slopes[n], unused_q[n], unused_qdot[n];
         pack inverse[n * n], v[n], still[n], u[n], found[n], turned[n * n];
-        read_block(inverses, count, n * n, k, inverse);
+        read_block(own->inverses, count, n * n, k, inverse);
         read_block(vectors, count, n, k, v);
         pack value = gather(values, count, 1, k, 0);
         for (long i = 0; i < n; i++) {
-            columns[i] = read_twist(twists, count, n, k, i);
+            columns[i] = read_twist(own->twists, count, n, k, i);
             still[i] = all(0.0);
             u[i] = all(0.0);
             found[i] = all(0.0);
@@ -383,8 +338,8 @@ void brachis_singular_slopes(
         }
         write_block(found, by_q, count, n, k);
         pack along_path = all(0.0);
-        if (along->turning) {
-            read_block(along->turning, count, (n - m) * n, k, turned);
+        if (own->turning) {
+            read_block(own->turning, count, (n - m) * n, k, turned);
             for (long i = m; i < n; i++) {
                 along_path += u[i] * inner_product(turned + (i - m) * n, v, n);
             }

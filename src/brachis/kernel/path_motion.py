@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from brachis.kernel.chain import Chain
-from brachis.kernel.library import address, as_doubles, load
+from brachis.kernel.library import address, as_doubles, as_doubles_at_points, load
 from brachis.kernel.newton import Prescribed
 
 
@@ -20,7 +20,7 @@ class Conditions:
     Attributes
     ----------
     rows : (K, r, n) ndarray
-        C.
+        C; (r, n) where it is constant.
     turning : (2, K, r, n) ndarray or None
         C' and C''; None where C is constant and p = 0.
     drift : (3, K, r) ndarray or None
@@ -32,34 +32,23 @@ class Conditions:
     drift: np.ndarray | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class _Given:
-    """What the library reads, contiguous; see `course` of path_motion.c."""
-
-    xi: np.ndarray
-    xi_ds: np.ndarray
-    xi_dds: np.ndarray
-    rows: np.ndarray
-    ydot: np.ndarray
-    yddot: np.ndarray
-    turning: np.ndarray | None = None
-    drift: np.ndarray | None = None
-
-    @cached_property
-    def structure(self) -> _Course:
-        """Return the addresses; they hold as long as this object lives."""
-        parts = (getattr(self, own.name) for own in fields(self))
-        return _Course(*(None if own is None else address(own) for own in parts))
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave addresses behind."""
-        return {own.name: getattr(self, own.name) for own in fields(self)}
+_GIVEN = ("q", "xi", "xi_ds", "xi_dds", "rows", "ydot", "yddot", "turning", "drift")
+_FOUND = ("twists", "inverse", "determinants", "gradient", "qdot", "qddot")
+_SLOPES = ("qdot_y", "qddot_y", "qddot_ydot")
 
 
-class _Course(ctypes.Structure):
-    """`course` of path_motion.c."""
+class _PathMotion(ctypes.Structure):
+    """`path_motion` of motion.h."""
 
-    _fields_ = [(own.name, ctypes.c_void_p) for own in fields(_Given)]
+    _fields_ = [
+        ("arm", ctypes.c_void_p),
+        ("asked", ctypes.c_void_p),
+        ("count", ctypes.c_long),
+        *((name, ctypes.c_void_p) for name in _GIVEN[:5]),
+        ("rows_step", ctypes.c_long),
+        *((name, ctypes.c_void_p) for name in (*_GIVEN[5:], *_FOUND, *_SLOPES)),
+        ("is_differentiated", ctypes.c_long),
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +59,10 @@ class PathMotion:
     ----------
     chain : Chain
     prescribed : Prescribed
-    given : _Given
-        From which it was computed.
+    given : tuple of (ndarray or None)
+        From which it was computed, contiguous: what is named in `_GIVEN`.
+    rows_step : int
+        From the rows of a point to those of the next one; 0 where they are the same.
     twists : (6, K, n) ndarray
         Columns of the tool's Jacobian.
     inverse : (K, n, n) ndarray
@@ -81,17 +72,21 @@ class PathMotion:
     gradient : (K, n, 1 + r) ndarray
         dq/dy.
     qdot, qddot : (K, n) ndarray
+    slopes : tuple of (K, n, 1 + r) ndarray
+        Room for dqdot/dy, dqddot/dy and dqddot/dydot.
     """
 
     chain: Chain
     prescribed: Prescribed
-    given: _Given
+    given: tuple[np.ndarray | None, ...]
+    rows_step: int
     twists: np.ndarray
     inverse: np.ndarray
     determinants: np.ndarray
     gradient: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+    slopes: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     @classmethod
     def of(
@@ -104,56 +99,59 @@ class PathMotion:
         curves: tuple[np.ndarray, np.ndarray],
     ) -> PathMotion:
         """Compute the motion in postures, (K, n), with ``path`` = xi, xi_ds, xi_dds and ``curves`` = ydot, yddot."""
-        count, n = q.shape
+        count = len(q)
+        n = chain.n
         m = prescribed.count
-        r = n - m
-        postures = as_doubles(q, (count, chain.n))
-        xi, xi_ds, xi_dds = path
-        ydot, yddot = curves
-        given = _Given(
-            xi=as_doubles(xi, (count, m)),
-            xi_ds=as_doubles(xi_ds, (count, m)),
-            xi_dds=as_doubles(xi_dds, (count, m)),
-            rows=as_doubles(conditions.rows, (count, r, n)),
-            ydot=as_doubles(ydot, (count, 1 + r)),
-            yddot=as_doubles(yddot, (count, 1 + r)),
-        )
-        if conditions.turning is not None or conditions.drift is not None:
-            given = replace(
-                given,
-                turning=as_doubles(conditions.turning, (2, count, r, n)),
-                drift=as_doubles(conditions.drift, (3, count, r)),
-            )
-        found = (
+        c = 1 + n - m
+        given = [as_doubles(q, (count, n))]
+        given += [as_doubles(own, (count, m)) for own in path]
+        rows, step = as_doubles_at_points(conditions.rows, (count, n - m, n))
+        given.append(rows)
+        given += [as_doubles(own, (count, c)) for own in curves]
+        turning, drift = conditions.turning, conditions.drift
+        if turning is not None or drift is not None:
+            turning = as_doubles(turning, (2, count, n - m, n))
+            drift = as_doubles(drift, (3, count, n - m))
+        slopes = np.empty((3, count, n, c))
+        motion = cls(
+            chain,
+            prescribed,
+            (*given, turning, drift),
+            step,
             np.empty((6, count, n)),
             np.empty((count, n, n)),
             np.empty(count),
-            np.empty((count, n, 1 + r)),
+            np.empty((count, n, c)),
             np.empty((count, n)),
             np.empty((count, n)),
+            (slopes[0], slopes[1], slopes[2]),
         )
-        load().brachis_path_motion(
-            chain.address,
-            ctypes.addressof(prescribed.structure),
-            ctypes.byref(given.structure),
-            count,
-            address(postures),
-            *map(address, found),
-        )
-        return cls(chain, prescribed, given, *found)
+        load().brachis_path_motion(motion.address)
+        return motion
+
+    @cached_property
+    def _structure(self) -> _PathMotion:
+        """What the library reads, and where it writes."""
+        found = (getattr(self, name) for name in _FOUND)
+        parts = (*self.given, *found, *self.slopes)
+        places = [None if own is None else address(own) for own in parts]
+        places.insert(5, self.rows_step)
+        asked = ctypes.addressof(self.prescribed.structure)
+        return _PathMotion(self.chain.address, asked, len(self.qdot), *places)
+
+    @property
+    def address(self) -> int:
+        """Where the library finds the motion."""
+        return ctypes.addressof(self._structure)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave addresses behind."""
+        return {name: value for name, value in vars(self).items() if name[0] != "_"}
 
     def derivatives(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each."""
-        qdot_y, qddot_ydot, qddot_y = np.empty((3, *self.gradient.shape))
-        own = (self.twists, self.inverse, self.gradient, self.qdot, self.qddot)
-        load().brachis_path_derivatives(
-            self.chain.n,
-            ctypes.addressof(self.prescribed.structure),
-            ctypes.byref(self.given.structure),
-            len(self.qdot),
-            *map(address, (*own, qdot_y, qddot_ydot, qddot_y)),
-        )
-        return qdot_y, qddot_y, qddot_ydot
+        """Differentiate qdot by y, and qddot by y and by ydot, (K, n, 1 + r) each; once."""
+        load().brachis_path_derivatives(self.address)
+        return self.slopes
 
     def singular_slopes(
         self, values: np.ndarray, vectors: np.ndarray
@@ -162,13 +160,8 @@ class PathMotion:
         by_q = np.empty_like(self.qdot)
         by_s = np.empty(len(by_q))
         singular = as_doubles(values, by_s.shape), as_doubles(vectors, by_q.shape)
-        load().brachis_singular_slopes(
-            self.chain.n,
-            ctypes.addressof(self.prescribed.structure),
-            ctypes.byref(self.given.structure),
-            len(by_q),
-            *map(address, (self.twists, self.inverse, *singular, by_q, by_s)),
-        )
+        places = map(address, (*singular, by_q, by_s))
+        load().brachis_singular_slopes(self.address, *places)
         return by_q, by_s
 
 

@@ -148,29 +148,34 @@ def _find_piece(knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
     return np.clip(piece, degree, len(knots) - degree - 2)
 
 
-def sum_basis(
-    basis: np.ndarray, first: np.ndarray, control_points: np.ndarray
-) -> np.ndarray:
-    """Values of splines and their derivatives, (orders, K, c), by the basis functions that matter at K places.
+class Basis:
+    """Basis functions of splines, and their derivatives, that matter at K places.
 
     Parameters
     ----------
-    basis : (orders, K, w) ndarray
+    values : (orders, K, w) ndarray
     first : (K,) int ndarray
-        Number of the control point of the first of them.
-    control_points : (c, L) ndarray
+        Number of the control point of the first of the w functions.
     """
-    orders, count, width = basis.shape
-    curves, many = control_points.shape
-    if first.shape != (count,):
-        raise ValueError("first needs one number for each place")
-    if count and not 0 <= first.min() <= first.max() <= many - width:
-        raise ValueError(f"a control point does not exist; there are {many}")
-    kept = (
-        as_doubles(basis, basis.shape),
-        first.astype("l", order="C", copy=False),
-        as_doubles(control_points, control_points.shape),
-        np.empty((orders, count, curves)),
-    )
-    load().brachis_curves(orders, count, width, curves, many, *map(address, kept))
-    return kept[-1]
+
+    def __init__(self, values: np.ndarray, first: np.ndarray) -> None:
+        orders, count, width = values.shape
+        if first.shape != (count,):
+            raise ValueError("first needs one number for each place")
+        if count and first.min() < 0:
+            raise ValueError("numbers of control points are negative")
+        self._values = as_doubles(values, (orders, count, width))
+        self._first = first.astype("l", order="C", copy=False)
+        self._needed = int(first.max(initial=0)) + width
+
+    def sum(self, control_points: np.ndarray) -> np.ndarray:
+        """Values of splines with control points, (c, L), and their derivatives, (orders, K, c)."""
+        orders, count, width = self._values.shape
+        curves, many = control_points.shape
+        if count and many < self._needed:
+            raise ValueError(f"a control point does not exist; there are {many}")
+        points = as_doubles(control_points, (curves, many))
+        found = np.empty((orders, count, curves))
+        places = map(address, (self._values, self._first, points, found))
+        load().brachis_curves(orders, count, width, curves, many, *places)
+        return found

@@ -124,9 +124,9 @@ class ChartRows:
 
     def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
         """Return rows, and how they change along the path, in postures (K, n) at path coordinates (K,)."""
-        rows, _ = self.at(s)
         if self.knots is None:
-            return Conditions(rows)
+            return Conditions(self.coefficients[0, :, :-1])
+        rows, _ = self.at(s)
         orders = self._orders_at(s)[1:]
         turning = orders[..., :-1]
         drift = (turning @ q[:, :, None])[..., 0] - orders[..., -1]

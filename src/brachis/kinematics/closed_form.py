@@ -64,7 +64,7 @@ class ClosedFormMap(PathMap):
         self.redundant_joints = tuple(robot.joint_names[i] for i in redundant)
         self.branch = branch
         self.branch_label = solver.branches[branch]
-        self._rows = np.eye(robot.n)[self.redundant]
+        self._conditions = Conditions(np.eye(robot.n)[self.redundant])
         self._turning = robot.revolute[self.nonredundant]
         self._turns = np.isin(np.arange(robot.n), self.nonredundant) & robot.revolute
         limits = robot.limits
@@ -125,9 +125,9 @@ class ClosedFormMap(PathMap):
         follow_turns(q, self._turns, self.start)
         return q
 
-    def conditions(self, s: np.ndarray, _q: np.ndarray) -> Conditions:
+    def conditions(self, _s: np.ndarray, _q: np.ndarray) -> Conditions:
         """Return rows that each select a redundant joint."""
-        return Conditions(np.broadcast_to(self._rows, (len(s), *self._rows.shape)))
+        return self._conditions
 
     def choose_turns(
         self,

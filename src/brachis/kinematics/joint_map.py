@@ -27,6 +27,7 @@ from typing import Any, Self
 import numpy as np
 
 from brachis.common.arrays import apply_each, rates
+from brachis.kernel import MotionSlopes
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques
@@ -73,6 +74,12 @@ class JointState(SharedTorques):
     def derivatives(self) -> JointDerivatives:
         """Exact derivatives."""
         return self.joint_map.derivatives(self)
+
+    @property
+    def slopes(self) -> MotionSlopes:
+        """The exact derivatives as the kernel takes them, but for those of the jerk."""
+        own = self.derivatives
+        return MotionSlopes(self.gradient, own.qdot_y, own.qddot_y, own.qddot_ydot)
 
     @cached_property
     def qdddot(self) -> np.ndarray:

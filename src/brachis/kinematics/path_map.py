@@ -36,7 +36,12 @@ import numpy as np
 
 from brachis.common.arrays import LastCall
 from brachis.errors import UnreachableError
-from brachis.kernel import Conditions, PathMotion, find_least_singular
+from brachis.kernel import (
+    Conditions,
+    MotionSlopes,
+    PathMotion,
+    find_least_singular,
+)
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -54,6 +59,11 @@ class PathState(JointState):
 
     path: PathSample
     motion: PathMotion
+
+    @property
+    def slopes(self) -> MotionSlopes:
+        """The exact derivatives, which the kernel computes when it needs them."""
+        return MotionSlopes(self.gradient, *self.motion.slopes, path_motion=self.motion)
 
     @cached_property
     def least_singular(self) -> tuple[np.ndarray, np.ndarray]:

@@ -19,11 +19,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
 
 from brachis.common.arrays import apply_each, rates
+from brachis.kernel import ScaledQuantity
 from brachis.limits.protocol import (
     Bound,
     Guarantee,
@@ -119,6 +121,12 @@ class JointLimit(Limit):
         own = self._of_joints(self.quantity(motion))
         return (own - self._middle) * self._scale
 
+    def _scaled(self, quantity: str) -> ScaledQuantity:
+        """Describe the values, where they are a quantity of the kernel."""
+        return ScaledQuantity(
+            quantity, self._joints, self._middle, self._scale, self._robot.chain
+        )
+
     def _of_joints(self, every: np.ndarray) -> np.ndarray:
         """Rows of the limited joints, (K, c, ...), from those of all joints, (K, n, ...)."""
         return every if self._is_of_all else every.take(self._joints, axis=1)
@@ -133,6 +141,10 @@ class _DerivativeLimit(JointLimit):
 
     derivative: str
     """Name of the quantity in `JointStates` and in `Partials`."""
+
+    @cached_property
+    def scaled(self) -> ScaledQuantity:  # type: ignore[override]
+        return self._scaled(self.derivative)
 
     def quantity(self, motion: JointStates) -> np.ndarray:
         return getattr(motion, self.derivative)
@@ -238,6 +250,10 @@ class TorqueLimit(_TorqueLimit, HasLatticeWeights):
     kind = "torque"
     at_rest = "posture"
     refusal = "cannot hold the arm against gravity"
+
+    @cached_property
+    def scaled(self) -> ScaledQuantity:  # type: ignore[override]
+        return self._scaled("torque")
 
     def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
         return self._scale_rows(dynamics.mass_matrices(self._robot, q)), None

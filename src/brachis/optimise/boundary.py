@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from brachis.kernel import sum_basis
+from brachis.kernel import Basis
 from brachis.optimise.bspline import ORDERS, local_basis
 from brachis.path.time_law import TimeLaw
 
@@ -127,7 +127,8 @@ class BoundarySpline:
         variables = np.unique(group[points], return_inverse=True)[1]
         shape = (count, int(variables.max(initial=-1)) + 1)
         free_part = FreePart(points, variables, np.ones(len(points)), shape)
-        return cls(knots, degree, free_part, given)
+        powers = np.flatnonzero(given[1:].any(axis=1)) + 1
+        return cls(knots, degree, free_part, given[: 1 + powers.max(initial=0)])
 
     @property
     def free(self) -> int:
@@ -194,6 +195,8 @@ def sum_powers(
     terms: np.ndarray, duration: float, *, slope: bool = False
 ) -> np.ndarray:
     """Add up terms, (1 + k, p), times the powers of a duration, s; or return the slope of the sum by the duration."""
+    if len(terms) == 1:
+        return np.zeros_like(terms[0]) if slope else terms[0]
     powers = np.arange(len(terms))
     if slope:
         return np.asarray((powers[1:] * duration ** powers[:-1]) @ terms[1:])
@@ -363,7 +366,11 @@ class LocalBasis:
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
         """Value and three derivatives (4, K, c) of c splines with control points (c, N + d)."""
-        return sum_basis(self.values, self.first, control_points)
+        return self._basis.sum(control_points)
+
+    @cached_property
+    def _basis(self) -> Basis:
+        return Basis(self.values, self.first)
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ jerk has likewise slopes by ydddot (see `joint_map`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from brachis.kernel import MotionSlopes, apply_chain_rule
+from brachis.kernel import Groups, VariableSlopes
 from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit, Partials
 
@@ -35,6 +35,8 @@ class Evaluator:
         As given.
     is_mean : (c,) bool ndarray
         Which of the limits' values are held as means over the motion.
+    has_means : bool
+        Whether any are.
     """
 
     def __init__(self, joint_map: JointMap, limits: Sequence[Limit]) -> None:
@@ -43,6 +45,8 @@ class Evaluator:
         counts = [len(limit.lower) for limit in self.limits]
         means = [limit.guarantee.is_mean for limit in self.limits]
         self.is_mean = np.repeat(np.array(means, dtype=bool), counts)
+        self.has_means = any(means)
+        self._groups = Groups([limit.scaled for limit in self.limits], counts)
 
     def evaluate(
         self,
@@ -71,7 +75,7 @@ class Evaluator:
             The joint map has no posture at one of the times.
         """
         motion = self.joint_map.state(y, ydot, yddot, ydddot, t=t, near=near)
-        return Evaluation(self.limits, motion)
+        return Evaluation(self.limits, motion, self._groups)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,15 +88,31 @@ class Evaluation:
         With c values in all.
     motion : JointState
         q, qdot, qddot, qdddot, (K, n), and the gradient dq/dy.
+    groups : Groups
+        The values of the limits as the kernel takes them.
     """
 
     limits: tuple[Limit, ...]
     motion: JointState
+    groups: Groups
 
     @cached_property
     def by_limit(self) -> tuple[np.ndarray, ...]:
         """Values of every limit, (K, its own c)."""
-        return tuple(limit.values(self.motion) for limit in self.limits)
+        motion = self.motion
+        states = [motion.q, motion.qdot, motion.qddot]
+        if self.groups.has_jerk:
+            states.append(motion.qdddot)
+        chain = self.groups.chain
+        known = None if chain is None else motion.known_torque(chain)
+        values, torque = self.groups.values(states, known)
+        if chain is not None and torque is not None:
+            motion.share_torque(chain, torque)
+        pairs = zip(self.limits, values, strict=True)
+        return tuple(
+            limit.values(motion) if limit.scaled is None else own
+            for limit, own in pairs
+        )
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -102,21 +122,35 @@ class Evaluation:
     @cached_property
     def slopes(self) -> np.ndarray:
         """Slopes of `values` by y, ydot, yddot and, where a limit asks for the jerk, ydddot, (3 or 4, K, c, 1 + r)."""
-        return self.chain([limit.partials(self.motion) for limit in self.limits])
+        return self.differentiate()[0]
 
-    def chain(self, partials: Sequence[Partials]) -> np.ndarray:
-        """Differentiate functions with given partials by y, ydot, yddot and, if one asks for it, ydddot."""
+    def differentiate(
+        self, variables: VariableSlopes | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return `slopes`, and entries of the Jacobian by variables, (z, c), if these are given."""
+        partials = [
+            limit.partials(self.motion) for limit in self.limits if limit.scaled is None
+        ]
+        return self._differentiate(self.groups, partials, variables)
+
+    def chain(self, partials: Partials) -> np.ndarray:
+        """Differentiate functions with given partials by y, ydot, yddot and, if they ask for it, ydddot."""
+        return self._differentiate(Groups([None], [partials.size]), [partials])[0]
+
+    def _differentiate(
+        self,
+        groups: Groups,
+        partials: list[Partials],
+        variables: VariableSlopes | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Differentiate the values of groups; `partials` are those of the groups that are no scaled quantities."""
         motion = self.motion
-        exact = motion.derivatives
-        jerk = None
-        if any(own.qdddot is not None for own in partials):
-            jerk = motion.qdddot_y
-        by_curves = (exact.qdot_y, exact.qddot_y, exact.qddot_ydot, jerk)
-        return apply_chain_rule(
-            [(own.by_joints, own.s) for own in partials],
-            [own.size for own in partials],
-            MotionSlopes(motion.gradient, *by_curves),
-        )
+        slopes = motion.slopes
+        if groups.has_jerk or any(own.qdddot is not None for own in partials):
+            slopes = replace(slopes, qdddot_y=motion.qdddot_y)
+        states = (motion.q, motion.qdot, motion.qddot)
+        given = [(own.by_joints, own.s) for own in partials]
+        return groups.differentiate(slopes, states, given, variables)
 
     def violation(self, counts: Callable[[Limit], bool]) -> np.ndarray:
         """How far the limits that count are violated, (K, their c); negative inside."""

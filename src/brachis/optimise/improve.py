@@ -418,9 +418,7 @@ class SolverSession:
             problem = Pulled(program, x, self.pull * program.end_time(x))
         is_interior = self.backend.is_interior
         report = (
-            solve(problem, x)
-            if is_interior
-            else solve_near_rows(problem, x, solve, self.options.tolerance)
+            solve(problem, x) if is_interior else solve_near_rows(problem, x, solve)
         )
         if self.pull > 0.0:
             objective = objective_at(program, report.x)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.kernel import CurvePlaces
 from brachis.limits import Limit
 from brachis.optimise.boundary import (
     Boundary,
@@ -87,6 +88,8 @@ class Progress:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian, (z,)."""
+        if len(self.given) == 1:
+            return self.weight
         by_duration = sum_powers(self.given, x[0], slope=True)
         return np.where(self.variable == 0, by_duration[self.row], self.weight)
 
@@ -123,8 +126,10 @@ class VariableLayout:
         Where the variables of each curve matter.
     point, variable : (z,) int ndarray
         Where variables matter at all, by T, by each curve, then by h.
-    curve_point, curve : (z',) int ndarray
-        Point and number of the curve of each entry between those of T and h.
+    curve : (z',) int ndarray
+        Number of the curve of each entry between those of T and h.
+    places : CurvePlaces
+        Point and curve of each.
     progress : Progress
         Differences of control points of s; empty without a path.
     x_lower, x_upper : (v,) ndarray
@@ -136,8 +141,8 @@ class VariableLayout:
     patterns: tuple[SparsityPattern, ...]
     point: np.ndarray
     variable: np.ndarray
-    curve_point: np.ndarray
     curve: np.ndarray
+    places: CurvePlaces
     progress: Progress
     x_lower: np.ndarray
     x_upper: np.ndarray
@@ -180,6 +185,7 @@ class VariableLayout:
         of_time = np.zeros(count, dtype=int)
         of_lengths = grid.variable + lengths.start
         numbers = np.arange(len(splines)) + int(time_law is not None)
+        width = len(splines) + int(time_law is not None)
         curve = np.repeat(numbers, [len(pattern.point) for pattern in patterns])
         return cls(
             splines=splines,
@@ -188,8 +194,8 @@ class VariableLayout:
             patterns=patterns,
             point=point,
             variable=np.concatenate([of_time, *of_curves, of_lengths]),
-            curve_point=point[count : count + len(curve)],
             curve=curve,
+            places=CurvePlaces(point[count : count + len(curve)], curve, count, width),
             progress=progress,
             x_lower=x_lower,
             x_upper=x_upper,

@@ -27,14 +27,12 @@ def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
     return tuple(part / t_end**order for order, part in enumerate(orders))
 
 
-def sample_law(time_law: TimeLaw | None, t_norm: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Sample s and its derivatives per unit of normalised time, (4, K, 1); nothing without a time law."""
-    if time_law is None:
-        return ()
+def sample_law(time_law: TimeLaw, t_norm: np.ndarray) -> np.ndarray:
+    """Sample s and its derivatives per unit of normalised time, (4, K, 1)."""
     duration = time_law.duration
     orders = time_law.at(t_norm * duration)
     scale = duration ** np.arange(ORDERS)
-    return ((orders * scale[:, None])[:, :, None],)
+    return np.asarray((orders * scale[:, None])[:, :, None])
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,8 +70,10 @@ class Motion(Summary):
         """
         t_norm = t / self.t_end
         basis = LocalBasis.of(self.knots, self.degree, t_norm)
-        given = sample_law(self.time_law, t_norm)
-        orders = np.concatenate([*given, basis.curves(self.control_points)], axis=2)
+        orders = basis.curves(self.control_points)
+        if self.time_law is not None:
+            given = sample_law(self.time_law, t_norm)
+            orders = np.concatenate([given, orders], axis=2)
         return per_second(orders, self.t_end)
 
     def with_knots(self, knots: np.ndarray) -> Motion:

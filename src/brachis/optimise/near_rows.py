@@ -38,10 +38,6 @@ _FIRST_VIOLATION = 0.5
 """Largest violation of a first point that counts as a fast motion."""
 _LAST_VIOLATION = 0.5
 """Violation of other rows above which an answer is another motion: then all rows are needed."""
-_WIDENING = 1e-6
-"""Largest widening of a bound, as a part of it."""
-_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""Multiples of this, modulo 1, are spread evenly."""
 _ROUNDS = 4
 """Solves with more and more rows, no more."""
 _FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT, SolveStatus.BEATEN)
@@ -49,18 +45,16 @@ _FINAL = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT, SolveStatus.BEATE
 
 
 class NearRows:
-    """A program without some of its rows, whose bounds are wider by up to a millionth; a `Problem`.
+    """A program without some of its rows; a `Problem`.
 
     Parameters
     ----------
     program : Problem
     kept : (c',) int ndarray
         Indices of the rows to keep, ascending.
-    tolerance : float
-        Of the solver: bounds are widened by no more.
     """
 
-    def __init__(self, program: Problem, kept: np.ndarray, tolerance: float) -> None:
+    def __init__(self, program: Problem, kept: np.ndarray) -> None:
         self._program = program
         self._kept = kept
         is_kept = np.zeros(len(program.lower), dtype=bool)
@@ -68,9 +62,8 @@ class NearRows:
         self._entries = np.flatnonzero(is_kept[program.jacobian_rows])
         self.x_lower = program.x_lower
         self.x_upper = program.x_upper
-        self.lower, self.upper = _spread_bounds(
-            program.lower[kept], program.upper[kept], min(tolerance, _WIDENING)
-        )
+        self.lower = program.lower[kept]
+        self.upper = program.upper[kept]
         self.jacobian_rows = np.searchsorted(kept, program.jacobian_rows[self._entries])
         self.jacobian_columns = program.jacobian_columns[self._entries]
 
@@ -111,7 +104,6 @@ def solve_near_rows(
     program: Problem,
     x: np.ndarray,
     solve: Callable[[Problem, np.ndarray], SolverReport],
-    tolerance: float,
 ) -> SolverReport:
     """Solve a program from a point, with the rows near their bounds where that is enough.
 
@@ -121,8 +113,6 @@ def solve_near_rows(
     x : (v,) ndarray
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
-    tolerance : float
-        Of the solver.
 
     Returns
     -------
@@ -142,7 +132,7 @@ def solve_near_rows(
         return solve(program, x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
-        report = solve(NearRows(program, kept, tolerance), x)
+        report = solve(NearRows(program, kept), x)
         reports.append(report)
         slack = _slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
@@ -155,22 +145,6 @@ def solve_near_rows(
         kept = np.union1d(kept, np.flatnonzero(slack < _NEAR))
         x = report.x
     return _complete(program, np.arange(len(slack)), [*reports, solve(program, x)])
-
-
-def _spread_bounds(
-    lower: np.ndarray, upper: np.ndarray, most: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Widen bounds, (c,), by up to a part `most` of themselves, each by another one.
-
-    At the fastest motion hundreds of neighbouring rows reach their bounds together. Such degenerate subproblems take an
-    active-set solver seconds instead of hundredths of a second. Simplex codes perturb bounds for the same reason.
-    Bounds of zero stay, for a sign is strict; so do rows whose bounds are equal. Bounds above 1 are widened as if they
-    were 1.
-    """
-    part = most * (np.arange(1, len(lower) + 1) * _GOLDEN % 1.0)
-    part[lower == upper] = 0.0
-    wider = upper + part * np.minimum(np.abs(upper), 1.0)
-    return lower - part * np.minimum(np.abs(lower), 1.0), wider
 
 
 def _slack(program: Problem, x: np.ndarray) -> np.ndarray:

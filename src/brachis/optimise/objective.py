@@ -125,7 +125,7 @@ class LeastAcceleration:
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Gauss-Newton part of the mean's Hessian, (v, v)."""
         by_joints = np.tile(np.diag(self.weights), (len(phase.t_norm), 1, 1))
-        by_curves = phase.evaluate(x).chain([Partials(qddot=by_joints)])
+        by_curves = phase.evaluate(x).chain(Partials(qddot=by_joints))
         slopes = phase.slopes_by_variables(by_curves, x)
         return phase.sum_outer_products(slopes, 2.0 * _shares(phase))
 

@@ -22,7 +22,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
-from brachis.kernel import find_entries
+from brachis.kernel import CurvePlaces, VariableSlopes
 from brachis.limits import Limit, Moments
 from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import basis_matrix, clamped_knots
@@ -171,11 +171,13 @@ class PathPhase:
         variable = np.concatenate([self._number, self._number + 1, of_curves.ravel()])
         every = np.arange(places)
         of_each = np.repeat(every, columns.shape[1])
-        self._points = np.tile(of_each, self.curves_count)
-        self._curves = np.repeat(curves + 1, columns.size)
+        points = np.tile(of_each, self.curves_count)
+        of_curve = np.repeat(curves + 1, columns.size)
+        width = 1 + self.curves_count
+        self._curve_places = CurvePlaces(points, of_curve, places, width)
         rows = np.arange(places * values).reshape(places, values)
         self.jacobian_columns = np.repeat(variable, values)
-        point = np.concatenate([every, every, self._points])
+        point = np.concatenate([every, every, points])
         self.jacobian_rows = rows[point].ravel()
 
     def _set_constants(self) -> None:
@@ -348,9 +350,9 @@ class PathPhase:
         by_squares[:, 2] = self._by_square * y_dds + self._by_step * y_ds
         value, first, second, _ = self._basis.values
         basis = np.array([value, first * rate, second * square + first * u])
-        slopes = evaluation.slopes[:3]
         own = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
-        return find_entries(slopes, by_squares, self._points, self._curves, own).ravel()
+        variables = VariableSlopes(by_squares, self._curve_places, own)
+        return evaluation.differentiate(variables)[1].ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:
         """Take s and the redundant curves at many places, (S, c)."""

@@ -18,7 +18,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from brachis.kernel import find_entries
+from brachis.kernel import VariableSlopes
 from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit, Partials, Role
 from brachis.limits.safeguards import MARGIN, build_branch_margins
@@ -243,9 +243,11 @@ class Phase:
         """
         h = self._h(x)
         own = self.grid.basis(h).curves(control_points)
+        if self.time_law is None:
+            return own
         given = sample_law(self.time_law, self.grid.t_norm_at(h))
         factor = 0.0 if is_slope else 1.0
-        return np.concatenate([*(factor * part for part in given), own], axis=2)
+        return np.concatenate([factor * given, own], axis=2)
 
     def with_time_scaled(
         self, x: np.ndarray, factor: float, held: tuple[int, int] = (0, 0)
@@ -362,19 +364,19 @@ class Phase:
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""
         self.evaluations["jacobians"] += 1
-        is_mean = self.evaluator.is_mean
         slopes = self.limit_slopes(x)
-        of_limits = (slopes[:, ~is_mean] if is_mean.any() else slopes).ravel()
+        if self.evaluator.has_means:
+            slopes = slopes[:, ~self.evaluator.is_mean]
         of_progress = self._layout.progress.jacobian(x)
         of_total = np.ones(len(self.grid.lower))
-        return np.concatenate([of_limits, of_progress, of_total])
+        return np.concatenate([slopes.ravel(), of_progress, of_total])
 
     def limit_slopes(self, x: np.ndarray) -> np.ndarray:
         """Slopes of all limits' values by the variables, (z, c); kept, and raises, as `evaluate`."""
         evaluation = self.evaluate(x)
         if self._slopes is None or self._slopes[0] is not evaluation:
-            slopes = self.slopes_by_variables(evaluation.slopes, x)
-            self._slopes = (evaluation, slopes)
+            slopes, entries = evaluation.differentiate(self._variable_slopes(x))
+            self._slopes = (evaluation, self._add_lengths(entries, slopes, x))
         return self._slopes[1]
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
@@ -386,7 +388,7 @@ class Phase:
             Of its terms with respect to the joints, one term a point: (K, 1, n).
         x : (v,) ndarray
         """
-        return self.gradient_by_curves(self.evaluate(x).chain([partials]), x)
+        return self.gradient_by_curves(self.evaluate(x).chain(partials), x)
 
     def gradient_by_curves(self, slopes: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Gradient, (v,), of a sum over the collocation points with slopes by y, ydot, ..., (orders, K, 1, c)."""
@@ -444,15 +446,19 @@ class Phase:
 
     def slopes_by_variables(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""
+        entries = self._variable_slopes(x).find_entries(by)
+        return self._add_lengths(entries, by, x)
+
+    def _variable_slopes(self, x: np.ndarray) -> VariableSlopes:
+        """Slopes of the curves and their time derivatives by T and by each curve's variables."""
+        shared = self._by_duration(x)[None]
+        return VariableSlopes(shared, self._layout.places, self._basis(x))
+
+    def _add_lengths(
+        self, entries: np.ndarray, by: np.ndarray, x: np.ndarray
+    ) -> np.ndarray:
+        """Add slopes by h, if knots are free, to those by T and the curves' variables; see `slopes_by_variables`."""
         orders = len(by)
-        layout = self._layout
-        entries = find_entries(
-            by,
-            self._by_duration(x)[None, :orders],
-            layout.curve_point,
-            layout.curve,
-            self._basis(x)[:orders],
-        )
         if not len(self.grid.point):
             return entries
         by_h = self.grid.slopes(self._h(x), self._control_points(x))[:orders]

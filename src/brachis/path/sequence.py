@@ -216,6 +216,10 @@ class SequencePath:
     def derivatives(self, s: Sequence[float] | Array, order: int = 3) -> Array:
         """Return the coordinates in the world and their derivatives by s, shape (order + 1, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
+        if len(self.pieces) == 1:
+            (piece,) = self.pieces
+            sigma = piece.first + (values - self.breaks[0]) * self.total
+            return self._in_world(piece.curve.derivatives(sigma, order))
         which = np.searchsorted(self.breaks[1:-1], values, side="right")
         result = np.empty((order + 1, values.size, self._coordinates))
         runs = np.flatnonzero(np.diff(which)) + 1
@@ -224,7 +228,11 @@ class SequencePath:
             piece = self.pieces[i]
             sigma = piece.first + (values[begin:end] - self.breaks[i]) * self.total
             result[:, begin:end] = piece.curve.derivatives(sigma, order)
-        result *= self.total ** np.arange(order + 1)[:, None, None]
+        return self._in_world(result)
+
+    def _in_world(self, result: Array) -> Array:
+        """Turn coordinates and their derivatives by sigma, (order + 1, K, m), into those in the world by s."""
+        result = result * self.total ** np.arange(len(result))[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T
             result[0] += self.frame.origin

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
+from brachis.kernel import Chain
 from brachis.robot.robot import Robot
-
-_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -42,25 +40,40 @@ class SharedTorques:
     qddot: np.ndarray
 
     @cached_property
-    def _known(self) -> dict[tuple[Callable[..., Any], int], tuple[Robot, Any]]:
+    def _known(self) -> dict[tuple[str, int], tuple[Chain, Any]]:
         return {}
 
     def torque(self, robot: Robot) -> np.ndarray:
         """Joint torques, (K, n); not to be written to."""
-        return self._once(torque, robot)
+        known = self.known_torque(robot.chain)
+        if known is not None:
+            return known
+        found = torque(robot, self.q, self.qdot, self.qddot)
+        self.share_torque(robot.chain, found)
+        return found
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
         """Return the derivatives of the joint torques; not to be written to."""
-        return self._once(torque_derivatives, robot)
+        known: TorqueDerivatives | None = self._find("derivatives", robot.chain)
+        if known is not None:
+            return known
+        found = torque_derivatives(robot, self.q, self.qdot, self.qddot)
+        self._known["derivatives", id(robot.chain)] = robot.chain, found
+        return found
 
-    def _once(self, function: Callable[..., _T], robot: Robot) -> _T:
-        key = function, id(robot)
-        known = self._known.get(key)
-        # The robot is compared too: in another process an id may be that of another object.
-        if known is None or known[0] is not robot:
-            known = robot, function(robot, self.q, self.qdot, self.qddot)
-            self._known[key] = known
-        return known[1]
+    def known_torque(self, chain: Chain) -> np.ndarray | None:
+        """Return the torques of a chain, (K, n), if they are known."""
+        known: np.ndarray | None = self._find("torque", chain)
+        return known
+
+    def share_torque(self, chain: Chain, torque: np.ndarray) -> None:
+        """Keep the torques of a chain, (K, n), for all who ask."""
+        self._known["torque", id(chain)] = chain, torque
+
+    def _find(self, what: str, chain: Chain) -> Any:
+        """Return what is known of a chain; in another process an id may be that of another object."""
+        owner, found = self._known.get((what, id(chain)), (None, None))
+        return found if owner is chain else None
 
 
 def torque(

@@ -1,0 +1,213 @@
+"""Values of limits, their slopes by curves, and entries of a Jacobian, against the formulas with NumPy."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+
+from brachis.kernel import (
+    Conditions,
+    CurvePlaces,
+    Groups,
+    MotionSlopes,
+    PathMotion,
+    Prescribed,
+    ScaledQuantity,
+    VariableSlopes,
+)
+from kernel.test_chain import chain_of, random_model
+
+POINTS = 9
+N = 5
+
+
+@pytest.fixture
+def chain():
+    return chain_of(*random_model(N, 1))
+
+
+def slopes_of(partials, parts, with_jerk):
+    """Chain rule for partials by q, qdot, qddot and qdddot."""
+    gradient, qdot_y, qddot_y, qddot_ydot, qdddot_y = parts
+    p_q, p_v, p_a, p_j = partials
+    found = [
+        p_q @ gradient + p_v @ qdot_y + p_a @ qddot_y,
+        p_v @ gradient + p_a @ qddot_ydot,
+        p_a @ gradient,
+    ]
+    if with_jerk:
+        found[0] = found[0] + p_j @ qdddot_y
+        found[1] = found[1] + 3.0 * p_j @ qddot_y
+        found[2] = found[2] + 3.0 * p_j @ qdot_y
+        found.append(p_j @ gradient)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("with_jerk", [False, True])
+def test_the_chain_rule(with_jerk, width):
+    rng = np.random.default_rng(8)
+    parts = list(rng.normal(size=(5, POINTS, N, width)))
+    motion = MotionSlopes(*parts[:4], parts[4] if with_jerk else None)
+    states = rng.normal(size=(3, POINTS, N))
+    first = rng.normal(size=(4, POINTS, 4, N))
+    given = [*first[:3], first[3] if with_jerk else None]
+    constant = np.broadcast_to(rng.normal(size=(2, N)), (POINTS, 2, N))
+    by_s = rng.normal(size=(POINTS, 2))
+    partials = [(given, None), ((None, constant, None, None), by_s)]
+    groups = Groups([None, None], [4, 2])
+    found, entries = groups.differentiate(motion, states, partials)
+    assert not entries.size
+    known = slopes_of(first, parts, with_jerk)
+    np.testing.assert_allclose(found[:, :, :4], known, atol=1e-12)
+    zero = np.zeros_like(constant)
+    known = slopes_of((zero, constant, zero, zero), parts, with_jerk)
+    known[0, :, :, 0] += by_s
+    np.testing.assert_allclose(found[:, :, 4:], known, atol=1e-12)
+
+    points = np.array([0, 0, 4, POINTS - 1])
+    basis = rng.normal(size=(len(found), 4))
+    curves = np.array([1, 0, 2, 1]) % width
+    every = rng.normal(size=(2, len(found), POINTS, width))
+    places = CurvePlaces(points, curves, POINTS, width)
+    variables = VariableSlopes(every, places, basis)
+    entries = variables.find_entries(found)
+    known = np.einsum("bokw,okcw->bkc", every, found).reshape(2 * POINTS, -1)
+    np.testing.assert_allclose(entries[: 2 * POINTS], known, atol=1e-12)
+    by_one = np.einsum("oz,zoc->zc", basis, found[:, points, :, curves])
+    np.testing.assert_allclose(entries[2 * POINTS :], by_one, atol=1e-12)
+    again = groups.differentiate(motion, states, partials, variables)
+    np.testing.assert_array_equal(again[0], found)
+    np.testing.assert_array_equal(again[1], entries)
+
+
+def test_orders_that_values_do_not_depend_on_are_left_out():
+    rng = np.random.default_rng(2)
+    found = rng.normal(size=(3, POINTS, 2, 2))
+    places = CurvePlaces(np.array([3]), np.array([1]), POINTS, 2)
+    shared = rng.normal(size=(1, 4, POINTS, 2))
+    basis = rng.normal(size=(4, 1))
+    whole = VariableSlopes(shared, places, basis).find_entries(found)
+    part = VariableSlopes(shared[:, :3], places, basis[:3]).find_entries(found)
+    np.testing.assert_array_equal(whole, part)
+    fewer = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found)
+    known = VariableSlopes(shared[:, :2], places, basis[:2]).find_entries(found[:2])
+    np.testing.assert_array_equal(fewer, known)
+
+
+@pytest.mark.parametrize("quantity", ["q", "qdot", "qddot", "qdddot", "torque"])
+def test_scaled_quantities(chain, quantity):
+    """Each is its partials, which are rows of the unit matrix or derivatives of the torque, times the factors."""
+    rng = np.random.default_rng(5)
+    joints = np.array([3, 0, 3])
+    offsets, factors = rng.normal(size=(2, 3))
+    scaled = ScaledQuantity(quantity, joints, offsets, factors, chain)
+    states = rng.normal(size=(4, POINTS, N))
+    parts = list(rng.normal(size=(5, POINTS, N, 3)))
+    torque = chain.torques(*states[:3])
+    quantities = dict(zip(("q", "qdot", "qddot", "qdddot"), states, strict=True))
+    quantities["torque"] = torque
+    groups = Groups([scaled], [3])
+    (values,), found = groups.values(states)
+    known = (quantities[quantity][:, joints] - offsets) * factors
+    np.testing.assert_array_equal(values, known)
+    if quantity == "torque":
+        np.testing.assert_array_equal(found, torque)
+        (again,), _ = groups.values(states, torque + 1.0)
+        np.testing.assert_allclose(again, known + factors, atol=1e-12)
+    else:
+        assert found is None
+
+    partials = np.zeros((4, POINTS, N, N))
+    if quantity == "torque":
+        partials[:3] = chain.torque_derivatives(*states[:3])
+    else:
+        partials[list(quantities).index(quantity)] = np.eye(N)
+    partials = partials[:, :, joints] * factors[:, None]
+    has_jerk = quantity == "qdddot"
+    motion = MotionSlopes(*parts[:4], parts[4] if has_jerk else None)
+    found, _ = groups.differentiate(motion, states[:3], [])
+    known = slopes_of(partials, parts, has_jerk)
+    np.testing.assert_allclose(found, known, atol=1e-11 * np.abs(known).max())
+
+
+def test_a_motion_along_a_path_is_differentiated_when_it_is_needed(chain):
+    rng = np.random.default_rng(6)
+    rows = np.eye(N)[:2]
+    q = rng.normal(size=(POINTS, N))
+    path = tuple(rng.normal(size=(3, POINTS, 3)))
+    curves = tuple(rng.normal(size=(2, POINTS, 3)))
+    asked = Prescribed((0, 1, 2))
+
+    def make():
+        return PathMotion.of(chain, asked, q, path, Conditions(rows), curves)
+
+    joints = np.arange(N)
+    scaled = ScaledQuantity("torque", joints, np.zeros(N), np.ones(N), chain)
+    groups = Groups([scaled], [N])
+    motion = make()
+    states = (q, motion.qdot, motion.qddot)
+    slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
+    found, _ = groups.differentiate(slopes, states, [])
+    known = MotionSlopes(motion.gradient, *make().derivatives())
+    for own, other in zip(motion.derivatives(), make().derivatives(), strict=True):
+        np.testing.assert_array_equal(own, other)
+    np.testing.assert_array_equal(found, groups.differentiate(known, states, [])[0])
+
+
+def test_groups_can_be_sent_to_another_process(chain):
+    one = np.ones(1)
+    groups = Groups([ScaledQuantity("torque", np.array([2]), one, one, chain)], [1])
+    states = np.random.default_rng(7).normal(size=(3, POINTS, N))
+    again = copy.deepcopy(groups)  # as another process gets it
+    (known,), _ = groups.values(states)
+    del groups
+    (found,), _ = again.values(states)
+    np.testing.assert_array_equal(found, known)
+
+
+def test_what_does_not_fit_is_refused(chain):
+    with pytest.raises(ValueError, match="point"):
+        CurvePlaces(np.array([9]), np.array([0]), POINTS, 2)
+    with pytest.raises(ValueError, match="curve"):
+        CurvePlaces(np.array([0]), np.array([2]), POINTS, 2)
+    with pytest.raises(ValueError, match="as many"):
+        CurvePlaces(np.array([0, 1]), np.array([0]), POINTS, 2)
+    with pytest.raises(TypeError, match="cast"):
+        CurvePlaces(np.array([0.0]), np.array([0]), POINTS, 2)
+    none = np.zeros(0, dtype=int)
+    variables = VariableSlopes(
+        np.zeros((1, 3, POINTS, 2)),
+        CurvePlaces(none, none, POINTS, 2),
+        np.zeros((3, 0)),
+    )
+    with pytest.raises(ValueError, match="other points"):
+        variables.find_entries(np.zeros((3, POINTS, 1, 3)))
+    motion = MotionSlopes(*np.zeros((4, POINTS, N, 3)))
+    states = np.zeros((3, POINTS, N))
+    groups = Groups([None], [1])
+    partials = [((np.zeros((POINTS, 1, N)), None, None, None), None)]
+    with pytest.raises(ValueError, match="other points"):
+        groups.differentiate(motion, states, partials, variables)
+    one = np.ones(1)
+    beyond = ScaledQuantity("q", np.array([N]), one, one, chain)
+    with pytest.raises(ValueError, match="joint"):
+        Groups([beyond], [1])
+
+
+def test_partials_by_the_jerk_need_its_slopes(chain):
+    motion = MotionSlopes(*np.zeros((4, POINTS, N, 3)))
+    states = np.zeros((3, POINTS, N))
+    partials = np.zeros((POINTS, 1, N))
+    with pytest.raises(ValueError, match="qdddot_y"):
+        Groups([None], [1]).differentiate(
+            motion, states, [((None, None, None, partials), None)]
+        )
+    one = np.ones(1)
+    jerk = ScaledQuantity("qdddot", np.zeros(1, dtype=int), one, one, chain)
+    with pytest.raises(ValueError, match="qdddot_y"):
+        Groups([jerk], [1]).differentiate(motion, states, [])
+    with pytest.raises(ValueError, match="qdddot"):
+        Groups([jerk], [1]).values(states)
