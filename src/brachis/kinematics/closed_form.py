@@ -65,7 +65,7 @@ class ClosedFormMap(PathMap):
         self.branch = branch
         self.branch_label = solver.branches[branch]
         self._conditions = Conditions(np.eye(robot.n)[self.redundant])
-        self._turning = robot.revolute[self.nonredundant]
+        self._turning = robot.revolute[self.nonredundant].astype(float)
         self._turns = np.isin(np.arange(robot.n), self.nonredundant) & robot.revolute
         limits = robot.limits
         ends = limits.position_lower, limits.position_upper

@@ -183,11 +183,17 @@ def stack_splines(
     """
     most = max((len(spline.given) for spline in splines), default=1)
     given = np.zeros((most, len(splines), count))
-    matrix = np.zeros((len(splines), count, variables))
+    nothing = np.empty(0, dtype=int)
+    points = [nothing]
+    columns = [nothing]
+    weights = [np.empty(0)]
     for number, (spline, own) in enumerate(zip(splines, slices, strict=True)):
         given[: len(spline.given), number] = spline.given
-        matrix[number, :, own] = spline.free_part.matrix()
-    free_part = FreePart.of(matrix.reshape(-1, variables))
+        points.append(number * count + spline.free_part.point)
+        columns.append(own.start + spline.free_part.variable)
+        weights.append(spline.free_part.weight)
+    parts = (np.concatenate(own) for own in (points, columns, weights))
+    free_part = FreePart(*parts, (len(splines) * count, variables))
     return free_part, given.reshape(most, -1)
 
 
