@@ -244,22 +244,22 @@ class Groups:
             If it is known now.
         """
         count, n = states[0].shape
-        arm = None
-        given = [as_doubles(own, (count, n)) for own in states]
-        if self.has_jerk and len(given) < _TORQUE:
+        if self.has_jerk and len(states) < _TORQUE:
             raise ValueError("a group needs qdddot")
+        arm = None
         if torque is None and self.chain is not None:
             torque = np.empty((count, n))
             arm = self.chain.address
-        places = [address(own) for own in given] + [0] * (_TORQUE - len(given))
-        if torque is not None:
-            places.append(address(as_doubles(torque, (count, n))))
+        kept: list[np.ndarray] = []
+        nothing = [None] * (_TORQUE - len(states))
+        given = (*states, *nothing, torque)
+        places = [_place(own, (count, n), kept) for own in given]
         found = np.empty(count * self._first[-1])
         load().brachis_values(
             count,
             n,
             arm,
-            (ctypes.c_void_p * len(places))(*places),
+            (ctypes.c_void_p * len(QUANTITIES))(*places),
             len(self._table),
             address(self._table),
             address(found),

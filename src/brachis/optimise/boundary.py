@@ -183,17 +183,19 @@ def stack_splines(
     """
     most = max((len(spline.given) for spline in splines), default=1)
     given = np.zeros((most, len(splines), count))
-    nothing = np.empty(0, dtype=int)
-    points = [nothing]
-    columns = [nothing]
-    weights = [np.empty(0)]
+    parts = [spline.free_part for spline in splines]
+    points = [np.empty(0, dtype=int)]
+    columns = [np.empty(0, dtype=int)]
     for number, (spline, own) in enumerate(zip(splines, slices, strict=True)):
         given[: len(spline.given), number] = spline.given
         points.append(number * count + spline.free_part.point)
         columns.append(own.start + spline.free_part.variable)
-        weights.append(spline.free_part.weight)
-    parts = (np.concatenate(own) for own in (points, columns, weights))
-    free_part = FreePart(*parts, (len(splines) * count, variables))
+    free_part = FreePart(
+        np.concatenate(points),
+        np.concatenate(columns),
+        np.concatenate([np.empty(0), *(part.weight for part in parts)]),
+        (len(splines) * count, variables),
+    )
     return free_part, given.reshape(most, -1)
 
 
