@@ -94,6 +94,8 @@ _SAME_TIME = 1e-9
 """Normalised times that differ by less are the same knot or grid point, seen from its two sides."""
 _EVERYWHERE = slice(5, None, 10)
 """Of the dense grid's times: one more between neighbouring collocation points."""
+_IN_A_GAP = 4
+"""Steps into which a gap between collocation points is cut where the motion leaves the branch, or the chart."""
 _BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
 """Points around an abrupt change, in steps of the dense grid."""
 
@@ -216,6 +218,27 @@ def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
         # Reachable, but singular or too far apart to count turns: more points everywhere.
         return dense.t_norm[_EVERYWHERE]
     return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
+
+
+def add_points_where_lost(program: Program, x: np.ndarray) -> Program | None:
+    """Add collocation points between those between which a motion leaves the branch, or the chart.
+
+    Returns
+    -------
+    Program or None
+        None if it does so nowhere.
+    """
+    points = []
+    for phase, part in program.split(x):
+        motion = phase.motion(part)
+        t_norm = spread(phase.t_norm, _IN_A_GAP)
+        postures = phase.joint_map.postures(motion.at(t_norm * motion.t_end)[0])
+        is_lost = ~np.isfinite(postures).all(axis=1)
+        gaps = np.unique(np.flatnonzero(is_lost) // _IN_A_GAP)
+        inside = gaps[:, None] * _IN_A_GAP + np.arange(1, _IN_A_GAP)
+        points.append(np.union1d(phase.t_norm, t_norm[inside]))
+    finer = program.with_points(points)
+    return finer if finer.collocation_points > program.collocation_points else None
 
 
 def _suspects(

@@ -53,7 +53,7 @@ from brachis.optimise.improve import (
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
-from brachis.optimise.refine import RefinementOptions
+from brachis.optimise.refine import RefinementOptions, add_points_where_lost
 from brachis.optimise.retiming import (
     FINE,
     improve_joint_paths,
@@ -79,6 +79,8 @@ _PULL = 0.001
 """Weight of the pull towards the motion that is refined, with several redundant joints; see `Pulled`."""
 SLOW = "not refined: no faster than another over all knots"
 """Status of a candidate that does not beat the best one before refinement."""
+_LOOKS = 3
+"""Solves, no more, with points added where a motion leaves the branch, or the chart, between them."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
@@ -137,7 +139,7 @@ def _solve_over_time(
         program, x = begun
         target = program
     x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
-    solved = solve_by_margin_continuation(program, x, session, MARGINS)
+    solved = _solve_where_it_exists(program, x, session)
     solved = keep_feasible(solved, x)
     status = solved.report.status
     words = status.name.lower().replace("_", " ")
@@ -155,6 +157,27 @@ def _solve_over_time(
         coarse=coarse,
         not_completed=solved.not_completed,
     )
+
+
+def _solve_where_it_exists(
+    program: Program, x: np.ndarray, solve: SolverSession
+) -> SolvedProgram:
+    """Solve, with more collocation points as long as the motion leaves the branch, or the chart, between them.
+
+    Refinement cannot add these points: it begins with a motion that can be evaluated there.
+    """
+    solved = SolvedProgram(program)
+    for _ in range(_LOOKS):
+        again = solve_by_margin_continuation(program, x, solve, MARGINS)
+        reports = (*solved.reports, *again.reports)
+        solved = dataclasses.replace(again, reports=reports)
+        if not solved.usable or solve.deadline.passed:
+            break
+        finer = add_points_where_lost(program, solved.x)
+        if finer is None:
+            break
+        program = finer
+    return solved
 
 
 def finish_candidate(
