@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import brachis
+from brachis.limits import joint
 from support.phases import phase_of, reachable_points
+from support.starts import starting_points
 
 
 @pytest.mark.parametrize("case", ["r0", "r1", "r2"])
@@ -51,3 +54,46 @@ def test_slopes_are_differences(case):
             np.testing.assert_allclose(
                 exact, expected, atol=2e-6 * (1.0 + np.abs(expected).max())
             )
+
+
+@pytest.mark.parametrize("example", ["scara_line", "tx90l_rail_line", "tilted_torch"])
+def test_joint_limits_are_quantities_of_the_kernel(example):
+    program, _ = brachis.transcribe(getattr(brachis.examples, example))
+    for phase in program.phases:
+        groups = phase.evaluator._groups
+        others = {phase.limits[number].kind for number in groups.open}
+        kinds = {limit.kind for limit in phase.limits} - others
+        assert "torque" in kinds
+        assert not others & {"torque", "velocity", "acceleration", "position", "jerk"}
+
+
+class DoubledTorque(joint.TorqueLimit):
+    """A subclass with another quantity."""
+
+    def quantity(self, motion):
+        return 2.0 * super().quantity(motion)
+
+    def quantity_partials(self, motion):
+        return super().quantity_partials(motion).map(lambda part: 2.0 * part)
+
+
+def test_limits_of_another_robot_and_subclasses_have_values_of_their_own():
+    program, _ = brachis.transcribe(
+        brachis.examples.scara_line, redundant_joints=["j1"]
+    )
+    (phase,) = program.phases
+    robot = phase.joint_map.robot
+    heavy = robot.with_payload(3.0)
+    joints = np.arange(robot.n)
+    limits = (
+        joint.TorqueLimit(robot, joints),
+        joint.TorqueLimit(heavy, joints),
+        DoubledTorque(robot, joints),
+    )
+    x = next(starting_points(program))
+    evaluation = phase.with_limits(limits).evaluate(x)
+    for limit, values in zip(limits, evaluation.by_limit, strict=True):
+        np.testing.assert_allclose(values, limit.values(evaluation.motion), atol=1e-12)
+    light, with_load, doubled = np.split(evaluation.slopes, 3, axis=2)
+    np.testing.assert_allclose(doubled, 2.0 * light, atol=1e-10)
+    assert np.abs(with_load - light).max() > 0.1

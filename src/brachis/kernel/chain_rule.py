@@ -181,6 +181,8 @@ class Groups:
         Of which torques are; None where no group needs them.
     has_jerk : bool
         Whether a scaled quantity is a jerk.
+    open : list of int
+        Numbers of the groups that have partials.
     """
 
     def __init__(
@@ -195,7 +197,7 @@ class Groups:
         self._table["quantity"] = -1
         self.chain: Chain | None = None
         self.has_jerk = False
-        self._open = [number for number, own in enumerate(scaled) if own is None]
+        self.open = [number for number, own in enumerate(scaled) if own is None]
         for row, own in zip(self._table, scaled, strict=True):
             if own is not None:
                 self._set(row, own)
@@ -222,6 +224,8 @@ class Groups:
         self._kept += [joints, offsets, factors]
         self.has_jerk |= own.quantity == "qdddot"
         if quantity == _TORQUE:
+            if self.chain not in (None, own.chain):
+                raise ValueError("torques are of more than one chain")
             self.chain = own.chain
 
     def values(
@@ -301,9 +305,9 @@ class Groups:
         kept: list[np.ndarray] = []
         table = self._table
         has_jerk = self.has_jerk
-        if self._open:
+        if self.open:
             table = table.copy()
-            for number, (by_joints, by_s) in zip(self._open, partials, strict=True):
+            for number, (by_joints, by_s) in zip(self.open, partials, strict=True):
                 has_jerk |= by_joints[-1] is not None
                 _set_partials(table[number], by_joints, by_s, (count, n), kept)
         if has_jerk and motion.qdddot_y is None:

@@ -133,10 +133,9 @@ void brachis_path_derivatives(path_motion *own)
     const prescribed *asked = own->asked;
     long count = own->count;
     long n = own->arm->joints;
-    if (own->is_differentiated) {
+    if (__atomic_load_n(&own->is_differentiated, __ATOMIC_ACQUIRE)) {
         return;
     }
-    own->is_differentiated = 1;
     long used[6];
     double signs[6];
     long m = rows_of(asked, used, signs);
@@ -236,6 +235,8 @@ void brachis_path_derivatives(path_motion *own)
         write_block(second, own->qddot_ydot, count, n * c, k);
         write_block(third, own->qddot_y, count, n * c, k);
     }
+    /* Another thread that comes meanwhile writes the same numbers. */
+    __atomic_store_n(&own->is_differentiated, 1, __ATOMIC_RELEASE);
 }
 
 /* M = A A^T, (n, n) */

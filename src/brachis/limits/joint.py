@@ -19,13 +19,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
 
 from brachis.common.arrays import apply_each, rates
-from brachis.kernel import ScaledQuantity
+from brachis.kernel import Chain, ScaledQuantity
 from brachis.limits.protocol import (
     Bound,
     Guarantee,
@@ -121,10 +120,10 @@ class JointLimit(Limit):
         own = self._of_joints(self.quantity(motion))
         return (own - self._middle) * self._scale
 
-    def _scaled(self, quantity: str) -> ScaledQuantity:
-        """Describe the values, where they are a quantity of the kernel."""
+    def as_quantity(self, name: str) -> ScaledQuantity:
+        """Describe the values as those of a quantity of the kernel."""
         return ScaledQuantity(
-            quantity, self._joints, self._middle, self._scale, self._robot.chain
+            name, self._joints, self._middle, self._scale, self._robot.chain
         )
 
     def _of_joints(self, every: np.ndarray) -> np.ndarray:
@@ -141,10 +140,6 @@ class _DerivativeLimit(JointLimit):
 
     derivative: str
     """Name of the quantity in `JointStates` and in `Partials`."""
-
-    @cached_property
-    def scaled(self) -> ScaledQuantity:  # type: ignore[override]
-        return self._scaled(self.derivative)
 
     def quantity(self, motion: JointStates) -> np.ndarray:
         return getattr(motion, self.derivative)
@@ -251,10 +246,6 @@ class TorqueLimit(_TorqueLimit, HasLatticeWeights):
     at_rest = "posture"
     refusal = "cannot hold the arm against gravity"
 
-    @cached_property
-    def scaled(self) -> ScaledQuantity:  # type: ignore[override]
-        return self._scaled("torque")
-
     def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
         return self._scale_rows(dynamics.mass_matrices(self._robot, q)), None
 
@@ -359,6 +350,30 @@ JOINT_LIMITS = {
     )
 }
 """The limit of every row of `LIMIT_KINDS`."""
+_QUANTITIES: dict[type[Limit], str] = {
+    TorqueLimit: "torque",
+    VelocityLimit: "qdot",
+    AccelerationLimit: "qddot",
+    PositionLimit: "q",
+    JerkLimit: "qdddot",
+}
+"""Limits whose values are a quantity of the kernel, less an offset, times a factor."""
+
+
+def as_quantity(limit: Limit, chain: Chain) -> ScaledQuantity | None:
+    """Describe the values of a limit as those of a quantity of the kernel.
+
+    Returns
+    -------
+    ScaledQuantity or None
+        None for any other limit, for those of another chain, and for subclasses, which may have values of their own.
+    """
+    name = _QUANTITIES.get(type(limit))
+    if name is None:
+        return None
+    assert isinstance(limit, JointLimit)
+    found = limit.as_quantity(name)
+    return found if found.chain is chain else None
 
 
 def reciprocals_near(

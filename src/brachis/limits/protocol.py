@@ -22,7 +22,6 @@ from typing import Any, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 
-from brachis.kernel import ScaledQuantity
 from brachis.robot import Robot
 from brachis.robot.custom_limits import name_failures
 from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
@@ -254,9 +253,6 @@ class Description:
         by a little. 0 where that is not known.
     refusal : str
         What a message says of an arm at rest beyond the limit, after "the ... limit".
-    scaled : ScaledQuantity or None
-        Where all values are quantities of single joints: which, for the compiled evaluator, in place of values and
-        partials. A subclass with its own `values` or `partials` has none.
     """
 
     kind: str
@@ -272,7 +268,6 @@ class Description:
     violation_scale: np.ndarray | float = 1.0
     inset: np.ndarray | float = 0.0
     refusal: str = "is exceeded at rest"
-    scaled: ScaledQuantity | None = None
 
     origin: str = ""
     """Where the user gives it, for messages; brachis sets it for limits that are not its own."""
@@ -338,8 +333,6 @@ class Limit(Description, ABC):
         for name in ("values", "partials"):
             if name in vars(cls):
                 setattr(cls, name, _name_failures_of(vars(cls)[name]))
-                if "scaled" not in vars(cls):
-                    cls.scaled = None
 
     @abstractmethod
     def values(self, motion: JointStates) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from brachis.kernel import Groups, VariableSlopes
 from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Partials
+from brachis.limits import Limit, Partials, as_quantity
 
 
 class Evaluator:
@@ -46,7 +46,9 @@ class Evaluator:
         means = [limit.guarantee.is_mean for limit in self.limits]
         self.is_mean = np.repeat(np.array(means, dtype=bool), counts)
         self.has_means = any(means)
-        self._groups = Groups([limit.scaled for limit in self.limits], counts)
+        chain = joint_map.robot.chain
+        quantities = [as_quantity(limit, chain) for limit in self.limits]
+        self._groups = Groups(quantities, counts)
 
     def evaluate(
         self,
@@ -108,11 +110,10 @@ class Evaluation:
         values, torque = self.groups.values(states, known)
         if chain is not None and torque is not None:
             motion.share_torque(chain, torque)
-        pairs = zip(self.limits, values, strict=True)
-        return tuple(
-            limit.values(motion) if limit.scaled is None else own
-            for limit, own in pairs
-        )
+        found = list(values)
+        for number in self.groups.open:
+            found[number] = self.limits[number].values(motion)
+        return tuple(found)
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -128,9 +129,8 @@ class Evaluation:
         self, variables: VariableSlopes | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return `slopes`, and entries of the Jacobian by variables, (z, c), if these are given."""
-        partials = [
-            limit.partials(self.motion) for limit in self.limits if limit.scaled is None
-        ]
+        others = (self.limits[number] for number in self.groups.open)
+        partials = [limit.partials(self.motion) for limit in others]
         return self._differentiate(self.groups, partials, variables)
 
     def chain(self, partials: Partials) -> np.ndarray:

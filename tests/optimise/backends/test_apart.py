@@ -101,6 +101,29 @@ def test_a_solver_that_does_not_come_back_is_ended(monkeypatch):
     assert not own_children()
 
 
+def test_what_a_solve_had_found_before_it_was_ended_is_its_answer(monkeypatch):
+    better = np.array([2.0, 0.25])
+
+    def find_and_hang(monitor, *_):
+        for x, violation in (better, 0.0), (START, 0.0), (0.0 * START, 1.0):
+            objective = monitor.problem.objective(x)
+            monitor.keep(x, objective, violation)
+            monitor.between_iterations(objective)
+        time.sleep(1e6)
+
+    monkeypatch.setattr(uno, "_run", find_and_hang)
+    report = solve(SolverOptions(time_limit=0.3))
+    assert report.status is SolveStatus.TIME_LIMIT
+    assert disc().objective(better) < disc().objective(START)
+    np.testing.assert_array_equal(report.x, better)
+    assert report.objective == disc().objective(better)
+    assert not own_children()
+
+
+def test_without_a_time_limit_it_is_not_ended():
+    assert solve(SolverOptions(time_limit=np.inf)).status is SolveStatus.OPTIMAL
+
+
 def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
     monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
     context = multiprocessing.get_context("fork")

@@ -79,8 +79,8 @@ class Solver:
     ) -> SolverReport:
         """Solve `problem` from the start `x`.
 
-        A large problem that is not solved in time has the start as its `x`, and the status `TIME_LIMIT`; one whose
-        solve is ended for its silence, the status `STALLED`.
+        A large problem that is not solved in time has the best feasible iterate as its `x`, or the start if none is
+        known, and the status `TIME_LIMIT`; one whose solve is ended for its silence, the status `STALLED`.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class Solver:
         elif not is_usable(x) or any(np.isnan(bound).any() for bound in bounds):
             refusal = "the start or a bound is not a finite number"
         if refusal:
-            return _report_start(self.name, problem, x, status, refusal)
+            return _report_point(self.name, problem, x, status, refusal)
         with solve_lock:
             most = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
             # A daemonic process may have no children; the limit then holds between iterations alone.
@@ -107,7 +107,7 @@ class Solver:
             return self.run(SolveMonitor(problem, options, progress), x)
 
 
-def _report_start(
+def _report_point(
     solver: str,
     problem: Problem,
     x: np.ndarray,
@@ -115,7 +115,7 @@ def _report_start(
     message: str,
     wall_time: float = 0.0,
 ) -> SolverReport:
-    """Report a solve that gave no answer: the start `x`, (v,), stays."""
+    """Report a solve that gave no answer: a point that is known, `x`, (v,), stays."""
     values = (objective_at(problem, x), residual(problem, x))
     none = np.zeros(len(problem.lower))
     return SolverReport(solver, status, x, *values, none, 0, wall_time, message)
@@ -148,7 +148,7 @@ def subprocess_solve(
         sender.close()
         is_large = len(x) * len(problem.lower) > ENTRIES
         silence = np.inf if is_large else _SILENCE
-        answer = _receive(receiver, until + _GRACE, silence, progress)
+        answer, best = _receive(receiver, until + _GRACE, silence, progress)
     finally:
         if process.pid is not None:
             process.kill()
@@ -168,26 +168,40 @@ def subprocess_solve(
     if now > until:
         status = SolveStatus.TIME_LIMIT
         message = "ended: it did not finish in time"
-    return _report_start(solver.name, problem, x, status, message, now - began)
+    kept = x if best is None else best
+    return _report_point(solver.name, problem, kept, status, message, now - began)
 
 
 def _receive(
     receiver: Connection, until: float, silence: float, progress: Progress | None
-) -> SolverReport | Exception | SolveStatus | None:
-    """Pass on the progress until the answer comes; None where none comes in time, or at all.
+) -> tuple[SolverReport | Exception | SolveStatus | None, np.ndarray | None]:
+    """Pass on the progress until the answer comes.
 
-    Where nothing is heard for `silence`, s, return `SolveStatus.STALLED`.
+    Returns
+    -------
+    answer : SolverReport, Exception, SolveStatus or None
+        None where none comes in time, or at all; `SolveStatus.STALLED` where nothing is heard for `silence`, s.
+    best : (v,) ndarray or None
+        The best feasible iterate that was heard of.
     """
-    while receiver.poll(max(min(until - time.monotonic(), silence), 0.0)):
+    best = None
+    while receiver.poll(_seconds(min(until - time.monotonic(), silence))):
         try:
             message = receiver.recv()
         except EOFError:
-            return None
+            return None, best
         if isinstance(message, SolverReport | Exception):
-            return message
+            return message, best
+        iteration, objective, found = message
+        best = best if found is None else found
         if progress is not None:
-            progress(*message)
-    return None if time.monotonic() >= until else SolveStatus.STALLED
+            progress(iteration, objective)
+    return None if time.monotonic() >= until else SolveStatus.STALLED, best
+
+
+def _seconds(time_left: float) -> float | None:
+    """Return how long to wait, as the system wants to hear it."""
+    return max(time_left, 0.0) if np.isfinite(time_left) else None
 
 
 def _work(
@@ -202,14 +216,21 @@ def _work(
     The system ends it when its time is up, wherever it is then, even if nobody waits for it any more.
     """
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_REAL, options.time_limit + _GRACE)
+    if np.isfinite(options.time_limit):
+        signal.setitimer(signal.ITIMER_REAL, options.time_limit + _GRACE)
+
+    sent: np.ndarray | None = None
 
     def progress(iteration: int, objective: float) -> None:
-        sender.send((iteration, objective))
+        nonlocal sent
+        best = None if monitor.best is None else monitor.best[1]
+        sender.send((iteration, objective, None if best is sent else best))
+        sent = best
 
+    monitor = SolveMonitor(problem, options, progress)
     try:
         with ThreadpoolController().limit(limits=1, user_api="blas"):
-            sender.send(run(SolveMonitor(problem, options, progress), x))
+            sender.send(run(monitor, x))
     except Exception as error:  # noqa: BLE001  (raised where the solve was asked for)
         sender.send(_make_sendable(error))
 

@@ -45,6 +45,11 @@ class SolveMonitor:
     problem : Problem
     options : SolverOptions
     progress : Progress or None
+
+    Attributes
+    ----------
+    best : tuple of (float, (v,) ndarray) or None
+        Objective and iterate of what was kept by `keep`.
     """
 
     def __init__(
@@ -56,6 +61,7 @@ class SolveMonitor:
         self.failure: BaseException | None = None
         self.timed_out = False
         self.exhausted = False
+        self.best: tuple[float, np.ndarray] | None = None
         self._evaluations = 0
         self.stagnated = False
         self.is_beaten = False
@@ -101,6 +107,12 @@ class SolveMonitor:
             except (KeyboardInterrupt, Exception) as error:  # noqa: BLE001  (`report` raises it)
                 self.failure = error
         return self.must_stop()
+
+    def keep(self, x: np.ndarray, objective: float, infeasibility: float) -> None:
+        """Keep an iterate if it is the best feasible one so far."""
+        is_feasible = infeasibility <= self._feasible_below
+        if is_feasible and (self.best is None or objective < self.best[0]):
+            self.best = objective, x
 
     def has_lost(self, objective: float) -> bool:
         """Tell whether an iterate is still worse than what the solve has to beat; kept in `is_beaten`."""

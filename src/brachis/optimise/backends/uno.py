@@ -49,7 +49,9 @@ _LOST = 0.9
 _WIDENING = 1e-6
 """Largest widening of a row's bound, no more than the tolerance,"""
 _WIDER = 0.05
-"""or this part of the tolerance, where that is more."""
+"""or this part of the tolerance, where that is more,"""
+_WIDEST = 5e-5
+"""up to this: refinement would take back more."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """Multiples of this, modulo 1, are spread evenly."""
 
@@ -159,6 +161,8 @@ class _Stall:
         own = self._units * point[: len(self._units)]
         objective = objective_at(monitor.problem, own)
         self._objectives.append(objective)
+        if not restores:
+            monitor.keep(own, objective, infeasibility)
         stop = monitor.between_iterations(objective)
         stop = stop or monitor.iterations >= monitor.options.max_iterations
         counts = is_near or (monitor.options.anywhere and not restores)
@@ -209,7 +213,7 @@ def _run(
         scale(monitor.gradient, units),
     )
     tolerance = options.tolerance
-    most = max(min(_WIDENING, tolerance), _WIDER * tolerance)
+    most = max(min(_WIDENING, tolerance), min(_WIDER * tolerance, _WIDEST))
     lower, upper = _spread_bounds(problem.lower, problem.upper, most)
     model.set_constraints(
         len(lower),
