@@ -16,7 +16,7 @@ from brachis.common.deadline import Deadline
 from brachis.errors import StartError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.refine import RefinementOptions, refine
-from brachis.search.candidates import MARGINS, solve_by_margin_continuation
+from brachis.search.continuation import MARGINS, solve_by_margin_continuation
 from support.effort import QUICK
 from support.starts import starting_points
 

@@ -9,14 +9,14 @@ from brachis.kernel import (
     Basis,
     Chain,
     Conditions,
-    CurvePlaces,
+    CurvePattern,
     Formula,
-    Groups,
     MotionSlopes,
     PathMotion,
     Prescribed,
     ScaledQuantity,
     Spline,
+    ValueGroups,
     VariableSlopes,
     find_least_singular,
     find_postures,
@@ -64,11 +64,11 @@ def work() -> None:
         chain.tool_size_slopes(quantity, q, qdot, qddot)
     every = np.arange(N)
     torque = ScaledQuantity("torque", every, np.zeros(N), np.ones(N), chain)
-    groups = Groups([torque, None], [N, N])
-    groups.values((q, qdot, qddot))
+    groups = ValueGroups([torque, None], [N, N])
+    groups.values((q, qdot, qddot), q)
     slopes = MotionSlopes(motion.gradient, *motion.slopes, path_motion=motion)
     places = np.arange(POINTS)
-    of_curves = CurvePlaces(places, places % 2, POINTS, 2)
+    of_curves = CurvePattern(places, places % 2, POINTS, 2)
     shared = np.ones((2, 3, POINTS, 2))
     variables = VariableSlopes(shared, of_curves, np.ones((3, POINTS)))
     states = (q, qdot, qddot)

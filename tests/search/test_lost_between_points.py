@@ -10,10 +10,13 @@ import pytest
 import brachis
 from brachis.common.deadline import NEVER
 from brachis.errors import UnreachableError
-from brachis.optimise.backends import SolverOptions, SolveStatus
-from brachis.optimise.improve import SolverSession
+from brachis.kinematics import ClosedFormMap
+from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
+from brachis.optimise.guess import starting_point
+from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.refine import add_points_where_lost
-from brachis.search import candidates
+from brachis.search import continuation
+from brachis.search.differential_ik import differential_ik_paths
 from support.starts import starting_points
 
 
@@ -53,24 +56,72 @@ def test_nothing_is_added_to_a_motion_that_is_reachable(program):
     assert add_points_where_lost(program, next(starting_points(program))) is None
 
 
-def test_it_is_solved_again_from_the_start(program, swinging, monkeypatch):
+@pytest.mark.parametrize("found_after", [1, 9])
+def test_it_is_solved_again_from_the_start(program, swinging, monkeypatch, found_after):
     few, lost = swinging
     x = next(starting_points(program))
     begun = []
 
     def solve(program, start, solve, _margins):
-        answer = lost if not begun else x
+        answer = lost if len(begun) < found_after else x
         begun.append((program.collocation_points, start))
         report = solve(program, start)
         report = replace(report, x=answer, status=SolveStatus.OPTIMAL)
-        return candidates.SolvedProgram(program, (report,))
+        return SolvedProgram(program, (report,))
 
-    (backend,) = candidates.solvers_for("uno")
+    (backend,) = solvers_for("uno")
     session = SolverSession(backend, SolverOptions(max_iterations=1), NEVER)
-    monkeypatch.setattr(candidates, "solve_by_margin_continuation", solve)
-    solved = candidates._solve_where_it_exists(few, x, session)
-    assert [count for count, _ in begun] == [5, 8]
+    monkeypatch.setattr(continuation, "solve_by_margin_continuation", solve)
+    solved = continuation.solve_within_branch(few, x, session)
+    counts = [count for count, _ in begun]
+    assert counts[:2] == [5, 8]
+    assert len(counts) == (2 if found_after == 1 else 3)
     assert all(start is x for _, start in begun)
-    assert solved.program.collocation_points == 8
-    assert len(solved.reports) == 2
-    np.testing.assert_array_equal(solved.report.x, x)
+    assert solved.program.collocation_points == counts[-1]
+    assert len(solved.reports) == len(counts)
+    np.testing.assert_array_equal(solved.report.x, x if found_after == 1 else lost)
+
+
+def test_the_last_point_may_be_lost_and_a_phase_with_a_given_speed(monkeypatch):
+    program, _ = brachis.transcribe(
+        brachis.examples.scara_line,
+        redundant_joints=["j1"],
+        intervals=6,
+        tool_limits={"process_speed": [{"speed": 0.1, "s": [0.3, 0.6]}]},
+    )
+    assert any(phase.time_law is not None for phase in program.phases)
+    paths = [next(differential_ik_paths(phase.joint_map)) for phase in program.phases]
+    x = starting_point(program, paths, [None] * len(paths))
+    assert add_points_where_lost(program, x) is None
+    honest = ClosedFormMap.postures
+
+    def lose_the_last(self, y, *sample, **near):
+        q = honest(self, y, *sample, **near)
+        q[-1] = np.nan
+        return q
+
+    monkeypatch.setattr(ClosedFormMap, "postures", lose_the_last)
+    finer = add_points_where_lost(program, x)
+    added = [
+        np.setdiff1d(fine.t_norm, phase.t_norm)
+        for fine, phase in zip(finer.phases, program.phases, strict=True)
+    ]
+    assert all(len(own) == 3 for own in added)
+    assert all(
+        own.min() > phase.t_norm[-2]
+        for own, phase in zip(added, program.phases, strict=True)
+    )
+
+
+def test_a_motion_that_turns_too_far_between_points_gets_points_everywhere(
+    program, monkeypatch
+):
+    x = next(starting_points(program))
+
+    def refuse(*_arguments, **_turns):
+        raise UnreachableError("a joint turns too far")
+
+    monkeypatch.setattr(ClosedFormMap, "choose_turns", refuse)
+    finer = add_points_where_lost(program, x)
+    gaps = program.collocation_points - 1
+    assert finer.collocation_points == program.collocation_points + 3 * gaps

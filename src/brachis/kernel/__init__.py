@@ -6,10 +6,10 @@ formulas.
 
 from brachis.kernel.chain import Chain
 from brachis.kernel.chain_rule import (
-    CurvePlaces,
-    Groups,
+    CurvePattern,
     MotionSlopes,
     ScaledQuantity,
+    ValueGroups,
     VariableSlopes,
 )
 from brachis.kernel.formula import Formula
@@ -27,14 +27,14 @@ __all__ = [
     "Basis",
     "Chain",
     "Conditions",
-    "CurvePlaces",
+    "CurvePattern",
     "Formula",
-    "Groups",
     "MotionSlopes",
     "PathMotion",
     "Prescribed",
     "ScaledQuantity",
     "Spline",
+    "ValueGroups",
     "VariableSlopes",
     "blossom",
     "body_twists",

@@ -13,9 +13,9 @@ typedef struct {
 
 enum { TORQUE = 4 };
 
-/* A group of values. Either quantities of one joint each, less an offset, times a factor: the derivative of q of the order
-`quantity`, up to 3, or the torque. Or, where `quantity` is negative, their partials by q, qdot, qddot and qdddot, and by s,
-(K, values), or null. */
+/* A group of values. Either each value is (quantity of one joint - offset) * factor, with `quantity` 0 to 3 for q and its
+derivatives and TORQUE for the torque. Or `quantity` is -1, and partial derivatives by q, qdot, qddot and qdddot, and by s, (K,
+values), are given; a null pointer stands for zeros. */
 typedef struct {
     long values;
     long quantity;
@@ -75,12 +75,13 @@ UNROLLED chain_rule(
     }
     /* Slopes of q, its derivatives and the torque by y, ydot, ...; those of the jerk follow Leibniz' rule. */
     const double *torque = motion->torque;
+    long block = torque ? count * n * width : 0;
     const double *slopes[5][4] = {
         {motion->gradient},
         {motion->qdot_y, motion->gradient},
         {motion->qddot_y, motion->qddot_ydot, motion->gradient},
         {motion->qdddot_y, motion->qddot_y, motion->qdot_y, motion->gradient},
-        {torque, torque + count * n * width, torque + 2 * count * n * width},
+        {torque, torque + block, torque + 2 * block},
     };
     for (long k = 0; k < count; k++) {
         long at = k * n * width;
@@ -111,12 +112,12 @@ UNROLLED chain_rule(
     }
 }
 
-/* Where variables move the curves and their time derivatives up to an order below `orders`. First those that move all curves, at each of the K points: `shared`, (broad, orders, K,
-width), are slopes of the curves and their time derivatives by them. Each of the others moves one curve at one point, by
-`basis`, (orders, z). */
+/* Where variables move the curves and their time derivatives up to an order below `orders`. First those that move all curves,
+at each of the K points: `shared`, (shared_count, orders, K, width), are slopes of the curves and their time derivatives by
+them. Each of the others moves one curve at one point, by `basis`, (orders, z). */
 typedef struct {
     long orders;
-    long broad;
+    long shared_count;
     const double *shared;
     long entries; /* z */
     const long *points, *curves;
@@ -127,12 +128,12 @@ UNROLLED entries_of(
     long width, long count, long columns, const double *table, const variables *by, double *found
 )
 {
-    double *of_one = found + by->broad * count * columns;
+    double *of_one = found + by->shared_count * count * columns;
     for (double *own = found; own < of_one + by->entries * columns; own++) {
         *own = 0.0;
     }
     for (long order = 0; order < by->orders; order++) {
-        for (long row = 0; row < by->broad * count; row++) {
+        for (long row = 0; row < by->shared_count * count; row++) {
             const double *slopes = table + (order * count + row % count) * columns * width;
             const double *factors = by->shared + ((row / count * by->orders + order) * count + row % count) * width;
             for (long i = 0; i < columns; i++) {
@@ -151,7 +152,7 @@ UNROLLED entries_of(
     }
 }
 
-/* Entries of a Jacobian, (broad K + z, columns), from slopes by the curves. */
+/* Entries of a Jacobian, (shared_count K + z, columns), from slopes by the curves. */
 void brachis_entries(
     long count, long columns, long width, const double *table, const variables *by, double *found
 )
@@ -160,22 +161,16 @@ void brachis_entries(
 }
 
 /* Slopes of groups of values by y, ydot, yddot and, with 4 orders, ydddot: a table, (orders, K, columns, width); and entries
-by variables, if they are asked for. Along a path the motion is `along`, and differentiated if that has not been done; else its
-slopes are given, and `states` are q, qdot and qddot. Torques are those of the arm, with room for their slopes. */
+by variables, if they are asked for. Along a path the motion is first differentiated, if that has not been done. With an arm
+the slopes of its torques are found in `motion`; `states` are q, qdot and qddot. */
 void brachis_differentiate(
-    long count, long n, long width, path_motion *along, const chain *arm, const double **states, motion_slopes *motion,
-    long groups, const group *of, long orders, long columns, double *table, const variables *by, double *found
+    long count, long n, long width, path_motion *along, const chain *arm, const double **states,
+    const motion_slopes *motion, long groups, const group *of, long orders, long columns, double *table,
+    const variables *by, double *found
 )
 {
     if (along) {
         brachis_path_derivatives(along);
-        states[0] = along->q;
-        states[1] = along->qdot;
-        states[2] = along->qddot;
-        motion->gradient = along->gradients;
-        motion->qdot_y = along->qdot_y;
-        motion->qddot_y = along->qddot_y;
-        motion->qddot_ydot = along->qddot_ydot;
     }
     if (arm) {
         brachis_torque_slopes(arm, count, width, states, motion);
@@ -187,14 +182,9 @@ void brachis_differentiate(
 }
 
 /* Values of the groups that are quantities of joints, each (K, values), one behind the other; `quantities` are q and its three
-derivatives and the torque, (K, n), which is computed with an arm. */
-void brachis_values(
-    long count, long n, const chain *arm, double *const *quantities, long groups, const group *of, double *found
-)
+derivatives and the torque, (K, n). */
+void brachis_values(long count, long n, const double **quantities, long groups, const group *of, double *found)
 {
-    if (arm) {
-        brachis_torques(arm, count, quantities[0], quantities[1], quantities[2], quantities[TORQUE]);
-    }
     for (const group *own = of; own < of + groups; own++) {
         for (long k = 0; k < count && own->quantity >= 0; k++) {
             const double *quantity = quantities[own->quantity] + k * n;

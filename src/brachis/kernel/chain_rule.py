@@ -65,7 +65,8 @@ class MotionSlopes:
     qdddot_y : (K, n, c) ndarray or None
         Where a value depends on the jerk.
     path_motion : PathMotion or None
-        Along a path the motion whose slopes they are, which is differentiated when they are needed.
+        Along a path the motion whose slopes they are. All but `gradient` are without numbers until that is
+        differentiated: by `PathMotion.derivatives`, or by `ValueGroups.differentiate`.
     """
 
     gradient: np.ndarray
@@ -76,7 +77,19 @@ class MotionSlopes:
     path_motion: PathMotion | None = None
 
 
-class CurvePlaces:
+class _Variables(ctypes.Structure):
+    """`variables` of chain_rule.c."""
+
+    _fields_ = [
+        ("orders", ctypes.c_long),
+        ("shared_count", ctypes.c_long),
+        ("shared", ctypes.c_void_p),
+        ("entries", ctypes.c_long),
+        *((name, ctypes.c_void_p) for name in ("points", "curves", "basis")),
+    ]
+
+
+class CurvePattern:
     """Where each of z variables matters: at which of K points, and for which of c curves.
 
     Parameters
@@ -116,40 +129,35 @@ class VariableSlopes:
     ----------
     shared : (b, orders, K, c) ndarray
         By the b variables that move all curves, at all points.
-    places : CurvePlaces
+    pattern : CurvePattern
         Of the other z variables.
     basis : (orders, z) ndarray
         Slopes of the curve of each, and of its time derivatives, by it.
     """
 
     shared: np.ndarray
-    places: CurvePlaces
+    pattern: CurvePattern
     basis: np.ndarray
 
     @property
     def entries(self) -> int:
         """How many entries a value has in the Jacobian, b K + z."""
-        return len(self.shared) * self.places.shape[0] + self.places.size
+        return len(self.shared) * self.pattern.shape[0] + self.pattern.size
 
-    def arguments(self, orders: int, kept: list[np.ndarray]) -> Any:
-        """`variables` of chain_rule.c; what is added to `kept` has to stay alive."""
+    def structure(self, orders: int, kept: list[np.ndarray]) -> _Variables:
+        """Return what the library reads; what is added to `kept` has to stay alive."""
         orders = min(orders, len(self.basis))
-        broad = len(self.shared)
-        shared = as_doubles(
-            self.shared[:, :orders], (broad, orders, *self.places.shape)
-        )
-        basis = as_doubles(self.basis[:orders], (orders, self.places.size))
-        kept += [shared, basis]
-        size = self.places.size
-        points, curves = self.places.addresses
-        return (ctypes.c_long * 7)(
-            orders, broad, address(shared), size, points, curves, address(basis)
-        )
+        count = len(self.shared)
+        size = self.pattern.size
+        whole = (count, orders, *self.pattern.shape)
+        shared = _keep_address(self.shared[:, :orders], whole, kept)
+        basis = _keep_address(self.basis[:orders], (orders, size), kept)
+        return _Variables(orders, count, shared, size, *self.pattern.addresses, basis)
 
     def find_entries(self, slopes: np.ndarray) -> np.ndarray:
         """Entries of a Jacobian, (b K + z, values), of values with slopes by the curves, (orders, K, values, c)."""
         orders, count, columns, width = slopes.shape
-        if (count, width) != self.places.shape:
+        if (count, width) != self.pattern.shape:
             raise ValueError("slopes are of other points or curves")
         kept: list[np.ndarray] = []
         table = as_doubles(slopes, slopes.shape)
@@ -159,13 +167,13 @@ class VariableSlopes:
             columns,
             width,
             address(table),
-            self.arguments(orders, kept),
+            ctypes.byref(self.structure(orders, kept)),
             address(found),
         )
         return found
 
 
-class Groups:
+class ValueGroups:
     """Groups of values of a joint motion.
 
     Parameters
@@ -181,7 +189,7 @@ class Groups:
         Of which torques are; None where no group needs them.
     has_jerk : bool
         Whether a scaled quantity is a jerk.
-    open : list of int
+    with_partials : list of int
         Numbers of the groups that have partials.
     """
 
@@ -197,14 +205,17 @@ class Groups:
         self._table["quantity"] = -1
         self.chain: Chain | None = None
         self.has_jerk = False
-        self.open = [number for number, own in enumerate(scaled) if own is None]
+        self._joints: int | None = None
+        self.with_partials = [
+            number for number, own in enumerate(scaled) if own is None
+        ]
         for row, own in zip(self._table, scaled, strict=True):
             if own is not None:
                 self._set(row, own)
 
-    def __reduce__(self) -> tuple[type[Groups], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[type[ValueGroups], tuple[Any, ...]]:
         """Leave addresses behind."""
-        return Groups, (self._scaled, self._sizes)
+        return ValueGroups, (self._scaled, self._sizes)
 
     def _set(self, row: np.void, own: ScaledQuantity) -> None:
         """Set what the library reads of a scaled quantity."""
@@ -217,6 +228,9 @@ class Groups:
         factors = as_doubles(own.factors, (count,))
         if joints.shape != (count,):
             raise ValueError("joints are not as many as values")
+        if self._joints not in (None, own.chain.n):
+            raise ValueError("the chains have different numbers of joints")
+        self._joints = own.chain.n
         row["quantity"] = quantity
         row["joints"] = address(joints)
         row["offsets"] = address(offsets)
@@ -228,9 +242,14 @@ class Groups:
                 raise ValueError("torques are of more than one chain")
             self.chain = own.chain
 
+    def _check_joints(self, n: int) -> None:
+        """Refuse a motion of another number of joints: the library would read beyond its end."""
+        if self._joints not in (None, n):
+            raise ValueError(f"the motion has {n} joints; needed: {self._joints}")
+
     def values(
         self, states: Sequence[np.ndarray], torque: Partial = None
-    ) -> tuple[tuple[np.ndarray, ...], Partial]:
+    ) -> list[np.ndarray]:
         """Compute the values of scaled quantities.
 
         Parameters
@@ -238,42 +257,37 @@ class Groups:
         states : sequence of (K, n) ndarray
             q, qdot, qddot and, where a group needs it, qdddot.
         torque : (K, n) ndarray, optional
-            If it is known.
+            Where a group needs it.
 
         Returns
         -------
-        values : tuple of (K, size) ndarray
+        list of (K, size) ndarray
             Of every group; nothing is set where it has partials.
-        torque : (K, n) ndarray or None
-            If it is known now.
         """
         count, n = states[0].shape
+        self._check_joints(n)
         if self.has_jerk and len(states) < _TORQUE:
             raise ValueError("a group needs qdddot")
-        arm = None
-        if torque is None and self.chain is not None:
-            torque = np.empty((count, n))
-            arm = self.chain.address
+        if self.chain is not None and torque is None:
+            raise ValueError("a group needs the torque")
         kept: list[np.ndarray] = []
         nothing = [None] * (_TORQUE - len(states))
         given = (*states, *nothing, torque)
-        places = [_place(own, (count, n), kept) for own in given]
+        addresses = [_keep_address(own, (count, n), kept) for own in given]
         found = np.empty(count * self._first[-1])
         load().brachis_values(
             count,
             n,
-            arm,
-            (ctypes.c_void_p * len(QUANTITIES))(*places),
+            (ctypes.c_void_p * len(QUANTITIES))(*addresses),
             len(self._table),
             address(self._table),
             address(found),
         )
         parts = zip(self._first, self._sizes, strict=False)
-        values = [
+        return [
             found[count * first : count * (first + size)].reshape(count, size)
             for first, size in parts
         ]
-        return tuple(values), torque
 
     def differentiate(
         self,
@@ -290,8 +304,8 @@ class Groups:
         states : sequence of (K, n) ndarray
             q, qdot and qddot.
         partials : sequence of (sequence of ndarray or None, ndarray or None)
-            Of the groups that are no scaled quantities, (K, size, n), by q, qdot, qddot and qdddot, and (K, size) by
-            the first curve.
+            Of the groups that are not scaled quantities, in order: (K, size, n), or (size, n) if all points share them,
+            by q, qdot, qddot and qdddot, and (K, size) by the first curve.
         variables : VariableSlopes, optional
 
         Returns
@@ -299,32 +313,32 @@ class Groups:
         slopes : (3 or 4, K, sum of sizes, c) ndarray
             By y, ydot, yddot and, with `qdddot_y`, ydddot.
         entries : (b K + z, sum of sizes) ndarray
-            See `VariableSlopes.find_entries`; (0, 0) without variables.
+            See `VariableSlopes.find_entries`; (0, sum of sizes) without variables.
         """
         count, n, width = motion.gradient.shape
+        self._check_joints(n)
         kept: list[np.ndarray] = []
         table = self._table
         has_jerk = self.has_jerk
-        if self.open:
+        if self.with_partials:
             table = table.copy()
-            for number, (by_joints, by_s) in zip(self.open, partials, strict=True):
+            for number, (by_joints, by_s) in zip(
+                self.with_partials, partials, strict=True
+            ):
                 has_jerk |= by_joints[-1] is not None
                 _set_partials(table[number], by_joints, by_s, (count, n), kept)
         if has_jerk and motion.qdddot_y is None:
             raise ValueError("values that depend on qdddot need qdddot_y")
         shape = count, n, width
+        parts = (motion.gradient, motion.qdot_y, motion.qddot_y, motion.qddot_ydot)
+        slopes = [_keep_address(own, shape, kept) for own in (*parts, motion.qdddot_y)]
+        of_states = [_keep_address(own, (count, n), kept) for own in states[:3]]
         along = motion.path_motion
-        slopes: list[int | None] = [None] * 4
-        of_states: list[int | None] = [None] * 3
-        if along is None:
-            parts = motion.gradient, motion.qdot_y, motion.qddot_y, motion.qddot_ydot
-            slopes = [_place(own, shape, kept) for own in parts]
-            of_states = [_place(own, (count, n), kept) for own in states]
-        slopes.append(_place(motion.qdddot_y, shape, kept))
+        if along is not None and along.chain.n != n:
+            raise ValueError("the motion along the path has other joints")
         arm = None
         if self.chain is not None:
-            torque = np.empty((3, *shape))
-            slopes.append(address(torque))
+            slopes.append(_keep_address(np.empty((3, *shape)), (3, *shape), kept))
             arm = self.chain.address
         columns = self._first[-1]
         orders = 3 if motion.qdddot_y is None else 4
@@ -332,10 +346,10 @@ class Groups:
         entries = np.empty((0, columns))
         by = None
         if variables is not None:
-            if variables.places.shape != (count, width):
+            if variables.pattern.shape != (count, width):
                 raise ValueError("variables are of other points or curves")
             entries = np.empty((variables.entries, columns))
-            by = variables.arguments(orders, kept)
+            by = ctypes.byref(variables.structure(orders, kept))
         load().brachis_differentiate(
             count,
             n,
@@ -355,7 +369,7 @@ class Groups:
         return found, entries
 
 
-def _place(
+def _keep_address(
     values: Partial, shape: tuple[int, ...], kept: list[np.ndarray]
 ) -> int | None:
     """Return where numbers are, None without any; what is added to `kept` has to stay alive."""
@@ -372,7 +386,7 @@ def _set_partials(
     points: tuple[int, int],
     kept: list[np.ndarray],
 ) -> None:
-    """Set what the library reads of partials at K points of n joints; see `_place`."""
+    """Set what the library reads of partials at K points of n joints; see `_keep_address`."""
     count, n = points
     size = int(row["values"])
     for name, partial in zip(_PARTIAL, by_joints, strict=True):
@@ -382,4 +396,4 @@ def _set_partials(
         kept.append(own)
         row[f"{name}_at"] = address(own)
         row[f"{name}_step"] = step
-    row["s"] = _place(by_s, (count, size), kept) or 0
+    row["s"] = _keep_address(by_s, (count, size), kept) or 0

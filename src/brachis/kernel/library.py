@@ -42,7 +42,7 @@ FUNCTIONS = {
     "brachis_singular_slopes": "- ppppp",
     "brachis_entries": "- lllppp",
     "brachis_differentiate": "- lllpppplpllppp",
-    "brachis_values": "- llpplpp",
+    "brachis_values": "- llplpp",
     "brachis_pick_nearest": "- lllppipp",
     "brachis_follow_turns": "- llppp",
     "brachis_set_turns": "i llppppppp",

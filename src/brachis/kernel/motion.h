@@ -11,10 +11,10 @@ typedef struct {
     const chain *arm;
     const prescribed *asked;
     long count;                        /* K */
+    long rows_step;                    /* from the rows of one point to those of the next, in doubles; 0 if all points share them */
     const double *q;                   /* (K, n) */
     const double *xi, *xi_ds, *xi_dds; /* (K, m): motion of the tool per unit of the path coordinate s */
     const double *rows;                /* (r, n): of the conditions, at every point */
-    long rows_step;                    /* from those of a point to those of the next one; 0 where they are the same */
     const double *ydot, *yddot;        /* (K, c) */
     const double *turning;             /* (2, K, r, n): first and second derivative of the rows by s; null where none */
     const double *drift;               /* (3, K, r): e, e' and e''; null likewise */
@@ -39,10 +39,6 @@ typedef struct {
 } motion_slopes;
 
 void brachis_path_derivatives(path_motion *own);
-
-void brachis_torques(
-    const chain *arm, long count, const double *q, const double *qdot, const double *qddot, double *torques
-);
 
 void brachis_torque_slopes(
     const chain *arm, long count, long width, const double **states, const motion_slopes *motion

@@ -114,9 +114,10 @@ static int all_finite(const double *values, long count)
     return 1;
 }
 
-/* Find postures, (K, n), that meet targets, (K, c), and C q = levels with rows C, (r, n), at every point, from `starts`, (K, n); NaN
-where the method does not converge. A step is no longer than `largest_step`. `beside` gives a posture up whose steps do not
-halve; tolerance and largest step are then in proportion to its size where that is above 1. */
+/* Find postures, (K, n), that meet targets, (K, c), and C q = levels, from `starts`, (K, n); NaN where the method does not
+converge. From the rows C of one point, (r, n), to those of the next it is `rows_step`, 0 if all points share them. A step is
+no longer than `largest_step`. `beside` gives a posture up whose steps do not halve; tolerance and largest step are then in
+proportion to its size where that is above 1. */
 void brachis_newton(
     const chain *arm, const prescribed *asked, long count, long coordinates, const double *targets,
     const double *starts, long conditions, const double *rows, long rows_step, const double *levels, long steps,

@@ -44,9 +44,8 @@ class _PathMotion(ctypes.Structure):
         ("arm", ctypes.c_void_p),
         ("asked", ctypes.c_void_p),
         ("count", ctypes.c_long),
-        *((name, ctypes.c_void_p) for name in _GIVEN[:5]),
         ("rows_step", ctypes.c_long),
-        *((name, ctypes.c_void_p) for name in (*_GIVEN[5:], *_FOUND, *_SLOPES)),
+        *((name, ctypes.c_void_p) for name in (*_GIVEN, *_FOUND, *_SLOPES)),
         ("is_differentiated", ctypes.c_long),
     ]
 
@@ -62,7 +61,7 @@ class PathMotion:
     given : tuple of (ndarray or None)
         From which it was computed, contiguous: what is named in `_GIVEN`.
     rows_step : int
-        From the rows of a point to those of the next one; 0 where they are the same.
+        Offset between the rows of successive points, in doubles; 0 if all points share them.
     twists : (6, K, n) ndarray
         Columns of the tool's Jacobian.
     inverse : (K, n, n) ndarray
@@ -134,10 +133,10 @@ class PathMotion:
         """What the library reads, and where it writes."""
         found = (getattr(self, name) for name in _FOUND)
         parts = (*self.given, *found, *self.slopes)
-        places = [None if own is None else address(own) for own in parts]
-        places.insert(5, self.rows_step)
+        addresses = (None if own is None else address(own) for own in parts)
         asked = ctypes.addressof(self.prescribed.structure)
-        return _PathMotion(self.chain.address, asked, len(self.qdot), *places)
+        before = (self.chain.address, asked, len(self.qdot), self.rows_step)
+        return _PathMotion(*before, *addresses)
 
     @property
     def address(self) -> int:

@@ -120,11 +120,11 @@ class JointLimit(Limit):
         own = self._of_joints(self.quantity(motion))
         return (own - self._middle) * self._scale
 
-    def as_quantity(self, name: str) -> ScaledQuantity:
-        """Describe the values as those of a quantity of the kernel."""
-        return ScaledQuantity(
-            name, self._joints, self._middle, self._scale, self._robot.chain
-        )
+    def scaled_quantity(self, name: str, chain: Chain) -> ScaledQuantity | None:
+        """Return the kernel's quantity with a name, of the limited joints; None where they are of another chain."""
+        if self._robot.chain is not chain:
+            return None
+        return ScaledQuantity(name, self._joints, self._middle, self._scale, chain)
 
     def _of_joints(self, every: np.ndarray) -> np.ndarray:
         """Rows of the limited joints, (K, c, ...), from those of all joints, (K, n, ...)."""
@@ -360,20 +360,18 @@ _QUANTITIES: dict[type[Limit], str] = {
 """Limits whose values are a quantity of the kernel, less an offset, times a factor."""
 
 
-def as_quantity(limit: Limit, chain: Chain) -> ScaledQuantity | None:
-    """Describe the values of a limit as those of a quantity of the kernel.
+def to_scaled_quantity(limit: Limit, chain: Chain) -> ScaledQuantity | None:
+    """Describe the values of a limit as a quantity of the kernel.
 
     Returns
     -------
     ScaledQuantity or None
-        None for any other limit, for those of another chain, and for subclasses, which may have values of their own.
+        None for all other limits, for those of another chain, and for subclasses, which may have values of their own.
     """
     name = _QUANTITIES.get(type(limit))
-    if name is None:
+    if name is None or not isinstance(limit, JointLimit):
         return None
-    assert isinstance(limit, JointLimit)
-    found = limit.as_quantity(name)
-    return found if found.chain is chain else None
+    return limit.scaled_quantity(name, chain)
 
 
 def reciprocals_near(

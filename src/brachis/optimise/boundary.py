@@ -92,8 +92,8 @@ class BoundarySpline:
         d.
     free_part : FreePart
         S.
-    given : (1 + k, N + d) ndarray
-        Given terms of the control points, by powers of the duration.
+    given : (1 + p, N + d) ndarray
+        Given terms of the control points, by powers of the duration, up to the highest one that matters, p.
     """
 
     knots: np.ndarray

@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from brachis.kernel import Groups, VariableSlopes
+from brachis.kernel import ValueGroups, VariableSlopes
 from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Partials, as_quantity
+from brachis.limits import Limit, Partials, to_scaled_quantity
 
 
 class Evaluator:
@@ -36,7 +36,7 @@ class Evaluator:
     is_mean : (c,) bool ndarray
         Which of the limits' values are held as means over the motion.
     has_means : bool
-        Whether any are.
+        Whether any value is held as a mean.
     """
 
     def __init__(self, joint_map: JointMap, limits: Sequence[Limit]) -> None:
@@ -47,8 +47,8 @@ class Evaluator:
         self.is_mean = np.repeat(np.array(means, dtype=bool), counts)
         self.has_means = any(means)
         chain = joint_map.robot.chain
-        quantities = [as_quantity(limit, chain) for limit in self.limits]
-        self._groups = Groups(quantities, counts)
+        quantities = [to_scaled_quantity(limit, chain) for limit in self.limits]
+        self._groups = ValueGroups(quantities, counts)
 
     def evaluate(
         self,
@@ -90,13 +90,13 @@ class Evaluation:
         With c values in all.
     motion : JointState
         q, qdot, qddot, qdddot, (K, n), and the gradient dq/dy.
-    groups : Groups
+    groups : ValueGroups
         The values of the limits as the kernel takes them.
     """
 
     limits: tuple[Limit, ...]
     motion: JointState
-    groups: Groups
+    groups: ValueGroups
 
     @cached_property
     def by_limit(self) -> tuple[np.ndarray, ...]:
@@ -106,12 +106,9 @@ class Evaluation:
         if self.groups.has_jerk:
             states.append(motion.qdddot)
         chain = self.groups.chain
-        known = None if chain is None else motion.known_torque(chain)
-        values, torque = self.groups.values(states, known)
-        if chain is not None and torque is not None:
-            motion.share_torque(chain, torque)
-        found = list(values)
-        for number in self.groups.open:
+        torque = None if chain is None else motion.torque_of(chain)
+        found = self.groups.values(states, torque)
+        for number in self.groups.with_partials:
             found[number] = self.limits[number].values(motion)
         return tuple(found)
 
@@ -129,17 +126,17 @@ class Evaluation:
         self, variables: VariableSlopes | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return `slopes`, and entries of the Jacobian by variables, (z, c), if these are given."""
-        others = (self.limits[number] for number in self.groups.open)
+        others = (self.limits[number] for number in self.groups.with_partials)
         partials = [limit.partials(self.motion) for limit in others]
         return self._differentiate(self.groups, partials, variables)
 
     def chain(self, partials: Partials) -> np.ndarray:
         """Differentiate functions with given partials by y, ydot, yddot and, if they ask for it, ydddot."""
-        return self._differentiate(Groups([None], [partials.size]), [partials])[0]
+        return self._differentiate(ValueGroups([None], [partials.size]), [partials])[0]
 
     def _differentiate(
         self,
-        groups: Groups,
+        groups: ValueGroups,
         partials: list[Partials],
         variables: VariableSlopes | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.kernel import CurvePlaces
+from brachis.kernel import CurvePattern
 from brachis.limits import Limit
 from brachis.optimise.boundary import (
     Boundary,
@@ -88,8 +88,6 @@ class Progress:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian, (z,)."""
-        if len(self.given) == 1:
-            return self.weight
         by_duration = sum_powers(self.given, x[0], slope=True)
         return np.where(self.variable == 0, by_duration[self.row], self.weight)
 
@@ -128,7 +126,7 @@ class VariableLayout:
         Where variables matter at all, by T, by each curve, then by h.
     curve : (z',) int ndarray
         Number of the curve of each entry between those of T and h.
-    places : CurvePlaces
+    pattern : CurvePattern
         Point and curve of each.
     progress : Progress
         Differences of control points of s; empty without a path.
@@ -142,7 +140,7 @@ class VariableLayout:
     point: np.ndarray
     variable: np.ndarray
     curve: np.ndarray
-    places: CurvePlaces
+    pattern: CurvePattern
     progress: Progress
     x_lower: np.ndarray
     x_upper: np.ndarray
@@ -195,7 +193,9 @@ class VariableLayout:
             point=point,
             variable=np.concatenate([of_time, *of_curves, of_lengths]),
             curve=curve,
-            places=CurvePlaces(point[count : count + len(curve)], curve, count, width),
+            pattern=CurvePattern(
+                point[count : count + len(curve)], curve, count, width
+            ),
             progress=progress,
             x_lower=x_lower,
             x_upper=x_upper,

@@ -22,7 +22,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
-from brachis.kernel import CurvePlaces, VariableSlopes
+from brachis.kernel import CurvePattern, VariableSlopes
 from brachis.limits import Limit, Moments
 from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import basis_matrix, clamped_knots
@@ -166,15 +166,13 @@ class PathPhase:
         """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
         places, values = self._bounds.shape[1:]
         curves = np.arange(self.curves_count)
-        first = len(self._s) + curves * self._count
-        of_curves = first[:, None, None] + columns
+        of_curves = (len(self._s) + curves * self._count)[:, None, None] + columns
         variable = np.concatenate([self._number, self._number + 1, of_curves.ravel()])
         every = np.arange(places)
         of_each = np.repeat(every, columns.shape[1])
         points = np.tile(of_each, self.curves_count)
         of_curve = np.repeat(curves + 1, columns.size)
-        width = 1 + self.curves_count
-        self._curve_places = CurvePlaces(points, of_curve, places, width)
+        self._pattern = CurvePattern(points, of_curve, places, 1 + self.curves_count)
         rows = np.arange(places * values).reshape(places, values)
         self.jacobian_columns = np.repeat(variable, values)
         point = np.concatenate([every, every, points])
@@ -351,7 +349,7 @@ class PathPhase:
         value, first, second, _ = self._basis.values
         basis = np.array([value, first * rate, second * square + first * u])
         own = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
-        variables = VariableSlopes(by_squares, self._curve_places, own)
+        variables = VariableSlopes(by_squares, self._pattern, own)
         return evaluation.differentiate(variables)[1].ravel()
 
     def curves(self, x: np.ndarray) -> np.ndarray:

@@ -108,7 +108,7 @@ class Phase:
         layout = layout or VariableLayout.of(grid, boundary, has_path=has_path)
         self._layout = layout
         self.splines = layout.splines
-        self._ends_by_duration = any(own.given[1:].any() for own in self.splines)
+        self._ends_by_duration = any(len(own.given) > 1 for own in self.splines)
         self.slices = layout.slices
         self.degree = grid.degree
         self.knots = grid.knots
@@ -452,7 +452,7 @@ class Phase:
     def _variable_slopes(self, x: np.ndarray) -> VariableSlopes:
         """Slopes of the curves and their time derivatives by T and by each curve's variables."""
         shared = self._by_duration(x)[None]
-        return VariableSlopes(shared, self._layout.places, self._basis(x))
+        return VariableSlopes(shared, self._layout.pattern, self._basis(x))
 
     def _add_lengths(
         self, entries: np.ndarray, by: np.ndarray, x: np.ndarray

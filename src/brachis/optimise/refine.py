@@ -208,11 +208,16 @@ def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
     return np.unique(np.clip(centres[:, None] + steps, 0.0, 1.0))
 
 
+def _find_lost(phase: Phase, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
+    """Tell at which normalised times the joint map has no posture, (K,)."""
+    motion = phase.motion(x)
+    postures = phase.joint_map.postures(motion.at(t_norm * motion.t_end)[0])
+    return ~np.isfinite(postures).all(axis=1)
+
+
 def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List the middle of every stretch of the dense grid on which the branch has no answer."""
-    motion = dense.motion(x)
-    postures = dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])
-    is_lost = ~np.isfinite(postures).all(axis=1)
+    is_lost = _find_lost(dense, x, dense.t_norm)
     edges = np.flatnonzero(np.diff(np.pad(is_lost, 1).astype(int)))
     if not len(edges):
         # Reachable, but singular or too far apart to count turns: more points everywhere.
@@ -221,7 +226,7 @@ def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
 
 
 def add_points_where_lost(program: Program, x: np.ndarray) -> Program | None:
-    """Add collocation points between those between which a motion leaves the branch, or the chart.
+    """Add collocation points in every gap in which the motion leaves the branch, or the chart.
 
     Returns
     -------
@@ -230,15 +235,25 @@ def add_points_where_lost(program: Program, x: np.ndarray) -> Program | None:
     """
     points = []
     for phase, part in program.split(x):
-        motion = phase.motion(part)
         t_norm = spread(phase.t_norm, _IN_A_GAP)
-        postures = phase.joint_map.postures(motion.at(t_norm * motion.t_end)[0])
-        is_lost = ~np.isfinite(postures).all(axis=1)
-        gaps = np.unique(np.flatnonzero(is_lost) // _IN_A_GAP)
+        lost = np.flatnonzero(_find_lost(phase, part, t_norm))
+        gaps = np.union1d((lost - 1) // _IN_A_GAP, lost // _IN_A_GAP)
+        gaps = gaps[(gaps >= 0) & (gaps < len(phase.t_norm) - 1)]
+        if not len(lost) and not _is_regular(phase.with_points(t_norm), part):
+            gaps = np.arange(len(phase.t_norm) - 1)
         inside = gaps[:, None] * _IN_A_GAP + np.arange(1, _IN_A_GAP)
         points.append(np.union1d(phase.t_norm, t_norm[inside]))
     finer = program.with_points(points)
     return finer if finer.collocation_points > program.collocation_points else None
+
+
+def _is_regular(phase: Phase, x: np.ndarray) -> bool:
+    """Tell whether a motion can be evaluated at all collocation points."""
+    try:
+        phase.state(x)
+    except UnreachableError:
+        return False
+    return True
 
 
 def _suspects(

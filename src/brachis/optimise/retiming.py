@@ -92,7 +92,12 @@ COARSE = PathEffort(
     may_add_places=False,
     margin=MARGINS[1],
     options=SolverOptions(
-        tolerance=1e-3, max_iterations=25, time_limit=np.inf, progress=3e-3, patience=3
+        tolerance=1e-3,
+        max_iterations=25,
+        time_limit=np.inf,
+        progress=3e-3,
+        patience=3,
+        widening=5e-5,
     ),
     posture_violation=5e-3,
 )
@@ -105,7 +110,12 @@ ROUGH = PathEffort(
     may_add_places=False,
     margin=MARGINS[1],
     options=SolverOptions(
-        tolerance=3e-4, max_iterations=40, time_limit=np.inf, progress=1e-3, patience=3
+        tolerance=3e-4,
+        max_iterations=40,
+        time_limit=np.inf,
+        progress=1e-3,
+        patience=3,
+        widening=1.5e-5,
     ),
 )
 """To rank joint paths, clear of branch boundaries."""

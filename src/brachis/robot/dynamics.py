@@ -40,40 +40,29 @@ class SharedTorques:
     qddot: np.ndarray
 
     @cached_property
-    def _known(self) -> dict[tuple[str, int], tuple[Chain, Any]]:
+    def _known(self) -> dict[tuple[str, Chain], Any]:
         return {}
 
     def torque(self, robot: Robot) -> np.ndarray:
         """Joint torques, (K, n); not to be written to."""
-        known = self.known_torque(robot.chain)
-        if known is not None:
-            return known
-        found = torque(robot, self.q, self.qdot, self.qddot)
-        self.share_torque(robot.chain, found)
+        return self.torque_of(robot.chain)
+
+    def torque_of(self, chain: Chain) -> np.ndarray:
+        """Joint torques of a chain, (K, n); not to be written to."""
+        key = "torque", chain
+        if key not in self._known:
+            self._known[key] = chain.torques(self.q, self.qdot, self.qddot)
+        found: np.ndarray = self._known[key]
         return found
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
         """Return the derivatives of the joint torques; not to be written to."""
-        known: TorqueDerivatives | None = self._find("derivatives", robot.chain)
-        if known is not None:
-            return known
-        found = torque_derivatives(robot, self.q, self.qdot, self.qddot)
-        self._known["derivatives", id(robot.chain)] = robot.chain, found
+        key = "derivatives", robot.chain
+        if key not in self._known:
+            states = self.q, self.qdot, self.qddot
+            self._known[key] = torque_derivatives(robot, *states)
+        found: TorqueDerivatives = self._known[key]
         return found
-
-    def known_torque(self, chain: Chain) -> np.ndarray | None:
-        """Return the torques of a chain, (K, n), if they are known."""
-        known: np.ndarray | None = self._find("torque", chain)
-        return known
-
-    def share_torque(self, chain: Chain, torque: np.ndarray) -> None:
-        """Keep the torques of a chain, (K, n), for all who ask."""
-        self._known["torque", id(chain)] = chain, torque
-
-    def _find(self, what: str, chain: Chain) -> Any:
-        """Return what is known of a chain; in another process an id may be that of another object."""
-        owner, found = self._known.get((what, id(chain)), (None, None))
-        return found if owner is chain else None
 
 
 def torque(

@@ -5,27 +5,20 @@
 2. `finish_candidate` improves the joint path and lays splines along its timing, or adapts the mesh and refines. Then it
    verifies.
 
-In between, changes of the solved program are tried, and the better motion is kept (`improve`):
-
-Branch margins: near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early
-creeps along it. Far from it the solve is easy, and its answer is a good start for a smaller margin.
-
-Charts: at the optimum any rows that are transversal along the motion describe the same motions, but splines of their
-coordinates are not the same curves: over the same knots one measure of self-motion may be a few parts in a thousand
-faster than another. So several choices of single joints are tried, and the best one is kept.
+In between, changes of the solved program are tried, and the better motion is kept (`improve`). At the optimum any rows
+that are transversal along the motion describe the same motions, but splines of their coordinates are not the same
+curves: over the same knots one measure of self-motion may be a few parts in a thousand faster than another. So several
+choices of single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import itertools
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator
 
 import numpy as np
 
-from brachis.common import tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
@@ -37,8 +30,8 @@ from brachis.kinematics import (
     chart_around,
     transversality,
 )
-from brachis.limits.safeguards import HELD_BACK, MARGINS
-from brachis.optimise.backends import SolverReport, SolveStatus, solvers_for
+from brachis.limits.safeguards import MARGINS
+from brachis.optimise.backends import SolveStatus, solvers_for
 from brachis.optimise.candidate import Candidate, InitialGuess, refine_and_verify
 from brachis.optimise.guess import fit_curves, shortest_time
 from brachis.optimise.improve import (
@@ -46,14 +39,13 @@ from brachis.optimise.improve import (
     Solve,
     SolvedProgram,
     SolverSession,
-    attempt_once,
     improve,
     keep_feasible,
 )
 from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.phase_timing import time_phases
 from brachis.optimise.program import Program
-from brachis.optimise.refine import RefinementOptions, add_points_where_lost
+from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import (
     FINE,
     improve_joint_paths,
@@ -66,11 +58,14 @@ from brachis.optimise.transcription import (
     program_over,
 )
 from brachis.problem.problem import Problem
+from brachis.search.continuation import (
+    solve_by_margin_continuation,
+    solve_within_branch,
+    solve_without_third_order_limits,
+)
 from brachis.search.phase_plane import FEW_VARIABLES, initial_breaks, initial_guess
 from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
-_FAR = 0.5
-"""Violation, as a part of a limit, that a smaller branch margin does not mend."""
 _LIGHT = 3_000_000
 """Variables times rows up to which a solve over all knots takes a second or two from the timing of a joint path."""
 _FOR_KNOTS = 0.5
@@ -79,8 +74,6 @@ _PULL = 0.001
 """Weight of the pull towards the motion that is refined, with several redundant joints; see `Pulled`."""
 SLOW = "not refined: no faster than another over all knots"
 """Status of a candidate that does not beat the best one before refinement."""
-_LOOKS = 3
-"""Solves, no more, with points added where a motion leaves the branch, or the chart, between them."""
 SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 
@@ -139,7 +132,7 @@ def _solve_over_time(
         program, x = begun
         target = program
     x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
-    solved = _solve_where_it_exists(program, x, session)
+    solved = solve_within_branch(program, x, session)
     solved = keep_feasible(solved, x)
     status = solved.report.status
     words = status.name.lower().replace("_", " ")
@@ -157,27 +150,6 @@ def _solve_over_time(
         coarse=coarse,
         not_completed=solved.not_completed,
     )
-
-
-def _solve_where_it_exists(
-    program: Program, x: np.ndarray, solve: SolverSession
-) -> SolvedProgram:
-    """Solve, with more collocation points as long as the motion leaves the branch, or the chart, between them.
-
-    Refinement cannot add these points: it begins with a motion that can be evaluated there.
-    """
-    solved = SolvedProgram(program)
-    for _ in range(_LOOKS):
-        again = solve_by_margin_continuation(program, x, solve, MARGINS)
-        reports = (*solved.reports, *again.reports)
-        solved = dataclasses.replace(again, reports=reports)
-        if not solved.usable or solve.deadline.passed:
-            break
-        finer = add_points_where_lost(program, solved.x)
-        if finer is None:
-            break
-        program = finer
-    return solved
 
 
 def finish_candidate(
@@ -331,94 +303,6 @@ def _open_session(
         listener,
         has_time_law=any(problem.time_laws),
     )
-
-
-def solve_by_margin_continuation(
-    program: Program, x: np.ndarray, solve: Solve, margins: Sequence[float]
-) -> SolvedProgram:
-    """Solve with ever smaller branch margins, each from the last answer.
-
-    A margin that does not hold the motion back, or that hardly shortens it, ends the continuation. So does an answer
-    far beyond the limits: no margin is that large.
-
-    Parameters
-    ----------
-    program : Program
-    x : (v,) ndarray
-        Starting point.
-    solve : callable
-        ``solve(program, x)`` returns a `SolverReport`.
-    margins : sequence of float
-        Least branch margins, descending.
-
-    Returns
-    -------
-    SolvedProgram
-        With the last margin for which the solve ended well; with the last one tried if none did.
-    """
-
-    def use(smaller: Program, kept: SolvedProgram) -> tuple[Program, np.ndarray] | None:
-        """Go on with a smaller margin, from the answer so far; None if that is free of its margin."""
-        if not kept.reports:
-            return smaller, x
-        report = kept.report
-        is_free = kept.usable and not _is_held_back(kept)
-        is_far = _FAR < report.violation < np.inf
-        if is_free or is_far or report.status is SolveStatus.TIME_LIMIT:
-            return None
-        # An unusable answer may have run out of iterations on its way.
-        return smaller, report.x if kept.usable or report.violation <= 1e-3 else x
-
-    # Closed forms may have no margins, or the start posture caps them.
-    programs = {
-        each.safeguard_bounds: each for each in map(program.with_margin, margins)
-    }
-    return improve(
-        SolvedProgram(program),
-        [partial(use, smaller) for smaller in programs.values()],
-        attempt_once(solve),
-        least_gain=tolerances.GAIN,
-        go_on_above=tolerances.GAIN,
-    )
-
-
-def _is_held_back(solved: SolvedProgram) -> bool:
-    """Tell whether a branch margin is so near to its bound that it holds the motion back."""
-    return solved.program.safeguard_slack(solved.report.x) <= HELD_BACK
-
-
-def solve_without_third_order_limits(
-    program: Program, x: np.ndarray, solve: Solve, margin: float
-) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
-    """Find a better starting point for limits on the third derivative: the answer without them, time-scaled.
-
-    Where the motion must slow down, such limits have local optima in which it all but stops. The fastest motion without
-    them has slowed down where it must; its shape over time, slowed down as a whole, leads past them.
-
-    Parameters
-    ----------
-    program : Program
-    x : (v,) ndarray
-        Starting point.
-    solve : callable
-    margin : float
-        Least branch margin.
-
-    Returns
-    -------
-    x : (v,) ndarray
-        The given point without such limits, or if that solve failed.
-    reports : tuple of SolverReport
-        Of the solve without them.
-    """
-    if all(limit.order <= 2 for limit in program.limits):
-        return x, ()
-    easier = program.without_orders_above(2)
-    report = solve(easier.with_margin(margin), x)
-    if report.status.usable:
-        with contextlib.suppress(UnreachableError):
-            x = shortest_time(program, report.x)
-    return x, (report,)
 
 
 def best_of_joints(

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
-from brachis.optimise.backends import uno
+import numpy as np
+import pytest
+
+from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for, uno
+from support.programs import disc
 
 
 def test_bounds_are_widened_by_a_little_and_never_alike():
@@ -19,3 +23,27 @@ def test_bounds_are_widened_by_a_little_and_never_alike():
     assert np.all((widened > 1e-8) & (widened <= 1e-6))
     assert np.all(np.abs(np.diff(widened)) > 1e-8)
     np.testing.assert_allclose(lower[3:] - wide_lower[3:], widened, atol=1e-9)
+
+
+@pytest.mark.parametrize("widening", [1e-6, 1e-4])
+def test_a_solve_uses_no_more_than_the_widening(widening):
+    options = SolverOptions(tolerance=1e-4, widening=widening)
+    report = solvers_for("uno")[0].solve(disc(), np.array([4.0, 0.5]), options, None)
+    assert report.feasible == (report.violation <= 1e-5)
+    assert 0.1 * widening < report.violation <= 2.0 * widening
+
+
+def test_the_best_feasible_iterate_is_the_answer_where_time_runs_out():
+    better = np.array([2.0, 0.25])
+
+    def run_out_of_time(monitor, x, *_rest):
+        monitor.keep(better, monitor.problem.objective(better), 0.0)
+        monitor.timed_out = True
+        return monitor.report("uno", SolveStatus.TIME_LIMIT, 100.0 * x, None, "")
+
+    (backend,) = solvers_for("uno")
+    slow = replace(backend, run=run_out_of_time)
+    report = slow.solve(disc(), np.array([4.0, 0.5]), SolverOptions(), None)
+    np.testing.assert_array_equal(report.x, better)
+    assert report.status is SolveStatus.TIME_LIMIT
+    assert report.feasible

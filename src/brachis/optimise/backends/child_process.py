@@ -47,6 +47,8 @@ _GRACE = 0.25
 """Seconds after its time limit at which a process is ended; a backend that sees the limit answers before."""
 _SILENCE = 5.0
 """Seconds without an iteration after which a small problem's process is ended: an iteration takes hundredths."""
+_LONGEST = 1e6
+"""Seconds without an iteration after which any process is ended: the system cannot wait for ever."""
 Run = Callable[[SolveMonitor, np.ndarray], SolverReport]
 """What a backend does: ``run(monitor, x)`` solves the monitor's problem from x, and returns ``monitor.report(...)``."""
 solve_lock = threading.RLock()
@@ -79,7 +81,7 @@ class Solver:
     ) -> SolverReport:
         """Solve `problem` from the start `x`.
 
-        A large problem that is not solved in time has the best feasible iterate as its `x`, or the start if none is
+        A large problem that is not solved in time has Uno's best feasible iterate as its `x`, or the start if none is
         known, and the status `TIME_LIMIT`; one whose solve is ended for its silence, the status `STALLED`.
 
         Raises
@@ -115,7 +117,7 @@ def _report_point(
     message: str,
     wall_time: float = 0.0,
 ) -> SolverReport:
-    """Report a solve that gave no answer: a point that is known, `x`, (v,), stays."""
+    """Report a solve without an answer; `x`, (v,), takes its place."""
     values = (objective_at(problem, x), residual(problem, x))
     none = np.zeros(len(problem.lower))
     return SolverReport(solver, status, x, *values, none, 0, wall_time, message)
@@ -185,7 +187,7 @@ def _receive(
         The best feasible iterate that was heard of.
     """
     best = None
-    while receiver.poll(_seconds(min(until - time.monotonic(), silence))):
+    while receiver.poll(max(min(until - time.monotonic(), silence, _LONGEST), 0.0)):
         try:
             message = receiver.recv()
         except EOFError:
@@ -197,11 +199,6 @@ def _receive(
         if progress is not None:
             progress(iteration, objective)
     return None if time.monotonic() >= until else SolveStatus.STALLED, best
-
-
-def _seconds(time_left: float) -> float | None:
-    """Return how long to wait, as the system wants to hear it."""
-    return max(time_left, 0.0) if np.isfinite(time_left) else None
 
 
 def _work(

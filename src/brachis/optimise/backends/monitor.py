@@ -49,7 +49,7 @@ class SolveMonitor:
     Attributes
     ----------
     best : tuple of (float, (v,) ndarray) or None
-        Objective and iterate of what was kept by `keep`.
+        Objective and variables of the best feasible iterate that the backend told of; None before the first.
     """
 
     def __init__(
@@ -213,6 +213,10 @@ class SolveMonitor:
         if self.failure is not None:
             raise self.failure
         violation = residual(self.problem, x)
+        if self.timed_out and violation > self._feasible_below and self.best:
+            x = self.best[1]
+            violation = residual(self.problem, x)
+            multipliers = None
         if self.stagnated and not status.usable:
             status = SolveStatus.STAGNATED
         feasible = violation <= self._feasible_below

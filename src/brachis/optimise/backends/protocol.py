@@ -115,6 +115,8 @@ class SolverOptions:
         How many iterates the last ones are.
     first_step : float
         Factor on the first radius of a trust region, for starts that are near the answer. Uno asks.
+    widening : float
+        Largest widening of a row's bound, as a part of it; no more than the tolerance. Uno asks.
     anywhere : bool
         Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
         asks; IPOPT counts all iterates in any case.
@@ -134,6 +136,7 @@ class SolverOptions:
     progress: float = 1e-6
     patience: int = 15
     first_step: float = 1.0
+    widening: float = 1e-6
     anywhere: bool = False
     to_beat: float = np.inf
     apart: bool = False

@@ -46,12 +46,6 @@ _LOST_AFTER = 15
 """Iterations of a restoration after which it is given up,"""
 _LOST = 0.9
 """if more than this part of the violation is left."""
-_WIDENING = 1e-6
-"""Largest widening of a row's bound, no more than the tolerance,"""
-_WIDER = 0.05
-"""or this part of the tolerance, where that is more,"""
-_WIDEST = 5e-5
-"""up to this: refinement would take back more."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """Multiples of this, modulo 1, are spread evenly."""
 
@@ -212,8 +206,7 @@ def _run(
         lambda point: monitor.objective(units * point),
         scale(monitor.gradient, units),
     )
-    tolerance = options.tolerance
-    most = max(min(_WIDENING, tolerance), min(_WIDER * tolerance, _WIDEST))
+    most = min(options.widening, options.tolerance)
     lower, upper = _spread_bounds(problem.lower, problem.upper, most)
     model.set_constraints(
         len(lower),
