@@ -19,6 +19,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -212,21 +213,19 @@ class RowLayout:
         Numbers of the rows of each limit; none, (0, c), where its means are held.
     lower, upper : (c,) ndarray
         Bounds of the rows.
-    jacobian_rows, jacobian_columns : (nnz,) int ndarray
-        Sparsity pattern; each place occurs once.
+    variables : VariableLayout
     """
 
     of_limits: tuple[np.ndarray, ...]
     lower: np.ndarray
     upper: np.ndarray
-    jacobian_rows: np.ndarray
-    jacobian_columns: np.ndarray
+    variables: VariableLayout
 
     @classmethod
     def of(
         cls, limits: Sequence[Limit], grid: FixedGrid, variables: VariableLayout
     ) -> RowLayout:
-        """Give every row of the limits its number, and list on which variables it depends."""
+        """Give every row of the limits its number."""
         count = len(grid.t_norm)
         of_limits = []
         first = 0
@@ -239,26 +238,32 @@ class RowLayout:
         pairs = list(zip(limits, of_limits, strict=True))
         lower = [np.tile(limit.lower, len(rows)) for limit, rows in pairs]
         upper = [np.tile(limit.upper, len(rows)) for limit, rows in pairs]
-
-        progress = variables.progress
-        steps = progress.given.shape[1]
-        at_points = [rows for rows in of_limits if len(rows)]
-        pointwise = np.hstack([np.empty((count, 0), dtype=int), *at_points])
-        h = np.arange(variables.lengths.start, variables.lengths.stop)
-        jacobian_rows = [
-            pointwise[variables.point].ravel(),
-            first + progress.row,
-            np.full(len(h), first + steps),
-        ]
-        jacobian_columns = [
-            np.repeat(variables.variable, pointwise.shape[1]),
-            progress.variable,
-            h,
-        ]
+        steps = variables.progress.given.shape[1]
         return cls(
             of_limits=tuple(of_limits),
             lower=np.concatenate([*lower, np.zeros(steps), grid.total]),
             upper=np.concatenate([*upper, np.full(steps, np.inf), grid.total]),
-            jacobian_rows=np.concatenate(jacobian_rows),
-            jacobian_columns=np.concatenate(jacobian_columns),
+            variables=variables,
         )
+
+    @cached_property
+    def pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the entries of the Jacobian, (nnz,) each; each place occurs once."""
+        variables = self.variables
+        progress = variables.progress
+        count, _ = variables.pattern.shape
+        at_points = [rows for rows in self.of_limits if len(rows)]
+        pointwise = np.hstack([np.empty((count, 0), dtype=int), *at_points])
+        h = np.arange(variables.lengths.start, variables.lengths.stop)
+        first = pointwise.size
+        rows = [
+            pointwise[variables.point].ravel(),
+            first + progress.row,
+            np.full(len(h), first + progress.given.shape[1]),
+        ]
+        columns = [
+            np.repeat(variables.variable, pointwise.shape[1]),
+            progress.variable,
+            h,
+        ]
+        return np.concatenate(rows), np.concatenate(columns)

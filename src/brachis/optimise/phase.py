@@ -79,8 +79,6 @@ class Phase:
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
-    jacobian_rows, jacobian_columns : (nnz,) int ndarray
-        Fixed sparsity pattern; each place occurs once.
     evaluations : dict of str to int
         How often states and Jacobians were computed.
     """
@@ -123,11 +121,9 @@ class Phase:
         self.x_lower = layout.x_lower
         self.x_upper = layout.x_upper
         rows = RowLayout.of(self.limits, grid, layout)
-        self._rows_of_limits = rows.of_limits
+        self._rows = rows
         self.lower = rows.lower
         self.upper = rows.upper
-        self.jacobian_rows = rows.jacobian_rows
-        self.jacobian_columns = rows.jacobian_columns
         self._entries: tuple[LocalBasis, np.ndarray] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
         self._slopes: tuple[Evaluation, np.ndarray] | None = None
@@ -203,6 +199,16 @@ class Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""
         own = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
         return self.with_limits([*own, *build_branch_margins(self.joint_map, margin)])
+
+    @property
+    def jacobian_rows(self) -> np.ndarray:
+        """Rows of the entries of the rows' Jacobian, (nnz,); each place occurs once."""
+        return self._rows.pattern[0]
+
+    @property
+    def jacobian_columns(self) -> np.ndarray:
+        """Columns of the entries of the rows' Jacobian, (nnz,)."""
+        return self._rows.pattern[1]
 
     @property
     def lengths(self) -> slice:
@@ -323,7 +329,7 @@ class Phase:
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of one of the limits, (K, c); none, (0, c), where its means are held."""
         number = next(i for i, own in enumerate(self.limits) if own is limit)
-        return self._rows_of_limits[number]
+        return self._rows.of_limits[number]
 
     def mean_weights(self, x: np.ndarray) -> np.ndarray:
         """Weights of the collocation points in a mean over the phase's time, (K,)."""

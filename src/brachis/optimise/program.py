@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -125,8 +126,6 @@ class Program(Summary):
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
-    jacobian_rows, jacobian_columns : (nnz,) int ndarray
-        Fixed sparsity pattern; each place occurs once.
     """
 
     def summary(self) -> Mapping[str, object]:
@@ -175,20 +174,38 @@ class Program(Summary):
         heights = [len(phase.lower) for phase in self.phases]
         heights.append(len(self.means))
         heights += [link.size for link in self.links]
-        patterns = [
-            (phase.jacobian_rows, phase.jacobian_columns + a)
-            for phase, a in zip(self.phases, self._durations, strict=True)
-        ]
-        count = heights[len(self.phases)]
-        every = np.arange(first[-1])
-        patterns.append((np.repeat(np.arange(count), first[-1]), np.tile(every, count)))
-        patterns += [link.pattern(self.phases, first) for link in self.links]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
         first_mean = self._first_rows[len(self.phases)]
         self._mean_rows = slice(first_mean, first_mean + len(self.means))
+
+    @cached_property
+    def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the entries of the Jacobian; of many programs nobody asks for them."""
+        count = self.variables
+        patterns = [
+            (phase.jacobian_rows, phase.jacobian_columns + first)
+            for phase, first in zip(self.phases, self._durations, strict=True)
+        ]
+        means = np.arange(len(self.means))
+        patterns.append(
+            (np.repeat(means, count), np.tile(np.arange(count), len(means)))
+        )
+        ends = [*self._durations, count]
+        patterns += [link.pattern(self.phases, ends) for link in self.links]
         pairs = zip(patterns, self._first_rows, strict=True)
-        self.jacobian_rows = np.concatenate([rows + a for (rows, _), a in pairs])
-        self.jacobian_columns = np.concatenate([columns for _, columns in patterns])
+        rows = [rows + first for (rows, _), first in pairs]
+        columns = [columns for _, columns in patterns]
+        return np.concatenate(rows), np.concatenate(columns)
+
+    @property
+    def jacobian_rows(self) -> np.ndarray:
+        """Rows of the entries of the Jacobian, (nnz,); each place occurs once."""
+        return self._pattern[0]
+
+    @property
+    def jacobian_columns(self) -> np.ndarray:
+        """Columns of the entries of the Jacobian, (nnz,)."""
+        return self._pattern[1]
 
     @property
     def variables(self) -> int:

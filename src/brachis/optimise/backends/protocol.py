@@ -63,8 +63,16 @@ class Problem(Protocol):
 
     x_lower: np.ndarray
     x_upper: np.ndarray
-    jacobian_rows: np.ndarray
-    jacobian_columns: np.ndarray
+
+    @property
+    def jacobian_rows(self) -> np.ndarray:
+        """Rows of the entries of the Jacobian."""
+        ...
+
+    @property
+    def jacobian_columns(self) -> np.ndarray:
+        """Columns of the entries of the Jacobian."""
+        ...
 
     @property
     def lower(self) -> np.ndarray:
