@@ -148,13 +148,19 @@ class VariableLayout:
 
     @classmethod
     def of(
-        cls, grid: FixedGrid, boundary: Boundary, *, has_path: bool
+        cls,
+        grid: FixedGrid,
+        boundary: Boundary,
+        *,
+        has_path: bool,
+        splines: tuple[BoundarySpline, ...] | None = None,
     ) -> VariableLayout:
         """Lay the variables of splines over a grid out; the first spline is s where there is a path.
 
-        With a time law the duration is given, and none of the splines is s.
+        With a time law the duration is given, and none of the splines is s. Splines may be those of another grid with
+        the same knots.
         """
-        splines = boundary.splines(grid.knots, grid.degree)
+        splines = splines or boundary.splines(grid.knots, grid.degree)
         time_law = boundary.time_law
         ends = np.cumsum([1, *(spline.free for spline in splines)]).tolist()
         slices = tuple(itertools.starmap(slice, itertools.pairwise(ends)))

@@ -131,10 +131,25 @@ class Phase:
 
     def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
         """Return the same phase over another grid, and with other boundary conditions where they are given."""
+        splines = None
+        if boundary is None and grid.knots is self.grid.knots:
+            splines = self.splines
         boundary = boundary or self.boundary
-        return Phase(
-            self.joint_map, self.limits, grid, boundary, margin=None, pause=self.pause
-        )
+        has_path = self.joint_map.path is not None
+        layout = VariableLayout.of(grid, boundary, has_path=has_path, splines=splines)
+        return self._with(self.limits, grid, boundary, layout)
+
+    def _with(
+        self,
+        limits: Sequence[Limit],
+        grid: FixedGrid,
+        boundary: Boundary,
+        layout: VariableLayout,
+    ) -> Phase:
+        """Return a phase with the same joint map and pause."""
+        pause = self.pause
+        given = (self.joint_map, limits, grid, boundary)
+        return Phase(*given, margin=None, pause=pause, layout=layout)
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
         """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
@@ -165,15 +180,7 @@ class Phase:
 
     def with_limits(self, limits: Sequence[Limit]) -> Phase:
         """Return the same phase with other limits, safeguards included; x keeps its meaning."""
-        return Phase(
-            self.joint_map,
-            limits,
-            self.grid,
-            self.boundary,
-            margin=None,
-            pause=self.pause,
-            layout=self._layout,
-        )
+        return self._with(limits, self.grid, self.boundary, self._layout)
 
     def limits_near(self, curves: np.ndarray) -> list[Limit]:
         """Return what matters of the limits while the motion stays close to curves, (S, c); see `Limit.restrict_to`."""
