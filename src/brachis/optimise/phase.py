@@ -147,9 +147,8 @@ class Phase:
         layout: VariableLayout,
     ) -> Phase:
         """Return a phase with the same joint map and pause."""
-        pause = self.pause
         given = (self.joint_map, limits, grid, boundary)
-        return Phase(*given, margin=None, pause=pause, layout=layout)
+        return Phase(*given, margin=None, pause=self.pause, layout=layout)
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
         """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
@@ -380,9 +379,8 @@ class Phase:
         slopes = self.limit_slopes(x)
         if self.evaluator.has_means:
             slopes = slopes[:, ~self.evaluator.is_mean]
-        of_progress = self._layout.progress.jacobian(x)
-        of_total = np.ones(len(self.grid.lower))
-        return np.concatenate([slopes.ravel(), of_progress, of_total])
+        rest = (self._layout.progress.jacobian(x), np.ones(len(self.grid.lower)))
+        return np.concatenate([slopes.ravel(), *rest])
 
     def limit_slopes(self, x: np.ndarray) -> np.ndarray:
         """Slopes of all limits' values by the variables, (z, c); kept, and raises, as `evaluate`."""
