@@ -106,6 +106,9 @@ def test_auto_asks_for_processes_when_what_is_left_takes_long(monkeypatch):
     assert here == ["1", "2", "3"]
     monkeypatch.setattr(processes, "_WORTH_STARTING", 0.0)
     assert plan_three() == [1, 2, 3]
+    assert here == ["1", "2", "3"], "they have been started"
+    monkeypatch.setattr(processes, "_WORTH_SENDING", 0.0)
+    assert plan_three() == [1, 2, 3]
     assert here == ["1", "3"]
 
 

@@ -25,6 +25,8 @@ from brachis.errors import BrachisError
 _MAIN = "MainProcess"
 _WORTH_STARTING = 3.0
 """Seconds of work for which other processes are started; that takes them a second or two."""
+_WORTH_SENDING = 0.7
+"""Seconds of work that is handed out to processes that were started before."""
 _IDLE_TIME = 300.0
 """Seconds after which a process without work ends."""
 _HEARTBEAT = 0.1
@@ -55,7 +57,8 @@ def run_in_processes(
         The same for all items.
     jobs : int or "auto"
         With 1, and within another program's workers, the work is done here, item by item as it is asked for. With
-        ``auto`` it is, until the rest is going to take longer than 3 s. What cannot be sent to others is done here too.
+        ``auto`` it is, until the rest is going to take longer than 3 s, or 0.7 s where an earlier plan has started the
+        processes. What cannot be sent to others is done here too.
     listener : callable
         Only heard of work that is done here.
 
@@ -78,7 +81,9 @@ def run_in_processes(
         while number == len(outcomes) or not outcomes[number].done():
             interrupts.check()
             waiting = given[len(outcomes) :]
-            is_long = elapsed / max(done, 1) * len(waiting) > _WORTH_STARTING
+            has_workers = _start_workers.cache_info().currsize > 0
+            worth = _WORTH_SENDING if has_workers else _WORTH_STARTING
+            is_long = elapsed / max(done, 1) * len(waiting) > worth
             if not is_alone and (jobs != "auto" or is_long):
                 outcomes += _hand_out(count - 1, waiting, function, *others)
             if len(outcomes) < len(given):
