@@ -262,7 +262,8 @@ class SearchSettings(Model):
     posture)."""
     jobs: Jobs = 1
     """Number of processes that plan at the same time, limited to the number of processors. auto: all processors, if the
-    remaining work takes longer than 3 s, or 0.7 s if an earlier plan has started them. The answer does not depend on it unless the time runs out."""
+    remaining work takes longer than 3 s, or 0.7 s if an earlier plan has started them. The answer does not depend on it
+    unless the time runs out."""
     time_limit: Positive = Field(default=60.0, le=1e6)
     """Time limit of the whole plan, s. The best verified motion found by then is returned; if there is none, an
     unverified one, up to two seconds later."""
