@@ -202,7 +202,10 @@ def stack_splines(
 def sum_powers(
     terms: np.ndarray, duration: float, *, slope: bool = False
 ) -> np.ndarray:
-    """Add up terms, (1 + k, p), times the powers of a duration, s; or return the slope of the sum by the duration."""
+    """Add up terms, (1 + k, p), times the powers of a duration, s; or return the slope of the sum by the duration.
+
+    The answer is not to be written to.
+    """
     if len(terms) == 1:
         return np.zeros_like(terms[0]) if slope else terms[0]
     powers = np.arange(len(terms))
