@@ -27,6 +27,7 @@ def make_task():
     def make(
         joint: str,
         *,
+        angle: float = 90.0,
         intervals: int = 20,
         rounds: int = 10,
         solver: str = "auto",
@@ -37,7 +38,7 @@ def make_task():
                 "brachis": 1,
                 "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
                 "task_space": ["x", "y"],
-                "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+                "path": [{"line": {"length": 1.0, "angle_deg": angle}}],
                 "redundant_joints": "auto" if joint == "auto" else [joint],
                 "search": search or {},
                 "spline": {"intervals": intervals},

@@ -48,8 +48,7 @@ def test_plan_refined_and_verified(benchmark, robot, make_task, joint, effort):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_fastest_motion(benchmark, robot, make_task, angle, jobs):
     """The paper's eight lines with everything left open; the goal is 3 s on two cores."""
-    task = make_task("auto", search={"jobs": jobs}).to_dict()
-    task["path"][0]["line"]["angle_deg"] = angle
+    task = make_task("auto", angle=angle, search={"jobs": jobs})
     assert benchmark.pedantic(plan, (robot, task), rounds=3, warmup_rounds=1).verified
 
 

@@ -291,6 +291,8 @@ _LARGE_PROGRAM = 250
 _NEAR_STEP = 0.1
 """Factor on the first step from a motion that is nearly as fast as possible. Very many rows are near their bounds
 there, and a small subproblem takes half as long."""
+_NEAR_WIDENING = 1e-6
+"""Widening of bounds there; see `SolverOptions`."""
 _PROGRESS = 1e-4
 """Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
 
@@ -399,6 +401,7 @@ class SolverSession:
                 time_limit=until.left,
                 progress=progress,
                 first_step=_NEAR_STEP if is_near else self.options.first_step,
+                widening=_NEAR_WIDENING if is_near else self.options.widening,
                 learnt=learnt,
             )
             report = backend.solve(problem, x, options, self.progress)

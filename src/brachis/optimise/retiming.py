@@ -127,7 +127,12 @@ FINE = PathEffort(
     may_add_places=True,
     margin=MARGIN,
     options=SolverOptions(
-        tolerance=1e-5, max_iterations=100, time_limit=np.inf, progress=2e-4, patience=4
+        tolerance=1e-5,
+        max_iterations=100,
+        time_limit=np.inf,
+        progress=2e-4,
+        patience=4,
+        widening=1e-6,
     ),
 )
 """For a plan, from the answer of a rough search."""

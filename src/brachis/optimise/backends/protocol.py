@@ -144,7 +144,7 @@ class SolverOptions:
     progress: float = 1e-6
     patience: int = 15
     first_step: float = 1.0
-    widening: float = 1e-6
+    widening: float = 0.0
     anywhere: bool = False
     to_beat: float = np.inf
     apart: bool = False
