@@ -107,7 +107,8 @@ class PathMotion:
         rows, step = as_doubles_at_points(conditions.rows, (count, n - m, n))
         given.append(rows)
         given += [as_doubles(own, (count, c)) for own in curves]
-        turning, drift = conditions.turning, conditions.drift
+        turning = conditions.turning
+        drift = conditions.drift
         if turning is not None or drift is not None:
             turning = as_doubles(turning, (2, count, n - m, n))
             drift = as_doubles(drift, (3, count, n - m))

@@ -140,7 +140,7 @@ class Evaluation:
         partials: list[Partials],
         variables: VariableSlopes | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Differentiate the values of groups; `partials` are those of the groups that are no scaled quantities."""
+        """Differentiate the values of groups; `partials` are those of the groups that have partials."""
         motion = self.motion
         slopes = motion.slopes
         if groups.has_jerk or any(own.qdddot is not None for own in partials):
