@@ -80,6 +80,7 @@ def test_an_object_limits_the_motion(plugin):
         "coupled range ratio"
     ]
     assert check.remark == "checked by its own formula"
+    assert check.in_words().endswith(check.remark)
     assert (check.subject, check.value) == ("j2 + j3", pytest.approx(1.0, abs=1e-4))
     report = brachis.bottleneck.report(result, check=True)
     entry = report.sensitivities.of("j2 + j3", "range", "upper")

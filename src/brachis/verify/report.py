@@ -111,7 +111,8 @@ class Check:
         verdict = "<=" if self.passed else "FAILED, allowed"
         subject = f", {self.subject}" if self.subject else ""
         time = f" at {self.time:.4g} s" if self.time is not None else ""
-        return f"{found}{unit} {verdict} {allowed}{unit}{subject}{time}"
+        remark = f", {self.remark}" if self.remark else ""
+        return f"{found}{unit} {verdict} {allowed}{unit}{subject}{time}{remark}"
 
 
 @dataclass(frozen=True, repr=False)
