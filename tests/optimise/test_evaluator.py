@@ -32,7 +32,7 @@ def test_slopes_are_differences(case):
     (x,) = reachable_points(phase, 1)
     state = phase.state(x)
     curves = [state.y, state.ydot, state.yddot, state.ydddot]
-    slopes = phase.evaluate(x).slopes
+    slopes, _ = phase.evaluate(x).differentiate()
     assert len(slopes) == 4
     smooth = [
         own
@@ -94,6 +94,6 @@ def test_limits_of_another_robot_and_subclasses_have_values_of_their_own():
     evaluation = phase.with_limits(limits).evaluate(x)
     for limit, values in zip(limits, evaluation.by_limit, strict=True):
         np.testing.assert_allclose(values, limit.values(evaluation.motion), atol=1e-12)
-    light, with_load, doubled = np.split(evaluation.slopes, 3, axis=2)
+    light, with_load, doubled = np.split(evaluation.differentiate()[0], 3, axis=2)
     np.testing.assert_allclose(doubled, 2.0 * light, atol=1e-10)
     assert np.abs(with_load - light).max() > 0.1

@@ -350,12 +350,9 @@ JOINT_LIMITS = {
     )
 }
 """The limit of every row of `LIMIT_KINDS`."""
-_QUANTITIES: dict[type[Limit], str] = {
-    TorqueLimit: "torque",
-    VelocityLimit: "qdot",
-    AccelerationLimit: "qddot",
-    PositionLimit: "q",
-    JerkLimit: "qdddot",
+_QUANTITIES: dict[type[Limit], str] = {TorqueLimit: "torque"} | {
+    limit: limit.derivative
+    for limit in (PositionLimit, VelocityLimit, AccelerationLimit, JerkLimit)
 }
 """Limits whose values are a quantity of the kernel, less an offset, times a factor."""
 

@@ -82,7 +82,7 @@ class Evaluator:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Joint motion and limits at K times; values and slopes are computed when they are asked for, and once.
+    """Joint motion and limits at K times; values are computed when they are asked for, and once.
 
     Attributes
     ----------
@@ -117,15 +117,18 @@ class Evaluation:
         """Values of all limits, (K, c)."""
         return np.concatenate(self.by_limit, axis=1)
 
-    @cached_property
-    def slopes(self) -> np.ndarray:
-        """Slopes of `values` by y, ydot, yddot and, where a limit asks for the jerk, ydddot, (3 or 4, K, c, 1 + r)."""
-        return self.differentiate()[0]
-
     def differentiate(
         self, variables: VariableSlopes | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return `slopes`, and entries of the Jacobian by variables, (z, c), if these are given."""
+        """Differentiate `values`; see `ValueGroups.differentiate`.
+
+        Returns
+        -------
+        slopes : (3 or 4, K, c, 1 + r) ndarray
+            By y, ydot, yddot and, where a limit asks for the jerk, ydddot.
+        entries : (z, c) ndarray
+            Of the Jacobian by the variables, if these are given.
+        """
         others = (self.limits[number] for number in self.groups.with_partials)
         partials = [limit.partials(self.motion) for limit in others]
         return self._differentiate(self.groups, partials, variables)

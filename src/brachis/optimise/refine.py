@@ -236,24 +236,28 @@ def add_points_where_lost(program: Program, x: np.ndarray) -> Program | None:
     points = []
     for phase, part in program.split(x):
         t_norm = spread(phase.t_norm, _IN_A_GAP)
-        lost = np.flatnonzero(_find_lost(phase, part, t_norm))
-        gaps = np.union1d((lost - 1) // _IN_A_GAP, lost // _IN_A_GAP)
-        gaps = gaps[(gaps >= 0) & (gaps < len(phase.t_norm) - 1)]
-        if not len(lost) and not _is_regular(phase.with_points(t_norm), part):
-            gaps = np.arange(len(phase.t_norm) - 1)
+        gaps = _find_gaps(phase, part, t_norm)
         inside = gaps[:, None] * _IN_A_GAP + np.arange(1, _IN_A_GAP)
         points.append(np.union1d(phase.t_norm, t_norm[inside]))
-    finer = program.with_points(points)
-    return finer if finer.collocation_points > program.collocation_points else None
+    if sum(map(len, points)) == program.collocation_points:
+        return None
+    return program.with_points(points)
 
 
-def _is_regular(phase: Phase, x: np.ndarray) -> bool:
-    """Tell whether a motion can be evaluated at all collocation points."""
+def _find_gaps(phase: Phase, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
+    """List the gaps, cut by `t_norm`, in which the motion leaves the branch, or the chart."""
+    motion = phase.motion(x)
+    times = t_norm * motion.t_end
+    count = len(phase.t_norm) - 1
     try:
-        phase.state(x)
+        phase.joint_map.state(*motion.at(times), t=times)
     except UnreachableError:
-        return False
-    return True
+        lost = np.flatnonzero(_find_lost(phase, x, t_norm))
+        if not len(lost):  # reachable, but singular or too far apart to count turns
+            return np.arange(count)
+        gaps = np.union1d((lost - 1) // _IN_A_GAP, lost // _IN_A_GAP)
+        return gaps[(gaps >= 0) & (gaps < count)]
+    return np.empty(0, dtype=int)
 
 
 def _suspects(

@@ -29,7 +29,6 @@ def test_bounds_are_widened_by_a_little_and_never_alike():
 def test_a_solve_uses_no_more_than_the_widening(widening):
     options = SolverOptions(tolerance=1e-4, widening=widening)
     report = solvers_for("uno")[0].solve(disc(), np.array([4.0, 0.5]), options, None)
-    assert report.feasible == (report.violation <= 1e-5)
     assert 0.1 * widening < report.violation <= 2.0 * widening
 
 

@@ -219,6 +219,7 @@ def _work(
     sent: np.ndarray | None = None
 
     def progress(iteration: int, objective: float) -> None:
+        """Tell the other process of an iteration, and of a better feasible iterate."""
         nonlocal sent
         best = None if monitor.best is None else monitor.best[1]
         sender.send((iteration, objective, None if best is sent else best))
