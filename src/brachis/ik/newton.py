@@ -115,7 +115,8 @@ class Newton:
 def null_spaces(jacobian: np.ndarray) -> np.ndarray:
     """Orthonormal bases (K, n, r) of the null spaces of Jacobians (K, m, n)."""
     m = jacobian.shape[1]
-    return np.swapaxes(np.linalg.svd(jacobian)[2][:, m:], 1, 2)
+    columns = np.swapaxes(jacobian, 1, 2)
+    return np.linalg.qr(columns, mode="complete").Q[:, :, m:]
 
 
 def solve_each(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:

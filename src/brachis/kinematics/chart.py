@@ -21,7 +21,7 @@ import numpy as np
 
 from brachis.common.arrays import LastCall, apply_each
 from brachis.errors import UnreachableError
-from brachis.ik.newton import Newton
+from brachis.ik.newton import Newton, null_spaces
 from brachis.kernel import Conditions, Spline
 from brachis.kinematics.path_map import PathMap, PathState
 from brachis.path import Path, PathSample
@@ -168,11 +168,11 @@ class ChartMap(PathMap):
         self.s = s
         self.reference = reference
         self._newton = Newton(task_map)
-        augmented = self._augmented_at(s, reference)
-        inverse = np.linalg.pinv(augmented, rcond=_SINGULAR)  # not regular throughout
-        self_motion = inverse[:, :, task_map.m :].reshape(len(s), -1)
+        null = null_spaces(self._newton.task_coordinates(reference)[1])
+        across = rows.at(s)[0] @ null  # not regular throughout
+        self_motion = null @ np.linalg.pinv(across, rcond=_SINGULAR)
         sigma = rows.values(s, reference)
-        table = np.concatenate([reference, sigma, self_motion], axis=1)
+        table = np.column_stack([reference, sigma, self_motion.reshape(len(s), -1)])
         self._lines = Spline.through(s, table, 1)
         self._reference_at = LastCall(self._between)
         even = np.linspace(0.0, 1.0, 33)
