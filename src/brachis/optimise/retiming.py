@@ -97,6 +97,7 @@ COARSE = PathEffort(
         time_limit=np.inf,
         progress=3e-3,
         patience=3,
+        anywhere=True,
         widening=5e-5,
     ),
     posture_violation=5e-3,
@@ -115,6 +116,7 @@ ROUGH = PathEffort(
         time_limit=np.inf,
         progress=1e-3,
         patience=3,
+        anywhere=True,
         widening=1.5e-5,
     ),
 )

@@ -27,7 +27,7 @@ _LARGEST = 1e30
 _TRIAL_ITERATIONS = 10
 """Iterations before a solve is compared with `SolverOptions.to_beat`."""
 _NEARLY_FEASIBLE = 1e-3
-"""Violation of rows up to which an iterate counts."""
+"""Violation of rows up to which an iterate counts, unless one up to which it is feasible is larger."""
 
 Function = Callable[[np.ndarray], float | np.ndarray]
 """Of the variables of a problem."""
@@ -128,9 +128,8 @@ class SolveMonitor:
         objective times 1 + violation. The last one has to be feasible.
         """
         needed = objective * (1.0 + infeasibility)
-        self._recent = (
-            [*self._recent, needed] if infeasibility <= _NEARLY_FEASIBLE else []
-        )
+        counts = infeasibility <= max(_NEARLY_FEASIBLE, self._feasible_below)
+        self._recent = [*self._recent, needed] if counts else []
         patience = self.options.patience
         before = self._recent[:-patience]
         least = self.options.progress * abs(objective)

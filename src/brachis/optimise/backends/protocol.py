@@ -118,7 +118,7 @@ class SolverOptions:
         s; no solve is begun where it is 0.
     progress : float
         Least relative gain of the last iterates over the best one before; with less a solve has stagnated. An iterate
-        counts with its objective times 1 + violation, if it violates rows by no more than 1e-3.
+        counts with its objective times 1 + violation, if it violates rows by no more than 1e-3 or ten tolerances.
     patience : int
         How many iterates the last ones are.
     first_step : float
