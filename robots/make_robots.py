@@ -6,6 +6,7 @@ ur10_rail needs the arm of example-robot-data (``pip install ".[robots]"``) and 
 
 from __future__ import annotations
 
+import copy
 import math
 import sys
 import sysconfig
@@ -14,15 +15,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 from lxml import etree
 
-from brachis.apps.compose import Rail, elements, on_rail
-from brachis.apps.compose.elements import Element
+from brachis.apps.compose import Rail, on_rail
+from brachis.apps.compose.rail import robot_text
+from brachis.robot.urdf_elements import Element
 
 ROBOTS = Path(__file__).parent
+ZERO = (0.0, 0.0, 0.0)
 COLOURS = {
-    "grey": elements.GREY,
+    "grey": (0.35, 0.38, 0.42, 1.0),
     "yellow": (0.93, 0.78, 0.25, 1.0),
     "blue": (0.16, 0.42, 0.68, 1.0),
     "orange": (0.90, 0.55, 0.15, 1.0),
@@ -136,24 +140,30 @@ def robot(
 ) -> str:
     """Text of the URDF with the links and visuals of `figures` and the given joints."""
     element = etree.Element("robot", name=name)
-    for link, inertial in figures["links"].items():
-        parts = shapes_of(figures["visuals"].get(link, []))
-        if inertial:
-            parts.insert(
-                0,
-                elements.inertial(
-                    inertial["mass"], inertial["com"], inertial["inertia"]
-                ),
-            )
-        element.append(elements.link(link, *parts))
+    for name_of_link, body in figures["links"].items():
+        parts = shapes_of(figures["visuals"].get(name_of_link, []))
+        if body:
+            parts.insert(0, inertial_of(body))
+        element.append(make("link", *parts, name=name_of_link))
     element.extend(joint_of(each) for each in joints)
     return commented(element)
+
+
+def inertial_of(figures: Mapping[str, Any]) -> Element:
+    """Inertia from its figures: mass, centre of mass, and the inertia about it."""
+    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    return make(
+        "inertial",
+        *origin(figures["com"], ZERO),
+        make("mass", value=figures["mass"]),
+        make("inertia", **dict(zip(keys, figures["inertia"], strict=True))),
+    )
 
 
 def commented(element: Element) -> str:
     """Text of the URDF below a comment that says where it comes from."""
     element.addprevious(etree.Comment(COMMENT))
-    return elements.robot_text(element)
+    return robot_text(element)
 
 
 def joint_of(figures: Mapping[str, Any]) -> Element:
@@ -176,25 +186,33 @@ def joint_of(figures: Mapping[str, Any]) -> Element:
             "velocity": figures["max_speed_m_s"],
             "effort": figures["max_force_n"],
         }
-    return elements.joint(
-        figures["name"],
-        kind,
-        figures["parent"],
-        figures["child"],
-        xyz=figures.get("origin", elements.ZERO),
-        rpy=radians(figures.get("rpy_deg", elements.ZERO)),
-        axis=figures.get("axis"),
-        limit=limit,
+    element = make(
+        "joint",
+        make("parent", link=figures["parent"]),
+        make("child", link=figures["child"]),
+        *origin(figures.get("origin", ZERO), radians(figures.get("rpy_deg", ZERO))),
+        name=figures["name"],
+        type=kind,
     )
+    if "axis" in figures:
+        element.append(make("axis", xyz=figures["axis"]))
+    if limit is not None:
+        element.append(make("limit", **limit))
+    return element
 
 
 def shapes_of(figures: Sequence[Mapping[str, Any]]) -> list[Element]:
     """Primitives that are drawn, and then, without the balls that mark tools, those that must not touch anything."""
     drawn = [visual_of(each) for each in figures]
-    solid = [
-        elements.collision(each) for each in drawn if each.find(".//sphere") is None
-    ]
+    solid = [collision_of(each) for each in drawn if each.find(".//sphere") is None]
     return [*drawn, *solid]
+
+
+def collision_of(drawn: Element) -> Element:
+    """Collision geometry that is what a visual shows."""
+    return make(
+        "collision", *(copy.deepcopy(part) for part in drawn if part.tag != "material")
+    )
 
 
 def visual_of(figures: Mapping[str, Any]) -> Element:
@@ -205,13 +223,35 @@ def visual_of(figures: Mapping[str, Any]) -> Element:
         if shape == "box"
         else dict(zip(SIZES[shape], figures[shape], strict=True))
     )
-    return elements.visual(
-        shape,
-        size,
-        (figures["colour"], COLOURS[figures["colour"]]),
-        xyz=figures.get("xyz", elements.ZERO),
-        rpy=radians(figures.get("rpy_deg", elements.ZERO)),
+    colour = figures["colour"]
+    return make(
+        "visual",
+        *origin(figures.get("xyz", ZERO), radians(figures.get("rpy_deg", ZERO))),
+        make("geometry", make(shape, **size)),
+        make("material", make("color", rgba=COLOURS[colour]), name=colour),
     )
+
+
+def make(
+    tag: str, *children: Element, **attributes: str | float | Sequence[float]
+) -> Element:
+    """Make an element; numbers are written as the shortest text from which the same numbers are read again."""
+    element = etree.Element(tag)
+    for name, value in attributes.items():
+        text = value
+        if not isinstance(text, str):
+            figures = np.array(value, dtype=float, ndmin=1) + 0.0
+            text = " ".join(repr(float(each)).removesuffix(".0") for each in figures)
+        element.set(name, text)
+    element.extend(children)
+    return element
+
+
+def origin(xyz: Sequence[float], rpy: Sequence[float]) -> list[Element]:
+    """Make an ``<origin>``, or nothing for the identity."""
+    if any(rpy):
+        return [make("origin", xyz=xyz, rpy=rpy)]
+    return [make("origin", xyz=xyz)] if any(xyz) else []
 
 
 def radians(angles: Sequence[float]) -> list[float]:

@@ -23,6 +23,7 @@ from brachis.common.deadline import Deadline
 from brachis.common.files import locate_urdf
 from brachis.common.words import write_count
 from brachis.errors import InputError, PlanningError
+from brachis.ik.newton import Newton
 from brachis.ik.registry import default_task_space
 from brachis.problem.plausibility import of_robot
 from brachis.result import Result
@@ -158,27 +159,20 @@ def _follow(
     task_map: TaskMap, posture: np.ndarray, displacement: np.ndarray
 ) -> np.ndarray | None:
     """Follow a line in 10 steps of least joint motion; None if a joint leaves its range or the line is lost."""
-    robot = task_map.robot
-    position, rotation = robot.tool_placements(posture[None])
+    limits = task_map.robot.limits
+    position, rotation = task_map.robot.tool_placements(posture[None])
     step = np.zeros(3)
     step[list(task_map.axes)] = displacement / 10
-    q = posture
-    postures = [posture]
+    newton = Newton(task_map)
+    postures = posture[None]
     for k in range(1, 11):
-        target = task_map.of_placements(position + k * step, rotation)[0]
-        for _ in range(6):
-            error = task_map.difference(target, task_map.value(q))
-            if np.abs(error).max() < 1e-8:
-                break
-            jacobian = task_map.jacobian(task_map.twists(q[None]))[0]
-            q = q + np.linalg.pinv(jacobian) @ error
-        else:
+        target = task_map.of_placements(position + k * step, rotation)
+        found = newton.nearest(target, postures[-1:])
+        is_within = (found > limits.position_lower) & (found < limits.position_upper)
+        if not is_within.all():  # NaN is not within
             return None
-        limits = robot.limits
-        if np.any((q <= limits.position_lower) | (q >= limits.position_upper)):
-            return None
-        postures.append(q)
-    return np.array(postures)
+        postures = np.concatenate([postures, found])
+    return postures
 
 
 def placeholders(names: Sequence[str], stated: Sequence[UrdfLimit]) -> LimitSpec:

@@ -12,13 +12,19 @@ import sys
 import pytest
 
 from brachis import planner, plots
-from brachis.apps.cli.app import EXAMPLES, app
+from brachis.apps.cli.app import app
+from support.command_line import make_group
 from support.effort import QUICK
 
 from .conftest import ROOT, SCARA
 
 COMMAND = [sys.executable, "-m", "brachis"]
 COMMANDS = [each.name or each.callback.__name__ for each in app.registered_commands]
+GROUP = make_group(app)
+EXAMPLES = {
+    name: [line.strip() for line in command.epilog.splitlines()[2:]]
+    for name, command in GROUP.commands.items()
+}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -28,10 +34,12 @@ def test_help_of_every_command_has_an_example(command, option, run):
     assert outcome.code == 0
     assert f"Usage: brachis {command} " in outcome.out
     examples = outcome.out.split("Examples:\n")[1].splitlines()
-    assert [line.strip() for line in examples if line] == list(EXAMPLES[command])
+    assert [line.strip() for line in examples if line] == EXAMPLES[command]
+    assert EXAMPLES[command]
     assert all(line.startswith(f"brachis {command}") for line in EXAMPLES[command])
     assert "--quiet" in outcome.out
     assert "--verbose" in outcome.out
+    assert all(parameter.help for parameter in GROUP.commands[command].params)
 
 
 def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
@@ -44,13 +52,12 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
     (tmp_path / "lines.yaml").write_text(
         f"sweep: 1\ntask: task.yaml\n{fixed}\ngrid: {{spline.degree: [3, 4]}}\n"
     )
-    assert set(EXAMPLES) == {"", *COMMANDS}
-    assert {line.split("  #")[0].strip() for line in EXAMPLES[""]} <= {
-        *EXAMPLES["new"],
-        *EXAMPLES["plan"],
-    }
+    assert set(EXAMPLES) == set(COMMANDS)
+    general = re.findall(r"^  (brachis .*?) +#", GROUP.epilog, re.MULTILINE)
+    assert len(general) == 2
+    assert {*general} <= {*EXAMPLES["new"], *EXAMPLES["plan"]}
     for command, lines in EXAMPLES.items():
-        for line in lines if command else ():
+        for line in lines:
             outcome = run(*shlex.split(line, comments=True)[1:])
             assert outcome.code == 0, f"{line}: {outcome.err}"
         if (

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from brachis import Robot
-from brachis.apps.cli.starting import split_vectors
+from brachis.apps.cli.app import split_vectors
 from brachis.apps.compose import Rail, on_rail
 
 from .conftest import ROOT, SCARA

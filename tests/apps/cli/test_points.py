@@ -37,7 +37,7 @@ def test_inspect_says_what_was_found(seam):
     assert done.exit_code == 0
     for text in (
         "seam.csv",
-        "1500 along",
+        "1500 points along",
         "decimal commas",
         "semicolons",
         "length in mm",

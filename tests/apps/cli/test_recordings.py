@@ -106,7 +106,7 @@ def test_compare(run, recorded, tmp_path):
     [
         (
             ("--angle", "grad"),
-            "unknown unit of angle; found grad; allowed: rad, mrad, deg",
+            "there is no unit of angle named 'grad'; allowed: rad, mrad, deg",
         ),
         (("--task-space", "x,z,y,yaw"), "yaw"),
         (

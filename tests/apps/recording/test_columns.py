@@ -136,7 +136,7 @@ def test_standing_still_before_and_after_does_not_count(table, write):
             {"angle": "rad"},
             "the unit in the header is not the requested unit; found deg",
         ),
-        ("t,j1,j2,j3", {"angle": "grad"}, "unknown unit of angle; found grad"),
+        ("t,j1,j2,j3", {"angle": "grad"}, "there is no unit of angle named 'grad'"),
     ],
 )
 def test_headers_that_are_not_understood(header, change, told, table, write):

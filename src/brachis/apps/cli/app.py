@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from enum import IntEnum
 from pathlib import Path
+from textwrap import indent
 from typing import Annotated, Any
 
 import typer
 from typer import Option
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 import brachis
 from brachis.common import interrupts
@@ -21,59 +24,22 @@ from brachis.errors import (
     InputError,
     ResultFileError,
     TaskError,
-    UnknownNameError,
 )
 
-EXIT_CODES = (
-    "0    done; of a plan: planned and verified",
-    "1    no verified plan; a bug in brachis; standard output that cannot be written",
-    "2    wrong input: a file, a key, an option",
-    "3    planned and verified, but a figure could not be written",
-    "130  interrupted (Ctrl-C) before there was a motion",
-)
+_EPILOG = """
+\b
+Examples:
+  brachis new scara3                # a task for an included robot
+  brachis plan task.yaml --out out  # plan, verify, draw
 
-EXAMPLES: dict[str, tuple[str, ...]] = {
-    "": (
-        "brachis new scara3                # a task for an included robot",
-        "brachis plan task.yaml --out out  # plan, verify, draw",
-    ),
-    "robots": ("brachis robots", "brachis robots --json"),
-    "new": ("brachis new scara3", "brachis new gantry2 --out gantry.yaml"),
-    "plan": (
-        "brachis plan task.yaml --out out",
-        "brachis plan task.yaml --set search.effort=single --set 'path.0.line.by=[0, 0.4]'",
-    ),
-    "bottleneck": ("brachis bottleneck task.yaml --set search.effort=single",),
-    "verify": ("brachis verify out/result.npz",),
-    "export": (
-        "brachis export out/result.npz --out out/motion.csv --dt 0.004",
-        "brachis export out/result.npz --out out/motion.gif --dt 0.1",
-    ),
-    "import": ("brachis import out/motion.csv --robot task.yaml --out out/today.npz",),
-    "compare": ("brachis compare out/motion.csv --robot task.yaml",),
-    "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
-    "report": (
-        "brachis report out/result.npz",
-        "brachis report out/result.npz --title 'cell 3' --out out/cell3.html",
-    ),
-    "view": ("brachis view out", "brachis view out/result.npz --port 0 --no-browser"),
-    "inspect": (
-        "brachis inspect task.yaml",
-        "brachis inspect tx90l_rail --task-space pose",
-    ),
-    "compose": (
-        "brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",
-    ),
-    "schema": (
-        "brachis schema --out task.schema.json",
-        "brachis schema --of trajectory",
-    ),
-    "sweep": (
-        "brachis sweep lines.yaml --jobs 2",
-        "brachis sweep lines.yaml --retry  # continues a sweep, plans failures again",
-    ),
-}
-"""Examples in the help, by command; those of the whole program under "". They work in this order, with a sweep file."""
+\b
+Exit codes:
+  0    done; of a plan: planned and verified
+  1    no verified plan; a bug in brachis; standard output that cannot be written
+  2    wrong input: a file, a key, an option
+  3    planned and verified, but a figure could not be written
+  130  interrupted (Ctrl-C) before there was a motion
+"""
 
 
 class Verbosity(IntEnum):
@@ -99,7 +65,7 @@ class InterruptedByUserError(BrachisError):
 
 
 class _Commands(TyperGroup):
-    """Commands that the user may interrupt, with examples in their help, and the options of all commands."""
+    """Commands that the user may interrupt, with the options that all commands have."""
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
         """Run a command, its imports included; Ctrl-C that nothing else handled ends it as an error."""
@@ -111,13 +77,11 @@ class _Commands(TyperGroup):
             raise InterruptedByUserError(message) from interrupt
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]
-        """Find a command; add its examples, and the options that all commands have."""
+        """Find a command, and add the options that all commands have."""
         command = super().get_command(ctx, cmd_name)
-        if command is not None and command.epilog is None:
-            command.epilog = _paragraphs("Examples", EXAMPLES[cmd_name])
-            command.params += [
-                each for each in self.params if each.name in {"quiet", "verbose"}
-            ]
+        shared = [each for each in self.params if each.name in {"quiet", "verbose"}]
+        if command is not None and shared[0] not in command.params:
+            command.params += shared
         return command
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]
@@ -128,9 +92,96 @@ class _Commands(TyperGroup):
         return super().resolve_command(ctx, args)
 
 
-def _paragraphs(title: str, lines: tuple[str, ...]) -> str:
-    """Write lines that the help must not wrap, so that each can be copied."""
-    return "\n  ".join((f"\b\n{title}:", *lines))
+_SHARED = """
+json : bool, optional
+    Print one JSON object on standard output.
+degrees : bool, optional
+    Show angles in degrees; files and JSON keep rad.
+figures : bool, optional
+    Draw the figures too: that takes some seconds, and needs Matplotlib.
+strict : bool, optional
+    Treat implausible figures, such as degrees for rad, as errors or as warnings. Default: only a start posture that
+    looks like degrees is an error.
+changes : list of str, optional
+    Change a key of the task, for example spline.intervals=40 or path.0.line.length=0.5. The value is YAML. Repeatable.
+urdf : path, optional
+    URDF file to use instead of the one in the task.
+tool_frame : str, optional
+    Link at the end of the chain.
+base_frame : str, optional
+    Link at the start of the chain.
+result : path
+    Result file (npz) of 'brachis plan --out', or its folder.
+csv : path
+    CSV file: time (t, time_ms, ...), joint positions (j1, q_j1, j1_pos [deg], ...), and velocities (qd_j1, ...) and
+    accelerations (qdd_j1, ...) if known.
+robot : path
+    URDF file; or a task file (.yaml), whose robot, limits and settings are used.
+task_space : str, optional
+    Task space of the path: rows such as x,y, or position, pose, pose_free_roll, joints. Default: that of the task, or
+    the most that the robot can prescribe.
+angle : str, optional
+    Unit of angles in columns without a unit: rad, deg.
+length : str, optional
+    Unit of lengths in columns without a unit: m, mm.
+time : str, optional
+    Unit of times in a column without a unit: s, ms.
+tolerance : float, optional
+    Largest deviation of the recovered path, m and rad. Default: 1e-6, or more if the file's last digits or the noise
+    are coarser.
+noise : float, optional
+    Standard deviation of measured positions, rad or m, which are then smoothed. Default: that of rounding to the file's
+    digits.
+"""
+"""Texts of options that several commands have."""
+
+
+class DocumentedCommand(TyperCommand):
+    """A command whose help is its docstring: what it does, its options under Parameters, examples.
+
+    Its options of several numbers also take one word: ``0 1 0``, ``0,1,0`` or ``"0 1 0"``.
+    """
+
+    def __init__(self, *args: Any, **keywords: Any) -> None:
+        super().__init__(*args, **keywords)
+        docstring = str(inspect.getdoc(self.callback))
+        titles = r"\n\n(Parameters|Examples)\n-+\n"
+        self.help, *parts = re.split(titles, docstring)
+        sections = dict(zip(parts[::2], parts[1::2], strict=True))
+        # The help must not wrap examples, so that each can be copied.
+        self.epilog = f"\b\nExamples:\n{indent(sections['Examples'], '  ')}"
+        entry = re.compile(r"^(\w+) : .*\n((?: +.*\n?)+)", re.MULTILINE)
+        own = sections.get("Parameters", "")
+        texts = dict(entry.findall(_SHARED) + entry.findall(own))
+        parameters: list[Any] = self.params
+        for parameter in parameters:
+            parameter.help = " ".join(texts[parameter.name].split())
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Split such words before the options are read."""
+        options = {
+            name
+            for parameter in self.params
+            if parameter.nargs > 1
+            for name in parameter.opts
+        }
+        return super().parse_args(ctx, split_vectors(args, options))
+
+
+def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
+    """Split the word after one of `options`, or joined to it by ``=``, at commas and spaces."""
+    words: list[str] = []
+    for argument in args:
+        option, equals, value = argument.partition("=")
+        if equals and option in options:
+            words.append(option)
+        elif words and words[-1] in options:
+            value = argument
+        else:
+            words.append(argument)
+            continue
+        words += [part for part in re.split(r"[,\s]+", value) if part] or [value]
+    return words
 
 
 app = typer.Typer(
@@ -140,9 +191,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog=_paragraphs("Examples", EXAMPLES[""])
-    + "\n\n"
-    + _paragraphs("Exit codes", EXIT_CODES),
+    epilog=_EPILOG,
 )
 
 
@@ -195,41 +244,9 @@ def options(
     del version, quiet, verbose
 
 
-Json = Annotated[
-    bool, Option("--json", help="Print one JSON object on standard output.")
-]
-Degrees = Annotated[
-    bool, Option("--degrees", help="Show angles in degrees; files and JSON keep rad.")
-]
-Figures = Annotated[
-    bool,
-    Option(
-        "--figures/--no-figures",
-        help="Draw the figures too: that takes some seconds, and needs Matplotlib.",
-    ),
-]
-Strict = Annotated[
-    bool | None,
-    Option(
-        "--strict/--no-strict",
-        help="Treat implausible figures, such as degrees for rad, as errors or as warnings. Default: only a start "
-        "posture that looks like degrees is an error.",
-    ),
-]
-Changes = Annotated[
-    list[str] | None,
-    Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change a key of the task, for example spline.intervals=40 or path.0.line.length=0.5. The value is YAML. "
-        "Repeatable.",
-    ),
-]
-Urdf = Annotated[
-    Path | None, Option(help="URDF file to use instead of the one in the task.")
-]
-ToolFrame = Annotated[str | None, Option(help="Link at the end of the chain.")]
-BaseFrame = Annotated[str | None, Option(help="Link at the start of the chain.")]
+Json = Annotated[bool, Option("--json")]
+Degrees = Annotated[bool, Option("--degrees")]
+Changes = Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE")]
 _MOTIONS = ("result.npz", "unverified.npz")
 """Names of a motion in the folder of ``brachis plan --out``."""
 
@@ -265,22 +282,6 @@ def task_space_of(text: str | None) -> str | list[str] | None:
     return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
-def load_changed_task(
-    path: Path, changes: Sequence[str] | None, *, strict: bool | None = None
-) -> brachis.Task:
-    """Load a task file with keys set as in ``spline.intervals=40``, and with ``strict`` if it is given."""
-    robots = brachis.robots
-    if robots.is_robot(str(path)) and path.suffix == "":
-        name = robots.path_of(str(path)).parent.name
-        raise TaskError(
-            "this is the name of a robot, not of a task file",
-            where=name,
-            allowed="a task file",
-            hint=f"brachis new {name} writes a first task for it",
-        )
-    return brachis.load_task(path, changes=read_changes(changes, strict=strict))
-
-
 def read_changes(
     changes: Sequence[str] | None, *, strict: bool | None = None
 ) -> dict[str, object]:
@@ -296,8 +297,22 @@ def read_changes(
     return keys
 
 
-def refuse_task_options(given: Mapping[str, object], source: str) -> None:
-    """Refuse options of a task if the input is not a task file.
+def load_changed_task(path: Path, keys: Mapping[str, object]) -> brachis.Task:
+    """Load a task file, with the keys that `read_changes` has read set."""
+    robots = brachis.robots
+    if robots.is_robot(str(path)) and path.suffix == "":
+        name = robots.path_of(str(path)).parent.name
+        raise TaskError(
+            "this is the name of a robot, not of a task file",
+            where=name,
+            allowed="a task file",
+            hint=f"brachis new {name} writes a first task for it",
+        )
+    return brachis.load_task(path, changes=keys)
+
+
+def refuse_options(given: Mapping[str, object], source: str, allowed: str) -> None:
+    """Refuse options that do not fit the input.
 
     Parameters
     ----------
@@ -305,6 +320,8 @@ def refuse_task_options(given: Mapping[str, object], source: str) -> None:
         The options and their values; None: not given.
     source : str
         What the input is, with its article.
+    allowed : str
+        What the options are for.
 
     Raises
     ------
@@ -316,7 +333,7 @@ def refuse_task_options(given: Mapping[str, object], source: str) -> None:
                 f"this option cannot be used with {source}",
                 where=option,
                 found=value,
-                allowed="this option with a task file",
+                allowed=f"this option with {allowed}",
             )
 
 
@@ -326,11 +343,6 @@ def urdf_of(given: Path) -> Path:
     Raises
     ------
     UnknownNameError
-        There is neither a file nor a robot of this name.
+        There is no file and no robot of this name, but a robot of a name like it.
     """
-    if is_file(given) or is_folder(given) or given.suffix or len(given.parts) > 1:
-        return given
-    robots = brachis.robots
-    if str(given) not in robots.names():
-        raise UnknownNameError("URDF file or robot", str(given), robots.names())
-    return robots.path_of(str(given))
+    return Path(brachis.robots.locate(str(given)))  # type: ignore[arg-type]

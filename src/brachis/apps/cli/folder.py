@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import shutil
 import signal
-import stat
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -31,7 +30,6 @@ from brachis.common.files import (
     check_beginning,
     is_file,
     is_folder,
-    status_of,
     temporary_in,
     writing_errors,
 )
@@ -46,19 +44,19 @@ Drawing = Callable[[], Any]
 
 
 def check_output(
-    out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]
+    out: Path, suffixes: Collection[str], inputs: Iterable[Path | None]
 ) -> None:
     """Refuse what cannot be written, or should not be replaced.
 
     An output is refused whose folder does not exist, or that would replace a folder, an input of the command or a file
-    that brachis did not write.
+    that brachis did not write in such a format.
 
     Parameters
     ----------
     out : Path
         What will be written. A new file may have any name; devices such as ``/dev/stdout`` are not checked.
-    suffixes : iterable of str
-        Suffixes of the format.
+    suffixes : collection of str
+        Suffixes of the formats that may be written; an older file has to begin as one of them.
     inputs : iterable of Path or None
         Files that the command reads.
 
@@ -68,23 +66,14 @@ def check_output(
     """
     from brachis.apps.export.formats import FORMATS
 
-    with writing_errors(out):
-        status = status_of(out)
-    if status is None and not is_folder(out.parent):
-        raise InputError(
-            "the file cannot be written",
-            where=str(out),
-            found=f"no folder {out.parent}",
-            hint="Make the folder first",
-        )
-    if status is not None and stat.S_ISDIR(status.st_mode):
-        raise InputError(
-            "the file cannot be written",
-            where=str(out),
-            found="a folder of this name",
-            allowed="a name that no folder has",
-        )
-    if status is None or not stat.S_ISREG(status.st_mode):
+    found = None
+    if is_folder(out):
+        found = "a folder of this name"
+    elif not is_folder(out.parent):
+        found = f"no folder {out.parent}"
+    if found is not None:
+        raise InputError("the file cannot be written", where=str(out), found=found)
+    if not is_file(out):
         return
     for path in inputs:
         with suppress(OSError):  # an input that cannot be read is another file
@@ -95,18 +84,9 @@ def check_output(
                     found="the same file",
                     allowed="another file name",
                 )
-    suffix = out.suffix.lower()
-    allowed = tuple(suffixes)
-    if suffix not in allowed:
-        raise InputError(
-            "the file exists and is of another kind",
-            where=str(out),
-            found=f"suffix {suffix}" if suffix else "no suffix",
-            allowed=f"a new file, or one that ends in {' or '.join(allowed)}",
-        )
-    exported = {form.beginning for form in FORMATS.values() if form.suffix == suffix}
-    own = BEGINNINGS.get(suffix)
-    check_beginning(out, b"|".join(exported if own is None else {own, *exported}))
+    exports = (form.beginning for form in FORMATS.values() if form.suffix in suffixes)
+    others = (BEGINNINGS[suffix] for suffix in suffixes if suffix in BEGINNINGS)
+    check_beginning(out, b"|".join((*exports, *others)))
 
 
 def write_files(
@@ -175,10 +155,9 @@ def _write_results(
         for name, write in results.items():
             try:
                 write(temporary / name)
-            except InputError as error:  # it names the temporary file
-                raise InputError(
-                    error.problem, where=str(out / name), found=error.found
-                ) from error
+            except InputError as error:
+                error.where = str(out / name)  # not the temporary file
+                raise
         for name in others:
             with writing_errors(out / name):
                 (out / name).unlink(missing_ok=True)
@@ -192,7 +171,7 @@ def _write_results(
 def write_one(
     out: Path,
     write: Writer,
-    suffixes: Iterable[str],
+    suffixes: Collection[str],
     inputs: Iterable[Path | None] = (),
 ) -> None:
     """Write one file, unless it would take the place of what `check_output` protects."""
@@ -240,36 +219,16 @@ def output_folder(
 ) -> Iterator[None]:
     """Make the folder for a motion's files; if the block fails, say which files of an earlier run are there.
 
-    Raises
-    ------
-    InputError
-        As `_make_folder` does.
-    """
-    _make_folder(out, names, inputs)
-    try:
-        yield
-    except (Exception, KeyboardInterrupt):
-        if out is not None:
-            both = (*names, *map(_unverified, names))
-            older = [name for name in dict.fromkeys(both) if is_file(out / name)]
-            if older:
-                print_error(
-                    f"files of an earlier run stay in {out}: {', '.join(older)}"
-                )
-        raise
-
-
-def _make_folder(
-    out: Path | None, names: Sequence[str], inputs: Sequence[Path | None]
-) -> None:
-    """Make the folder for a motion's files, and refuse what `check_output` refuses; without a folder do nothing.
+    Without a folder nothing is made.
 
     Raises
     ------
     InputError
-        The folder cannot be made, has the name of a file, or holds a file of others under one of these names.
+        The folder cannot be made, has the name of a file, or holds under one of these names what `check_output`
+        refuses to replace.
     """
     if out is None:
+        yield
         return
     has_suffix = out.suffix in {Path(name).suffix for name in names}
     if is_file(out) or (has_suffix and not is_folder(out)):
@@ -280,15 +239,18 @@ def _make_folder(
             allowed="a folder",
             hint=f"Write --out {out.with_suffix('')}" if out.suffix else None,
         )
-    try:
+    with writing_errors(out):
         out.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or str(error)
-        raise InputError(
-            "the folder cannot be made", where=str(out), found=found
-        ) from error
-    for name in (*names, *map(_unverified, names)):
+    both = dict.fromkeys((*names, *map(_unverified, names)))
+    for name in both:
         check_output(out / name, (Path(name).suffix,), inputs)
+    try:
+        yield
+    except (Exception, KeyboardInterrupt):
+        older = [name for name in both if is_file(out / name)]
+        if older:
+            print_error(f"files of an earlier run stay in {out}: {', '.join(older)}")
+        raise
 
 
 def finish(
@@ -330,11 +292,11 @@ def finish(
     """
     failures: list[InputError] = []
     if out is not None:
-        own = {name: name if verified else _unverified(name) for name in names}
-        files = {own[name]: write for name, write in results.items()}
-        (data_file,) = (own[name] for name in names if name.endswith(".json"))
+        own = str if verified else _unverified
+        files = {own(name): write for name, write in results.items()}
+        (data_file,) = (own(name) for name in names if name.endswith(".json"))
         files[data_file] = partial(write_text, json_text(data))
-        drawings = {own[name]: partial(draw, make) for name, make in figures.items()}
+        drawings = {own(name): partial(draw, make) for name, make in figures.items()}
         stale = {*names, *map(_unverified, names)} - {*files}
         with show_progress(WRITING) as listener:
             data["files"], failures = write_files(
@@ -353,18 +315,15 @@ def finish(
         for each in result.not_completed:
             print_error(f"not completed: {each}")
     if not verified:
-        failed = "" if result is None else _describe_failures(result.verification)
+        checks = () if result is None else result.verification.checks
+        failed = [
+            f"{each.name} {each.in_words()}" for each in checks if not each.passed
+        ]
+        named = f" ({name_first(failed, '; ')})" if failed else ""
         print_error(
-            f"the motion found did not pass the verification{failed}; {complaint}"
+            f"the motion found did not pass the verification{named}; {complaint}"
         )
     return exit_code(verified, failures)
-
-
-def _describe_failures(verification: brachis.Verification) -> str:
-    """Say which checks failed, the first three."""
-    failed = [check for check in verification.checks if not check.passed]
-    words = [f"{check.name} {check.in_words()}" for check in failed]
-    return f" ({name_first(words, '; ')})" if words else ""
 
 
 def draw(make: Drawing, path: Path) -> None:

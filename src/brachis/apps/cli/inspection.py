@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
-from math import degrees as in_degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Argument, Option
+from typer import Argument
 
 import brachis
 from brachis.apps.cli.app import (
-    BaseFrame,
     Changes,
     Degrees,
     Json,
-    ToolFrame,
     load_changed_task,
     read_changes,
-    refuse_task_options,
+    refuse_options,
     task_space_of,
     urdf_of,
 )
@@ -53,40 +51,13 @@ _OTHER_TASKS = (
 """Reasons of families for other task spaces; shown only without other reasons."""
 
 
-PrescribedSpace = Annotated[
-    str | None,
-    Option(
-        help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
-        "Default: the task's, or all that the robot can."
-    ),
-]
-
-Posture = Annotated[
-    str | None,
-    Option(
-        help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
-    ),
-]
-
-LockedJoints = Annotated[
-    list[str] | None, Option(help="Joint held at a position: name=value, repeatable.")
-]
-
-
 def inspect(
-    source: Annotated[
-        Path,
-        Argument(
-            help="URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the "
-            "path and the postures at its ends.",
-            metavar="URDF|TASK",
-        ),
-    ],
-    task_space: PrescribedSpace = None,
-    tool_frame: ToolFrame = None,
-    base_frame: BaseFrame = None,
-    posture: Posture = None,
-    lock: LockedJoints = None,
+    source: Annotated[Path, Argument(metavar="URDF|TASK")],
+    task_space: str | None = None,
+    tool_frame: str | None = None,
+    base_frame: str | None = None,
+    posture: str | None = None,
+    lock: list[str] | None = None,
     degrees: Degrees = False,
     changes: Changes = None,
     json: Json = False,
@@ -94,6 +65,24 @@ def inspect(
     """Show a robot's joints and its closed forms.
 
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
+
+    Parameters
+    ----------
+    source : path
+        URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the path and the
+        postures at its ends.
+    task_space : str, optional
+        What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. Default: the task's,
+        or all that the robot can.
+    posture : str, optional
+        Say where the tool is at these joint positions, for example '0, 0.3, 1.2'.
+    lock : list of str, optional
+        Joint held at a position: name=value, repeatable.
+
+    Examples
+    --------
+    brachis inspect task.yaml
+    brachis inspect tx90l_rail --task-space pose
     """
     from brachis.problem.plausibility import check_within_reach, of_robot, of_task
     from brachis.problem.problem import Problem
@@ -108,8 +97,10 @@ def inspect(
     keys = read_changes(changes)
     space: str | Sequence[str] | None = task_space_of(task_space)
     if is_task_file(source):
-        _refuse_urdf_options(tool_frame, base_frame, lock)
-        task = load_changed_task(source, changes)
+        given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
+        set_it = "robot.tool_frame, robot.base_frame, robot.locked_joints"
+        refuse_options(given, "a task file", f"a URDF; a task has {set_it}")
+        task = load_changed_task(source, keys)
         with name_task_file(source, keys):
             robot = robot_from_settings(task.robot)
             try:
@@ -120,7 +111,7 @@ def inspect(
                 raise
         space = space or task.task_space
     else:
-        refuse_task_options({"--set": changes}, "a URDF")
+        refuse_options({"--set": changes}, "a URDF", "a task file")
         source = urdf_of(source)
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _robot_of_urdf(source, tool_frame, base_frame, lock or [])
@@ -149,13 +140,16 @@ def inspect(
 
 
 def _describe(robot: Robot, problem: Problem | None) -> dict[str, Any]:
-    """Describe a robot, and what a task says of it and of its path, as plain data for JSON."""
+    """Describe a robot, and what a task says of it, its ends (None where free) and its path, as plain data for JSON.
+
+    The path's length is None without positions.
+    """
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
 
     task = None if problem is None else problem.task
     limits = joint_limits_of(robot) if problem is None else problem.limits
-    return {
+    data = {
         "tool_frame": robot.tool_frame,
         "base_frame": robot.base_frame,
         "in_use": in_use(robot),
@@ -163,36 +157,16 @@ def _describe(robot: Robot, problem: Problem | None) -> dict[str, Any]:
         "guarantees": describe_guarantees(limits),
         "collisions": _collisions(robot, task),
         "fits": [fit.to_dict() for fit in task.fits] if task else [],
-        **(_places(problem) if problem else {}),
     }
-
-
-def _refuse_urdf_options(
-    tool_frame: str | None, base_frame: str | None, lock: list[str] | None
-) -> None:
-    """Refuse the options of a URDF that a task sets itself."""
-    given = {
-        "--tool-frame": (tool_frame, "robot.tool_frame"),
-        "--base-frame": (base_frame, "robot.base_frame"),
-        "--lock": (lock, "robot.locked_joints"),
-    }
-    for option, (value, key) in given.items():
-        if value:
-            raise InputError(
-                "not allowed with a task file",
-                where=option,
-                hint=f"Omit the option and set {key} in the task; or give the URDF in place of the task",
-            )
-
-
-def _places(problem: Problem) -> dict[str, Any]:
-    """Describe the postures at both ends, None where free, and the path; its length is None without positions."""
-    robot = problem.robot
-    ends = {"start_posture": problem.start, "end_posture": problem.end}
-    return {
-        "joint_names": list(robot.joint_names),
-        "position_units": list(robot.position_units),
-        **{key: None if q is None else q.tolist() for key, q in ends.items()},
+    if problem is None:
+        return data
+    start = problem.start
+    end = problem.end
+    return data | {
+        "joint_names": list(problem.robot.joint_names),
+        "position_units": list(problem.robot.position_units),
+        "start_posture": None if start is None else start.tolist(),
+        "end_posture": None if end is None else end.tolist(),
         "path": {
             "segments": [segment.kind for segment in problem.task.path],
             "length": problem.path.length if problem.task_map.axes else None,
@@ -217,6 +191,7 @@ def _remarks(
     robot: Robot, candidates: list[ik.TriedDecomposition], posture: str | None
 ) -> list[str]:
     """Say whether closed forms are missing, and where the tool is in a posture."""
+    from brachis.common.arguments import numbers
     from brachis.problem.plausibility import of_posture
     from brachis.robot.plausibility import refuse_issues
 
@@ -226,7 +201,8 @@ def _remarks(
     if missing := brachis.ik.missing_eaik(candidates):
         remarks.append(missing)
     if posture is not None:
-        q = _read_posture(robot, posture)
+        values = numbers(posture.replace(",", " ").split(), "--posture", "rad or m")
+        q = robot.posture(values, "--posture")
         issues = refuse_issues(of_posture(robot, "--posture", q), strict=False)
         remarks += [f"warning: {issue}" for issue in issues]
         remarks.append(_tool_pose(robot, q))
@@ -258,7 +234,11 @@ def _print_robot(
         for end in ("start", "end"):
             posture = write_posture(data, f"{end}_posture", degrees=degrees)
             print_lines(f"{end} posture: {posture}")
-        print_lines(f"path: {_path_in_words(data['path'])}")
+        kinds = [segment.kind for segment in task.path]
+        length = data["path"]["length"]
+        long = "" if length is None else f", {length:.4g} m long"
+        named = ", ".join(dict.fromkeys(kinds))
+        print_lines(f"path: {write_count(len(kinds), 'segment')} ({named}){long}")
         for fit in task.fits:
             _print_fit(fit)
     redundancy = data["degree_of_redundancy"]
@@ -270,14 +250,6 @@ def _print_robot(
         )
     else:
         _print_decompositions(data["decompositions"])
-
-
-def _path_in_words(path: dict[str, Any]) -> str:
-    """Say how many segments of which kinds a path has, and how long it is."""
-    segments = path["segments"]
-    kinds = ", ".join(dict.fromkeys(segments))
-    text = f"{write_count(len(segments), 'segment')} ({kinds})"
-    return text if path["length"] is None else f"{text}, {path['length']:.4g} m long"
 
 
 def _collisions(robot: Robot, task: Task | None) -> dict[str, list[str]]:
@@ -335,38 +307,24 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
 
 
 def _print_fit(fit: FitReport) -> None:
-    """Print what was read from a file of points, and how near the fitted path is to it."""
-    rows = {
-        "points": f"{fit.points} along {1e3 * fit.length:.6g} mm",
-        "knot intervals": str(fit.intervals),
-        "position error": f"at most {1e3 * fit.position_error:.4g} mm (allowed {1e3 * fit.position_tolerance:.4g} mm), "
-        f"rms {1e3 * fit.position_rms:.3g} mm",
-        "orientation error": f"at most {in_degrees(fit.orientation_error):.3g} deg "
-        f"(allowed {in_degrees(fit.orientation_tolerance):.4g} deg)",
-    }
-    if not fit.profile:
-        rows["path"] = "passes all points"
-    notes = [("found", note) for note in (*fit.told, fit.doubt) if note]
-    print_table(fit.source, ("", ""), [*rows.items(), *notes])
-    corners = [
-        (
-            corner.row,
-            f"{in_degrees(corner.angle):.4g}",
-            f"{1e3 * corner.distance:.6g}",
-            f"{1e3 * corner.blend:.4g}",
+    """Print what was read from a file of points, how near the fitted path is to it, and its corners."""
+    print_lines(f"path from {fit}")
+    if fit.corners:
+        is_blended = any(corner.blend for corner in fit.corners)
+        what = (
+            "rounded within the tolerance" if is_blended else "at which the tool stops"
         )
-        for corner in fit.corners
-    ]
-    if corners:
         columns = ("row", "angle [deg]", "at [mm]", "blend [mm]")
-        print_table(
-            "corners, rounded within the tolerance"
-            if any(corner.blend for corner in fit.corners)
-            else "corners, at which the tool stops",
-            columns,
-            corners,
-            numbers=columns,
-        )
+        rows = [
+            (
+                corner.row,
+                f"{math.degrees(corner.angle):.4g}",
+                f"{1e3 * corner.distance:.6g}",
+                f"{1e3 * corner.blend:.4g}",
+            )
+            for corner in fit.corners
+        ]
+        print_table(f"corners, {what}", columns, rows, numbers=columns)
 
 
 def _robot_of_urdf(
@@ -375,18 +333,12 @@ def _robot_of_urdf(
     """Make the robot of a URDF with the limits that the file states; a plan refuses missing ones, inspect does not."""
     import numpy as np
 
+    from brachis.common.arguments import numbers
+
     locked = {}
     for text in lock:
         name, _, value = text.partition("=")
-        try:
-            locked[name] = float(value)
-        except ValueError as error:
-            raise InputError(
-                "this value is not understood",
-                where="--lock",
-                found=text,
-                allowed="name=value, rad or m",
-            ) from error
+        locked[name] = float(numbers(value, f"--lock {name}", "rad or m"))
     robot = brachis.Robot.from_urdf(
         path,
         tool_frame=tool_frame,
@@ -397,8 +349,7 @@ def _robot_of_urdf(
     magnitudes = {}
     for kind in ("acceleration", "velocity", "torque"):
         stated = [limit.of_kind(kind) for limit in robot.urdf_limits]
-        sizes = [np.inf if value is None else value for value in stated]
-        magnitudes[kind] = np.array(sizes)
+        magnitudes[kind] = np.array([np.inf if x is None else x for x in stated])
     return replace(robot, limits=robot.limits.with_magnitudes(**magnitudes))
 
 
@@ -457,11 +408,9 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     if solved:
         cells = [[row[name] for name in columns] for row in solved]
         print_table("choices of redundant joints", columns, cells)
-    choices: dict[str, list[str]] = {}
-    for row in solved:
-        choices.setdefault(row["labels"], []).append(row["redundant joints"])
-    for labels, joints in choices.items():
-        print_lines(f"branches with {'; '.join(joints)} redundant: {labels}")
+    for labels in dict.fromkeys(row["labels"] for row in solved):
+        alike = [row["redundant joints"] for row in solved if row["labels"] == labels]
+        print_lines(f"branches with {'; '.join(alike)} redundant: {labels}")
     if refused:
         print_lines(
             f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
@@ -471,20 +420,6 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     if len(refused) > _LISTED:
         more = len(refused) - _LISTED
         print_lines(f"  ... and {more} more, which --json lists")
-
-
-def _read_posture(robot: Robot, text: str) -> np.ndarray:
-    """Read the numbers of a posture, (n,)."""
-    try:
-        values = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError as error:
-        raise InputError(
-            "this value is not understood",
-            where="--posture",
-            found=text,
-            allowed="numbers, rad or m",
-        ) from error
-    return robot.posture(values, "--posture")
 
 
 def _tool_pose(robot: Robot, q: np.ndarray) -> str:

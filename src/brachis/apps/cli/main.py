@@ -18,7 +18,7 @@ from typing import TextIO, cast
 import typer
 
 from brachis.apps.cli import inspection, motions, planning, recordings, starting
-from brachis.apps.cli.app import Verbosity, app, get_verbosity
+from brachis.apps.cli.app import DocumentedCommand, Verbosity, app, get_verbosity
 from brachis.apps.cli.output import (
     StandardOutput,
     open_streams,
@@ -70,7 +70,7 @@ def _prepare(command: Callable[..., None]) -> Callable[..., None]:
 
 
 for _name, _command in _COMMANDS.items():
-    app.command(_name, cls=starting.VectorCommand)(_prepare(_command))
+    app.command(_name, cls=DocumentedCommand)(_prepare(_command))
 
 
 def main() -> None:

@@ -41,32 +41,31 @@ from brachis.apps.cli.output import (
 )
 from brachis.common import interrupts
 from brachis.common.files import read_file
-from brachis.errors import UnknownNameError
+from brachis.errors import check_names
 
 if TYPE_CHECKING:
     from brachis.apps.view import Viewer
 
-ResultFile = Annotated[
-    Path,
-    Argument(
-        help="Result file (npz) of 'brachis plan --out', or its folder.",
-        metavar="RESULT",
-    ),
-]
+ResultFile = Annotated[Path, Argument(metavar="RESULT")]
 
 
 def verify(
     result: ResultFile,
-    urdf: Annotated[
-        Path | None,
-        Option(
-            help="Check against this URDF, or included robot, instead of the saved one."
-        ),
-    ] = None,
+    urdf: Path | None = None,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
-    """Check a saved motion again: path, limits, ends."""
+    """Check a saved motion again: path, limits, ends.
+
+    Parameters
+    ----------
+    urdf : path, optional
+        Check against this URDF, or included robot, instead of the saved one.
+
+    Examples
+    --------
+    brachis verify out/result.npz
+    """
     from brachis.robot.from_task import robot_from_settings
 
     _, trajectory = _load(result)
@@ -82,42 +81,37 @@ def verify(
 
 def export(
     result: ResultFile,
-    out: Annotated[
-        Path,
-        Option(
-            help="File to write. Its suffix sets the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every "
-            "joint; SI units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4."
-        ),
-    ],
-    form: Annotated[
-        str | None,
-        Option(
-            "--format",
-            help="Name of the format: csv, parquet, json, ros2, mcap, urscript, gif or mp4.",
-        ),
-    ] = None,
-    dt: Annotated[
-        float | None,
-        Option(
-            help="Sampling period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations."
-        ),
-    ] = None,
-    last: Annotated[
-        str | None,
-        Option(
-            help="Time of the last sample. exact: the end time, even if it is not a multiple of the period. hold: the "
-            "next multiple of the period; the end posture is held until then. Default: exact; hold for URScript."
-        ),
-    ] = None,
-    joints: Annotated[
-        str | None,
-        Option(help="Joints to write, in this order: j1,j2,... Default: all."),
-    ] = None,
-    slower: Annotated[
-        float, Option(help="How many times slower an animation shows the motion.")
-    ] = 1.0,
+    out: Annotated[Path, Option()],
+    form: Annotated[str | None, Option("--format")] = None,
+    dt: float | None = None,
+    last: str | None = None,
+    joints: str | None = None,
+    slower: float = 1.0,
 ) -> None:
-    """Sample a saved motion for a controller, or animate it."""
+    """Sample a saved motion for a controller, or animate it.
+
+    Parameters
+    ----------
+    out : path
+        File to write. Its suffix sets the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every joint; SI
+        units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4.
+    form : str, optional
+        Name of the format: csv, parquet, json, ros2, mcap, urscript, gif or mp4.
+    dt : float, optional
+        Sampling period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations.
+    last : str, optional
+        Time of the last sample. exact: the end time, even if it is not a multiple of the period. hold: the next
+        multiple of the period; the end posture is held until then. Default: exact; hold for URScript.
+    joints : str, optional
+        Joints to write, in this order: j1,j2,... Default: all.
+    slower : float, optional
+        How many times slower an animation shows the motion.
+
+    Examples
+    --------
+    brachis export out/result.npz --out out/motion.csv --dt 0.004
+    brachis export out/result.npz --out out/motion.gif --dt 0.1
+    """
     formats = brachis.export
     result, trajectory = _load(result)
     settings = formats.format_of(out, form)
@@ -143,20 +137,26 @@ def export(
 
 def plot(
     result: ResultFile,
-    out: Annotated[Path, Option(help="Figure to write: png, pdf or svg.")],
-    kind: Annotated[
-        str,
-        Option(
-            help="Figure to draw: torques, postures, motion, overview, timeline, limits or fit."
-        ),
-    ] = "overview",
+    out: Annotated[Path, Option()],
+    kind: str = "overview",
 ) -> None:
-    """Draw a saved motion."""
+    """Draw a saved motion.
+
+    Parameters
+    ----------
+    out : path
+        Figure to write: png, pdf or svg.
+    kind : str, optional
+        Figure to draw: torques, postures, motion, overview, timeline, limits or fit.
+
+    Examples
+    --------
+    brachis plot out/result.npz --kind torques --out out/torques.svg
+    """
     from brachis.apps.plots import SUFFIXES, check_suffix
 
     plots = brachis.plots
-    if kind not in plots.PLOTS:
-        raise UnknownNameError("figure", kind, plots.PLOTS, where="--kind")
+    check_names("figure", [kind], plots.PLOTS, "--kind")
     check_suffix(out)
     result, trajectory = _load(result)
 
@@ -170,17 +170,24 @@ def plot(
 
 def report(
     result: ResultFile,
-    out: Annotated[
-        Path | None,
-        Option(help="HTML file to write. Default: result.html next to the result."),
-    ] = None,
-    title: Annotated[
-        str | None,
-        Option(help="Title of the page. Default: the names of the robot and the file."),
-    ] = None,
+    out: Path | None = None,
+    title: str | None = None,
     degrees: Degrees = False,
 ) -> None:
-    """Write a report of a saved motion as one HTML page."""
+    """Write a report of a saved motion as one HTML page.
+
+    Parameters
+    ----------
+    out : path, optional
+        HTML file to write. Default: result.html next to the result.
+    title : str, optional
+        Title of the page. Default: the names of the robot and the file.
+
+    Examples
+    --------
+    brachis report out/result.npz
+    brachis report out/result.npz --title 'cell 3' --out out/cell3.html
+    """
     from brachis.apps.report import check_report_name
 
     if out is not None:
@@ -217,31 +224,28 @@ def _inputs(result: Path, trajectory: brachis.Trajectory) -> list[Path]:
 
 def view(
     result: ResultFile,
-    host: Annotated[
-        str,
-        Option(
-            help="Address that the viewer listens on; 0.0.0.0 lets other machines look.",
-            metavar="ADDRESS",
-        ),
-    ] = "127.0.0.1",
-    port: Annotated[
-        int | None,
-        Option(
-            help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on."
-        ),
-    ] = None,
-    browser: Annotated[
-        bool,
-        Option(
-            "--browser/--no-browser",
-            help="Open the browser if there is a screen and a terminal.",
-        ),
-    ] = True,
+    host: Annotated[str, Option(metavar="ADDRESS")] = "127.0.0.1",
+    port: int | None = None,
+    browser: bool = True,
     degrees: Degrees = False,
 ) -> None:
     """Show a saved motion in the browser.
 
     It shows robot, path, tool trace and ghost postures, and plots of the limits with a time slider. Ctrl-C ends it.
+
+    Parameters
+    ----------
+    host : str, optional
+        Address that the viewer listens on; 0.0.0.0 lets other machines look.
+    port : int, optional
+        Port of the viewer; 0 for any free one. Default: the first free one from 8080 on.
+    browser : bool, optional
+        Open the browser if there is a screen and a terminal.
+
+    Examples
+    --------
+    brachis view out
+    brachis view out/result.npz --port 0 --no-browser
     """
     from brachis.apps.view import Viewer
 
@@ -290,23 +294,28 @@ def _read_candidates(
 
 
 def schema(
-    out: Annotated[
-        Path | None, Option(help="File to write instead of standard output.")
-    ] = None,
-    of: Annotated[
-        str,
-        Option(
-            help="Which schema: task (task files) or trajectory (motions exported as JSON)."
-        ),
-    ] = "task",
+    out: Path | None = None,
+    of: str = "task",
 ) -> None:
-    """Print the JSON schema of tasks, or of exported JSON."""
+    """Print the JSON schema of tasks, or of exported JSON.
+
+    Parameters
+    ----------
+    out : path, optional
+        File to write instead of standard output.
+    of : str, optional
+        Which schema: task (task files) or trajectory (motions exported as JSON).
+
+    Examples
+    --------
+    brachis schema --out task.schema.json
+    brachis schema --of trajectory
+    """
     from brachis.apps.export import samples_schema
     from brachis.task import json_schema
 
     schemas = {"task": json_schema, "trajectory": samples_schema}
-    if of not in schemas:
-        raise UnknownNameError("schema", of, schemas, where="--of")
+    check_names("schema", [of], schemas, "--of")
     data = schemas[of]()
     if out is None:
         print_json(data)

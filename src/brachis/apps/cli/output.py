@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import sys
@@ -169,18 +168,9 @@ def print_error(message: str) -> None:
 
 def json_text(data: Mapping[str, object]) -> str:
     """Return one JSON object as text; numbers that JSON does not know become null."""
-    return json.dumps(_finite(data), indent=2, allow_nan=False) + "\n"
-
-
-def _finite(value: object) -> object:
-    """Return plain data with None for every number that JSON does not know."""
-    if isinstance(value, Mapping):
-        return {str(key): _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    # json writes NaN and infinities as constants, which it reads as None here.
+    plain = json.loads(json.dumps(data), parse_constant=lambda _: None)
+    return json.dumps(plain, indent=2) + "\n"
 
 
 def print_json(data: Mapping[str, object]) -> None:

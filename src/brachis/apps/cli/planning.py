@@ -14,15 +14,11 @@ import brachis
 from brachis.apps.cli.app import (
     Changes,
     Degrees,
-    Figures,
     Json,
-    Strict,
-    Urdf,
     load_changed_task,
     motion_file,
     read_changes,
-    refuse_task_options,
-    urdf_of,
+    refuse_options,
 )
 from brachis.apps.cli.folder import (
     Drawing,
@@ -51,25 +47,33 @@ _BOTTLENECK = ("bottleneck.json", "timeline.png")
 
 
 def plan(
-    task: Annotated[Path, Argument(help="Task file (YAML).", metavar="TASK")],
-    out: Annotated[
-        Path | None,
-        Option(
-            help="Folder for result.npz, result.json, overview.png and candidates.png, and fit.png if the path was "
-            "fitted to points. If the verification fails, the names begin with unverified."
-        ),
-    ] = None,
-    urdf: Urdf = None,
+    task: Annotated[Path, Argument(metavar="TASK")],
+    out: Path | None = None,
+    urdf: Path | None = None,
     changes: Changes = None,
-    view: Annotated[
-        bool, Option("--view", help="Show the motion in the browser, until Ctrl-C.")
-    ] = False,
-    strict: Strict = None,
-    figures: Figures = True,
+    view: Annotated[bool, Option("--view")] = False,
+    strict: bool | None = None,
+    figures: bool = True,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
-    """Plan a task, verify the motion, and print the result."""
+    """Plan a task, verify the motion, and print the result.
+
+    Parameters
+    ----------
+    task : path
+        Task file (YAML).
+    out : path, optional
+        Folder for result.npz, result.json, overview.png and candidates.png, and fit.png if the path was fitted to
+        points. If the verification fails, the names begin with unverified.
+    view : bool, optional
+        Show the motion in the browser, until Ctrl-C.
+
+    Examples
+    --------
+    brachis plan task.yaml --out out
+    brachis plan task.yaml --set search.effort=single --set 'path.0.line.by=[0, 0.4]'
+    """
     from brachis.apps.view import Viewer, require_viser
 
     if view:
@@ -112,12 +116,11 @@ def _plan_task(
     """Load a task and plan it."""
     from brachis.task import name_task_file
 
-    changed = load_changed_task(task, changes, strict=strict)
-    robot = urdf and urdf_of(urdf)
+    keys = read_changes(changes, strict=strict)
+    changed = load_changed_task(task, keys)
     # With a URDF of its own, the robot is not that of the task file.
-    source = None if urdf else task
-    with name_task_file(source, read_changes(changes, strict=strict)):
-        return brachis.plan(robot, changed, listener=listener)
+    with name_task_file(None if urdf else task, keys):
+        return brachis.plan(urdf and str(urdf), changed, listener=listener)
 
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
@@ -171,42 +174,15 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
     print_verification(result.verification, degrees=degrees)
 
 
-CheckedAgain = Annotated[
-    bool,
-    Option("--check", help="Solve again with each limit raised by 1 %, and compare."),
-]
-
-WithReference = Annotated[
-    bool,
-    Option(
-        "--reference",
-        help="Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best "
-        "known value, not a proven bound, and takes seconds.",
-    ),
-]
-
-
 def bottleneck(
-    task: Annotated[
-        Path,
-        Argument(
-            help="Task file (YAML), or result file (npz) of a saved motion.",
-            metavar="TASK|RESULT",
-        ),
-    ],
-    check: CheckedAgain = False,
-    reference: WithReference = False,
-    out: Annotated[
-        Path | None,
-        Option(
-            help="Folder for bottleneck.json and timeline.png. If the verification fails, the names begin with "
-            "unverified_."
-        ),
-    ] = None,
-    urdf: Urdf = None,
+    task: Annotated[Path, Argument(metavar="TASK|RESULT")],
+    check: Annotated[bool, Option("--check")] = False,
+    reference: Annotated[bool, Option("--reference")] = False,
+    out: Path | None = None,
+    urdf: Path | None = None,
     changes: Changes = None,
-    strict: Strict = None,
-    figures: Figures = True,
+    strict: bool | None = None,
+    figures: bool = True,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
@@ -214,6 +190,22 @@ def bottleneck(
 
     For each limit: how much time it costs, and when it is active. A task is planned first; a saved motion is used as it
     is.
+
+    Parameters
+    ----------
+    task : path
+        Task file (YAML), or result file (npz) of a saved motion.
+    check : bool, optional
+        Solve again with each limit raised by 1 %, and compare.
+    reference : bool, optional
+        Compare with a reference: the same problem with discontinuous torque on a fine mesh. It is the best known value,
+        not a proven bound, and takes seconds.
+    out : path, optional
+        Folder for bottleneck.json and timeline.png. If the verification fails, the names begin with unverified_.
+
+    Examples
+    --------
+    brachis bottleneck task.yaml --set search.effort=single
     """
     from brachis.optimise.candidate import describe_coordinates
 
@@ -222,7 +214,7 @@ def bottleneck(
         source = motion_file(task)
         if source.suffix.lower() == ".npz":
             given = {"--urdf": urdf, "--set": changes, "--strict": strict}
-            refuse_task_options(given, "a saved motion")
+            refuse_options(given, "a saved motion", "a task file")
             trajectory = brachis.Trajectory.load(source)
             data = _verify_again(trajectory)
         else:
@@ -269,30 +261,34 @@ def _verify_again(trajectory: brachis.Trajectory) -> dict[str, Any]:
 
 
 def sweep(
-    source: Annotated[Path, Argument(help="Sweep file (YAML).", metavar="SWEEP")],
-    out: Annotated[
-        Path | None,
-        Option(
-            help="Folder for plans, table.parquet, table.csv and sweep.png. Default: a folder in the current one with "
-            "the name of the file. An interrupted sweep continues there with the missing plans."
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        Option(
-            help="Number of processes. Default and maximum: the number of processors."
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        Option(
-            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file."
-        ),
-    ] = None,
-    retry: Annotated[bool, Option("--retry", help="Plan failed plans again.")] = False,
+    source: Annotated[Path, Argument(metavar="SWEEP")],
+    out: Path | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    retry: Annotated[bool, Option("--retry")] = False,
     json: Json = False,
 ) -> None:
-    """Plan a task many times with different values of its keys."""
+    """Plan a task many times with different values of its keys.
+
+    Parameters
+    ----------
+    source : path
+        Sweep file (YAML).
+    out : path, optional
+        Folder for plans, table.parquet, table.csv and sweep.png. Default: a folder in the current one with the name of
+        the file. An interrupted sweep continues there with the missing plans.
+    jobs : int, optional
+        Number of processes. Default and maximum: the number of processors.
+    scheduler : str, optional
+        Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file.
+    retry : bool, optional
+        Plan failed plans again.
+
+    Examples
+    --------
+    brachis sweep lines.yaml --jobs 2
+    brachis sweep lines.yaml --retry  # continues a sweep, plans failures again
+    """
     from brachis.apps.sweeps.plans import VERIFIED
 
     with end_cleanly(), show_progress(in_logs=True) as listener:

@@ -9,7 +9,7 @@ import typer
 from typer import Argument, Option
 
 import brachis
-from brachis.apps.cli.app import Degrees, Figures, Json, task_space_of
+from brachis.apps.cli.app import Degrees, Json, task_space_of
 from brachis.apps.cli.folder import Drawing, finish, output_folder, write_one
 from brachis.apps.cli.output import (
     print_json,
@@ -22,80 +22,42 @@ from brachis.apps.cli.output import (
 _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")
 """The recorded motion, the plan, the figures and the drawing."""
 
-RecordedFile = Annotated[
-    Path,
-    Argument(
-        help="CSV file: time (t, time_ms, ...), joint positions (j1, q_j1, j1_pos [deg], ...), and velocities (qd_j1, "
-        "...) and accelerations (qdd_j1, ...) if known.",
-        metavar="CSV",
-    ),
-]
+RecordedFile = Annotated[Path, Argument(metavar="CSV")]
 
-RobotFile = Annotated[
-    Path,
-    Option(
-        help="URDF file; or a task file (.yaml), whose robot, limits and settings are used."
-    ),
-]
-
-RecordedSpace = Annotated[
-    str | None,
-    Option(
-        help="Task space of the path: rows such as x,y, or position, pose, pose_free_roll, joints. Default: that of "
-        "the task, or the most that the robot can prescribe."
-    ),
-]
-
-AngleUnit = Annotated[
-    str | None, Option(help="Unit of angles in columns without a unit: rad, deg.")
-]
-
-LengthUnit = Annotated[
-    str | None, Option(help="Unit of lengths in columns without a unit: m, mm.")
-]
-
-TimeUnit = Annotated[
-    str | None, Option(help="Unit of times in a column without a unit: s, ms.")
-]
-
-PathTolerance = Annotated[
-    float | None,
-    Option(
-        help="Largest deviation of the recovered path, m and rad. Default: 1e-6, or more if the file's last digits or "
-        "the noise are coarser."
-    ),
-]
-
-Noise = Annotated[
-    float | None,
-    Option(
-        help="Standard deviation of measured positions, rad or m, which are then smoothed. Default: that of rounding "
-        "to the file's digits."
-    ),
-]
+RobotFile = Annotated[Path, Option()]
 
 
 def import_(
     csv: RecordedFile,
     robot: RobotFile,
-    out: Annotated[Path, Option(help="Result file (npz) to write.")],
-    task_space: RecordedSpace = None,
-    angle: AngleUnit = None,
-    length: LengthUnit = None,
-    time: TimeUnit = None,
-    tolerance: PathTolerance = None,
-    noise: Noise = None,
+    out: Annotated[Path, Option()],
+    task_space: str | None = None,
+    angle: str | None = None,
+    length: str | None = None,
+    time: str | None = None,
+    tolerance: float | None = None,
+    noise: float | None = None,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
-    """Turn a recorded motion into a result file."""
+    """Turn a recorded motion into a result file.
+
+    Parameters
+    ----------
+    out : path
+        Result file (npz) to write.
+
+    Examples
+    --------
+    brachis import out/motion.csv --robot task.yaml --out out/today.npz
+    """
     from brachis.apps.comparison import bound_ratios
 
     trajectory = brachis.import_motion(
         csv,
         str(robot),
         task_space=task_space_of(task_space),
-        units=_units(angle=angle, length=length, time=time),
+        units={"angle": angle, "length": length, "time": time},
         tolerance=tolerance,
         noise=noise,
     )
@@ -128,29 +90,30 @@ def import_(
 def compare(
     csv: RecordedFile,
     robot: RobotFile,
-    keep_end: Annotated[
-        bool,
-        Option(
-            "--keep-end",
-            help="End in the recorded end posture, not in any posture with the tool there.",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None,
-        Option(
-            help="Folder for today.npz, result.npz, comparison.json and comparison.png."
-        ),
-    ] = None,
-    task_space: RecordedSpace = None,
-    angle: AngleUnit = None,
-    length: LengthUnit = None,
-    time: TimeUnit = None,
-    tolerance: PathTolerance = None,
-    noise: Noise = None,
-    figures: Figures = True,
+    keep_end: Annotated[bool, Option("--keep-end")] = False,
+    out: Path | None = None,
+    task_space: str | None = None,
+    angle: str | None = None,
+    length: str | None = None,
+    time: str | None = None,
+    tolerance: float | None = None,
+    noise: float | None = None,
+    figures: bool = True,
     json: Json = False,
 ) -> None:
-    """Compare a recorded motion with a plan along its path."""
+    """Compare a recorded motion with a plan along its path.
+
+    Parameters
+    ----------
+    keep_end : bool, optional
+        End in the recorded end posture, not in any posture with the tool there.
+    out : path, optional
+        Folder for today.npz, result.npz, comparison.json and comparison.png.
+
+    Examples
+    --------
+    brachis compare out/motion.csv --robot task.yaml
+    """
     from brachis.apps.comparison import plot_both_motions
 
     with output_folder(out, _FILES, (csv, robot)), show_progress() as listener:
@@ -158,7 +121,7 @@ def compare(
             csv,
             str(robot),
             task_space=task_space_of(task_space),
-            units=_units(angle=angle, length=length, time=time),
+            units={"angle": angle, "length": length, "time": time},
             tolerance=tolerance,
             noise=noise,
             keep_end=keep_end,
@@ -177,11 +140,6 @@ def compare(
         result=found.result,
     )
     raise typer.Exit(code)
-
-
-def _units(**units: str | None) -> dict[str, str]:
-    """Return the units that the user states."""
-    return {name: unit for name, unit in units.items() if unit is not None}
 
 
 def _print_comparison(found: brachis.Comparison) -> None:

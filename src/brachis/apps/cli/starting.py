@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from typer import Argument, Option
-from typer.core import TyperCommand
 
 import brachis
-from brachis.apps.cli.app import BaseFrame, Json, ToolFrame, urdf_of
+from brachis.apps.cli.app import Json, urdf_of
 from brachis.apps.cli.folder import write_one, write_text
 from brachis.apps.cli.output import (
     print_answer,
@@ -22,12 +18,18 @@ from brachis.apps.cli.output import (
     print_table,
     show_progress,
 )
-from brachis.common.files import status_of, writing_errors
+from brachis.common.files import is_file, is_folder
 from brachis.errors import InputError
 
 
 def list_robots(json: Json = False) -> None:
-    """List the included robots."""
+    """List the included robots.
+
+    Examples
+    --------
+    brachis robots
+    brachis robots --json
+    """
     robots = brachis.robots
     listed = []
     rows = []
@@ -52,32 +54,38 @@ def list_robots(json: Json = False) -> None:
 
 
 def new(
-    urdf: Annotated[
-        Path,
-        Argument(help="URDF file, or the name of an included robot.", metavar="URDF"),
-    ],
-    out: Annotated[
-        Path, Option(help="Task file to write; it must not exist yet.")
-    ] = Path("task.yaml"),
-    tool_frame: ToolFrame = None,
-    base_frame: BaseFrame = None,
+    urdf: Annotated[Path, Argument(metavar="URDF")],
+    out: Path = Path("task.yaml"),
+    tool_frame: str | None = None,
+    base_frame: str | None = None,
     json: Json = False,
 ) -> None:
     """Write a first task for a robot, with comments.
 
     The task starts in a posture away from limits and singularities and follows a short line. It has been planned and
     verified.
+
+    Parameters
+    ----------
+    urdf : path
+        URDF file, or the name of an included robot.
+    out : path, optional
+        Task file to write; it must not exist yet.
+
+    Examples
+    --------
+    brachis new scara3
+    brachis new gantry2 --out gantry.yaml
     """
     from brachis.apps.starter import starter_task
 
-    with writing_errors(out):
-        if status_of(out) is not None:
-            raise InputError(
-                "the file exists",
-                where=str(out),
-                allowed="a new file",
-                hint="Choose another name with --out",
-            )
+    if is_file(out) or is_folder(out):
+        raise InputError(
+            "the file exists",
+            where=str(out),
+            allowed="a new file",
+            hint="Choose another name with --out",
+        )
     with show_progress() as listener:
         starter = starter_task(
             urdf_of(urdf),
@@ -108,74 +116,55 @@ Triple = tuple[float, float, float]
 _ZERO = (0.0, 0.0, 0.0)
 
 
-class VectorCommand(TyperCommand):
-    """A command whose options of several numbers also take one word: ``0 1 0``, ``0,1,0`` or ``"0 1 0"``."""
-
-    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
-        """Split such words before the options are read."""
-        options = {
-            name
-            for parameter in self.params
-            if parameter.nargs > 1
-            for name in parameter.opts
-        }
-        return super().parse_args(ctx, split_vectors(args, options))
-
-
-def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
-    """Split the word after one of `options`, or joined to it by ``=``, at commas and spaces."""
-    words: list[str] = []
-    for argument in args:
-        option, equals, value = argument.partition("=")
-        if equals and option in options:
-            words.append(option)
-        elif words and words[-1] in options:
-            value = argument
-        else:
-            words.append(argument)
-            continue
-        words += [part for part in re.split(r"[,\s]+", value) if part] or [value]
-    return words
-
-
 def compose(
-    arm: Annotated[
-        Path,
-        Argument(
-            help="URDF file of the arm, or the name of an included robot.",
-            metavar="ARM",
-        ),
-    ],
-    travel: Annotated[
-        tuple[float, float],
-        Option("--range", help="Lowest and highest position on the rail, m."),
-    ],
-    velocity: Annotated[float, Option(help="Velocity limit of the rail, m/s.")],
-    force: Annotated[float, Option(help="Force limit of the rail's drive, N.")],
-    mass: Annotated[float, Option(help="Mass of the carriage, kg.")],
-    out: Annotated[Path, Option(help="URDF file to write.")],
-    axis: Annotated[
-        Triple, Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0.")
-    ] = (0.0, 1.0, 0.0),
-    mount_xyz: Annotated[
-        Triple, Option(help="Position of the arm's root link on the carriage, m.")
-    ] = _ZERO,
-    mount_rpy_deg: Annotated[
-        Triple,
-        Option(
-            help="Roll, pitch and yaw of this link, degrees; 180 0 0 hangs the arm upside down."
-        ),
-    ] = _ZERO,
-    name: Annotated[str, Option(help="Name of the rail's joint.")] = "rail",
-    root: Annotated[
-        str, Option(help="Name of the root link, which is the world frame.")
-    ] = "world",
-    meshes: Annotated[bool, Option(help="Keep or remove the arm's meshes.")] = True,
+    arm: Annotated[Path, Argument(metavar="ARM")],
+    travel: Annotated[tuple[float, float], Option("--range")],
+    velocity: Annotated[float, Option()],
+    force: Annotated[float, Option()],
+    mass: Annotated[float, Option()],
+    out: Annotated[Path, Option()],
+    axis: Triple = (0.0, 1.0, 0.0),
+    mount_xyz: Triple = _ZERO,
+    mount_rpy_deg: Triple = _ZERO,
+    name: str = "rail",
+    root: str = "world",
+    meshes: bool = True,
     json: Json = False,
 ) -> None:
     """Mount an arm on a linear axis, as a new URDF.
 
     You state all figures of the axis; none is guessed.
+
+    Parameters
+    ----------
+    arm : path
+        URDF file of the arm, or the name of an included robot.
+    travel : (2,) tuple of float
+        Lowest and highest position on the rail, m.
+    velocity : float
+        Velocity limit of the rail, m/s.
+    force : float
+        Force limit of the rail's drive, N.
+    mass : float
+        Mass of the carriage, kg.
+    out : path
+        URDF file to write.
+    axis : (3,) tuple of float, optional
+        Direction of the rail in the world frame: 0 1 0 or 0,1,0.
+    mount_xyz : (3,) tuple of float, optional
+        Position of the arm's root link on the carriage, m.
+    mount_rpy_deg : (3,) tuple of float, optional
+        Roll, pitch and yaw of this link, degrees; 180 0 0 hangs the arm upside down.
+    name : str, optional
+        Name of the rail's joint.
+    root : str, optional
+        Name of the root link, which is the world frame.
+    meshes : bool, optional
+        Keep or remove the arm's meshes.
+
+    Examples
+    --------
+    brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf
     """
     rail = brachis.compose.Rail(
         axis=axis,

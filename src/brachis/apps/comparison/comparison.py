@@ -217,7 +217,7 @@ def compare(
     *,
     task: Source | None = None,
     task_space: str | Sequence[str] | None = None,
-    units: Mapping[str, str] | None = None,
+    units: Mapping[str, str | None] | None = None,
     tolerance: float | None = None,
     noise: float | Sequence[float] | None = None,
     keep_end: bool = False,

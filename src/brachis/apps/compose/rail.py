@@ -7,26 +7,26 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from lxml import etree
 
-from brachis.apps.compose import elements
-from brachis.apps.compose.elements import Element
-from brachis.common import files
 from brachis.common.files import (
     BEGINNINGS,
     COMPOSED,
     atomic_write,
-    status_of,
-    writing_errors,
+    is_file,
+    mesh_file,
+    ros_files,
 )
 from brachis.errors import InputError
 from brachis.robot.urdf import check_inertias, read_file
 from brachis.robot.urdf_bodies import read_dynamics
-from brachis.robot.urdf_elements import UrdfTree, read_tree
+from brachis.robot.urdf_elements import Element, UrdfTree, read_tree
 
 _NAME = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
 
@@ -63,8 +63,8 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
         scheme, _, within = name.partition("://")
         path: Path | None = old / name
         if within:
-            by_ros = any(files.is_file(place) for place in files.ros_files(within))
-            path = None if by_ros or scheme != "package" else files.mesh_file(name, old)
+            by_ros = any(map(is_file, ros_files(within)))
+            path = None if by_ros or scheme != "package" else mesh_file(name, old)
         if path is None:
             continue
         placed = os.path.normpath(path)
@@ -112,8 +112,8 @@ class Rail:
     force: float
     mass: float
     axis: Sequence[float] = (0.0, 1.0, 0.0)
-    mount_xyz: Sequence[float] = elements.ZERO
-    mount_rpy: Sequence[float] = elements.ZERO
+    mount_xyz: Sequence[float] = (0.0, 0.0, 0.0)
+    mount_rpy: Sequence[float] = (0.0, 0.0, 0.0)
     carriage_size: Sequence[float] = (0.4, 0.4, 0.1)
     name: str = "rail"
     root: str = "world"
@@ -165,7 +165,7 @@ class Rail:
         relocate_meshes(arm.robot, source, target)
         arm.robot.set("name", f"{arm.robot.get('name') or source.stem}_{self.name}")
         arm.robot[:0] = self._elements(root)
-        declaration, _, rest = elements.robot_text(arm.robot).partition("\n")
+        declaration, _, rest = robot_text(arm.robot).partition("\n")
         return "\n".join((declaration, COMPOSED, rest.removeprefix(f"{COMPOSED}\n")))
 
     def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:
@@ -199,51 +199,77 @@ class Rail:
         """World, rail, carriage and mount."""
         carriage = f"{self.name}_carriage"
         low, high = self.range
+        speed = self.velocity
+        speed = self.velocity
         x, y, z = self.axis
-        height = self.carriage_size[2]
+        width, depth, height = self.carriage_size
         turn = pin.rpy.rpyToMatrix(*self.mount_rpy)
         down = (turn @ np.array([0.0, 0.0, -1.0])).round(15)  # cos(pi / 2) is not 0
-        centre = np.array(self.mount_xyz) + 0.5 * height * down
-        beam = centre + height * down + 0.5 * (low + high) * np.array(self.axis)
-        length = high - low + max(self.carriage_size[:2])
-        limit = {
-            "lower": low,
-            "upper": high,
-            "velocity": self.velocity,
-            "effort": self.force,
-        }
+        middle = np.array(self.mount_xyz) + 0.5 * height * down
+        beam = middle + height * down + 0.5 * (low + high) * np.array(self.axis)
+        beam_rpy = (0.0, -math.atan2(z, math.hypot(x, y)), math.atan2(y, x))
+        beam_size = (high - low + max(width, depth), height, height)
+        centre = _origin(middle, self.mount_rpy)
+        xx, yy, zz = (side**2 for side in self.carriage_size)
+        ixx = self.mass * (yy + zz) / 12  # of a solid box
+        iyy = self.mass * (xx + zz) / 12
+        izz = self.mass * (xx + yy) / 12
         # A name of its own: the arm may have another grey.
-        colour = (f"{self.name}_grey", elements.GREY)
-        inertia = elements.box_inertia(self.mass, self.carriage_size)
-        rail_box = elements.visual(
-            "box",
-            {"size": (length, height, height)},
-            colour,
-            xyz=beam.round(12),
-            rpy=(0.0, -math.atan2(z, math.hypot(x, y)), math.atan2(y, x)),
-        )
-        carriage_box = elements.visual(
-            "box", {"size": self.carriage_size}, colour, xyz=centre, rpy=self.mount_rpy
-        )
-        return [
-            elements.link(self.root, rail_box),
-            elements.joint(
-                self.name, "prismatic", self.root, carriage, axis=self.axis, limit=limit
-            ),
-            elements.link(
-                carriage,
-                elements.inertial(self.mass, centre, inertia, self.mount_rpy),
-                carriage_box,
-            ),
-            elements.joint(
-                f"{self.name}_mount",
-                "fixed",
-                carriage,
-                arm_root,
-                xyz=self.mount_xyz,
-                rpy=self.mount_rpy,
-            ),
-        ]
+        grey = f'<material name="{self.name}_grey"><color rgba="0.35 0.38 0.42 1"/></material>'
+        new = etree.fromstring(f"""
+<robot>
+  <link name="{self.root}">
+    <visual>
+      {_origin(beam.round(12), beam_rpy)}
+      <geometry><box size="{_write(*beam_size)}"/></geometry>
+      {grey}
+    </visual>
+  </link>
+  <joint name="{self.name}" type="prismatic">
+    <parent link="{self.root}"/>
+    <child link="{carriage}"/>
+    <axis xyz="{_write(*self.axis)}"/>
+    <limit lower="{_write(low)}" upper="{_write(high)}" velocity="{_write(speed)}" effort="{_write(self.force)}"/>
+  </joint>
+  <link name="{carriage}">
+    <inertial>
+      {centre}
+      <mass value="{_write(self.mass)}"/>
+      <inertia ixx="{_write(ixx)}" ixy="0" ixz="0" iyy="{_write(iyy)}" iyz="0" izz="{_write(izz)}"/>
+    </inertial>
+    <visual>
+      {centre}
+      <geometry><box size="{_write(*self.carriage_size)}"/></geometry>
+      {grey}
+    </visual>
+  </link>
+  <joint name="{self.name}_mount" type="fixed">
+    <parent link="{carriage}"/>
+    <child link="{escape(arm_root)}"/>
+    {_origin(self.mount_xyz, self.mount_rpy)}
+  </joint>
+</robot>""")
+        return list(new)
+
+
+def _write(*numbers: float) -> str:
+    """Write numbers as the shortest text from which the same numbers are read again."""
+    return " ".join(repr(float(each) + 0.0).removesuffix(".0") for each in numbers)
+
+
+def _origin(xyz: Sequence[float] | np.ndarray, rpy: Sequence[float]) -> str:
+    """Write an ``<origin>``, or nothing for the identity."""
+    turn = f' rpy="{_write(*rpy)}"' if any(rpy) else ""
+    return f'<origin xyz="{_write(*xyz)}"{turn}/>' if turn or any(xyz) else ""
+
+
+def robot_text(robot: Element) -> str:
+    """Text of a ``<robot>`` element and of the comments around it, indented."""
+    etree.cleanup_namespaces(robot)
+    etree.indent(robot, "  ")
+    tree = robot.getroottree()
+    text = etree.tostring(tree, encoding="unicode", pretty_print=True)
+    return f'<?xml version="1.0"?>\n{text}'
 
 
 def on_rail(
@@ -295,15 +321,12 @@ def on_rail(
     source = Path(arm_urdf)
     target = None if output is None else Path(output)
     arm = read_tree(read_file(source), str(source))
-    if target is not None:
-        with writing_errors(target):
-            known = status_of(target)
-        if known is not None and os.path.samestat(known, source.stat()):
-            raise InputError(
-                "the output would overwrite the arm's URDF",
-                where=f"output {target}",
-                allowed="another file",
-            )
+    if target is not None and is_file(target) and target.samefile(source):
+        raise InputError(
+            "the output would overwrite the arm's URDF",
+            where=f"output {target}",
+            allowed="another file",
+        )
     text = rail.mount(arm, source, target, meshes=meshes)
     # On a moving axis even the inertia of the arm's root link counts, which no joint moved before.
     composed = read_tree(text, str(source))

@@ -11,7 +11,6 @@ import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -97,19 +96,8 @@ def frames(
         yield figure, np.asarray(canvas.buffer_rgba())
 
 
-@dataclass(frozen=True, eq=False)
-class Film:
-    """Pictures of a motion.
-
-    Attributes
-    ----------
-    pictures : iterator of (height, width, 3) uint8 ndarray
-    period : float
-        For which each is shown, s.
-    """
-
-    pictures: Iterator[np.ndarray]
-    period: float
+Film = tuple[Iterator[np.ndarray], float]
+"""Pictures of a motion, (height, width, 3) uint8, and for how long each is shown, s."""
 
 
 def film_of(
@@ -171,13 +159,14 @@ def film_of(
             hint="Lower slower, or raise dt",
         )
     found = frames(trajectory, trajectory.sample(dt / slower).t, slower)
-    return Film((pixels[:, :, :3].copy() for _, pixels in found), dt)
+    return (pixels[:, :, :3].copy() for _, pixels in found), dt
 
 
 def write_gif(film: Film, stream: BinaryIO) -> None:
     """Write a film that is shown again and again; the last picture stands for 1 s."""
     pillow = require_library("PIL.Image", "a GIF", library="Pillow", extra="plots")
-    images = [pillow.fromarray(picture) for picture in film.pictures]
+    pictures, period = film
+    images = [pillow.fromarray(picture) for picture in pictures]
     palette = images[len(images) // 2].quantize(128)
     first, *others = (
         image.quantize(palette=palette, dither=pillow.Dither.NONE) for image in images
@@ -187,7 +176,7 @@ def write_gif(film: Film, stream: BinaryIO) -> None:
         format="GIF",
         save_all=True,
         append_images=others,
-        duration=[*[round(1e3 * film.period)] * len(others), 1000],
+        duration=[*[round(1e3 * period)] * len(others), 1000],
         loop=0,
         optimize=True,
     )
@@ -207,10 +196,11 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
             "an MP4 file needs ffmpeg, which is not installed",
             hint="Install ffmpeg, or write a GIF",
         )
-    first = next(film.pictures)
+    pictures, period = film
+    first = next(pictures)
     # H.264 halves the colours' resolution, so that width and height are even.
     height, width = (2 * (size // 2) for size in first.shape[:2])
-    source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * film.period)} -i -"
+    source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * period)} -i -"
     target = "-an -pix_fmt yuv420p -movflags +faststart"
     with (
         tempfile.TemporaryDirectory(prefix="brachis-") as folder,
@@ -227,7 +217,7 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
         ) as process:
             assert process.stdin is not None
             with suppress(BrokenPipeError):  # the messages say more
-                for picture in chain([first], film.pictures):
+                for picture in chain([first], pictures):
                     process.stdin.write(picture[:height, :width].tobytes())
                 process.stdin.close()
         if process.returncode:

@@ -50,20 +50,30 @@ def write_ros2_yaml(rows: JointRows, stream: BinaryIO) -> None:
 TOPIC: Final = "/joint_trajectory_controller/joint_trajectory"
 """Topic on which ros2_control's controller listens."""
 
-_DEFINITION = f"\n{'=' * 80}\n".join(
-    (
-        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points",
-        "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id",
-        """MSG: trajectory_msgs/JointTrajectoryPoint
+_DEFINITION = """\
+std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint[] points
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: trajectory_msgs/JointTrajectoryPoint
 float64[] positions
 float64[] velocities
 float64[] accelerations
 float64[] effort
-builtin_interfaces/Duration time_from_start""",
-        "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec",
-        "MSG: builtin_interfaces/Duration\nint32 sec\nuint32 nanosec",
-    )
-)
+builtin_interfaces/Duration time_from_start
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: builtin_interfaces/Duration
+int32 sec
+uint32 nanosec"""
+"""The message and its parts, as bags describe them."""
 
 
 def write_mcap(rows: JointRows, stream: BinaryIO) -> None:
@@ -105,27 +115,26 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
         )
     first, *postures = (f"[{', '.join(map(repr, row))}]" for row in rows.q.tolist())
     periods = np.diff(rows.t).round(12).tolist()
-    moves = [
-        f"  servoj({posture}, 0, 0, {period!r}, {_SERVOJ})"
+    moves = "".join(
+        f"  servoj({posture}, 0, 0, {period!r}, {_SERVOJ})\n"
         for posture, period in zip(postures, periods, strict=True)
-    ]
-    lines = [
-        "def brachis_motion():",
-        f"  # {len(postures)} periods, {rows.t_end:.6g} s; joints {', '.join(rows.joints)}, rad",
-        *(f"  # {sentence}" for sentence in rows.left_out),
-        f"  start = {first}",
-        "  now = get_actual_joint_positions()",
-        "  i = 0",
-        "  while i < 6:",
-        "    if norm(now[i] - start[i]) > 0.005:",
-        '      popup("The arm is not at the start posture of the motion", error=True, blocking=True)',
-        "      halt",
-        "    end",
-        "    i = i + 1",
-        "  end",
-        *moves,
-        "  stopj(10)",
-        "end",
-        "brachis_motion()\n",
-    ]
-    stream.write("\n".join(lines).encode())
+    )
+    comments = "".join(f"  # {sentence}\n" for sentence in rows.left_out)
+    program = f"""\
+def brachis_motion():
+  # {len(postures)} periods, {rows.t_end:.6g} s; joints {", ".join(rows.joints)}, rad
+{comments}  start = {first}
+  now = get_actual_joint_positions()
+  i = 0
+  while i < 6:
+    if norm(now[i] - start[i]) > 0.005:
+      popup("The arm is not at the start posture of the motion", error=True, blocking=True)
+      halt
+    end
+    i = i + 1
+  end
+{moves}  stopj(10)
+end
+brachis_motion()
+"""
+    stream.write(program.encode())

@@ -13,7 +13,7 @@ from brachis.apps.export.controllers import write_mcap, write_ros2_yaml, write_u
 from brachis.apps.export.rows import rows_of
 from brachis.apps.export.tables import write_csv, write_json, write_parquet
 from brachis.common.files import atomic_write
-from brachis.errors import InputError, UnknownNameError
+from brachis.errors import InputError, check_names
 from brachis.trajectory import Motion, motion_of
 
 
@@ -111,8 +111,7 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
         The suffix does not belong to a format.
     """
     if name is not None:
-        if name not in FORMATS:
-            raise UnknownNameError("format", name, FORMATS, where="format")
+        check_names("format", [name], FORMATS, "format")
         return FORMATS[name]
     suffix = Path(path).suffix.lower()
     found = [form for form in FORMATS.values() if form.suffix == suffix]

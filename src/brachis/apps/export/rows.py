@@ -14,7 +14,7 @@ from brachis.errors import (
     BrachisWarning,
     InputError,
     NotInstalledError,
-    UnknownNameError,
+    check_names,
 )
 from brachis.trajectory import Trajectory
 from brachis.trajectory.samples import COLUMNS
@@ -97,9 +97,8 @@ def rows_of(
     names = trajectory.joint_names
     real = names[: len(trajectory.robot.urdf_joints)]
     chosen = list(real if joints is None else joints)
+    check_names("joint", chosen, names, "joints")
     for name in chosen:
-        if name not in names:
-            raise UnknownNameError("joint", name, names, where="joints")
         if chosen.count(name) > 1:
             raise InputError(
                 f"joint {name!r} is given twice",

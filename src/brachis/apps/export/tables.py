@@ -27,14 +27,13 @@ def write_csv(rows: JointRows, stream: BinaryIO) -> None:
     ``#`` stands before the header.
     """
     names, values = zip(*rows.columns(), strict=True)
-    text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
+    text = io.StringIO()
     text.writelines(f"# brachis: {sentence}\n" for sentence in rows.left_out)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
     # Floats are written as repr: the shortest text that reads back the same.
     writer.writerows(np.column_stack(values).tolist())
-    text.flush()
-    text.detach()  # the caller closes the stream
+    stream.write(text.getvalue().encode())
 
 
 def write_parquet(rows: JointRows, stream: BinaryIO) -> None:

@@ -60,7 +60,7 @@ def import_motion(
     *,
     task: Source | None = None,
     task_space: str | Sequence[str] | None = None,
-    units: Mapping[str, str] | None = None,
+    units: Mapping[str, str | None] | None = None,
     tolerance: float | None = None,
     noise: float | Sequence[float] | None = None,
 ) -> Trajectory:

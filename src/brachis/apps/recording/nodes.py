@@ -20,7 +20,7 @@ A recorded motion waits where several rows have the same posture; between the wa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -71,11 +71,6 @@ class Nodes:
     def qddot(self) -> np.ndarray:
         """Accelerations, (L, n)."""
         return self.states[2]
-
-    def part(self, first: int, last: int) -> Nodes:
-        """Return the motion from one node to another."""
-        kept = slice(first, last + 1)
-        return Nodes(self.t[kept], self.states[:, kept])
 
     @property
     def at_rest(self) -> tuple[bool, bool]:
@@ -409,4 +404,5 @@ def with_rests(nodes: Nodes) -> Nodes:
 def split_at_rests(nodes: Nodes, rests: list[tuple[int, int]]) -> list[Nodes]:
     """Return the parts between waits in which the motion moves."""
     edges = [0, *chain(*rests), len(nodes.t) - 1]
-    return [nodes.part(*ends) for ends in list(pairwise(edges))[::2]]
+    moves = [slice(a, b + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [Nodes(nodes.t[move], nodes.states[:, move]) for move in moves]

@@ -13,7 +13,7 @@ import numpy as np
 
 from brachis.common.files import check_kind, read_text
 from brachis.common.words import write_count
-from brachis.errors import InputError, TaskError, UnknownNameError
+from brachis.errors import InputError, TaskError, check_names
 from brachis.robot import Robot
 from brachis.task.points.tables import Table, read_table
 from brachis.task.points.units import ANGLES, LENGTHS
@@ -50,7 +50,7 @@ _STILL = 1e-12
 
 
 def check_units(units: object) -> dict[str, str]:
-    """Return units of the quantities ``angle``, ``length`` and ``time`` that the user states.
+    """Return units of the quantities ``angle``, ``length`` and ``time`` that the user states; None: not stated.
 
     Raises
     ------
@@ -65,17 +65,11 @@ def check_units(units: object) -> dict[str, str]:
             allowed='{"angle": "deg", "length": "mm", "time": "ms"}, or some of them',
         )
     known = dict(_UNITS.values())
-    for name, unit in units.items():
-        if name not in known:
-            raise UnknownNameError("quantity", name, known, where="units")
-        if unit not in known[name]:
-            raise TaskError(
-                f"unknown unit of {name}",
-                found=unit,
-                allowed=", ".join(known[name]),
-                where=f"units.{name}",
-            )
-    return dict(units)
+    check_names("quantity", units, known, "units")
+    stated = {name: unit for name, unit in units.items() if unit is not None}
+    for name, unit in stated.items():
+        check_names(f"unit of {name}", [unit], known[name], f"units.{name}")
+    return stated
 
 
 Columns = dict[tuple[str, str], tuple[int, str | None]]
@@ -103,7 +97,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
             names = [form.format(joint.lower()) for form in forms.split()]
             meanings |= dict.fromkeys(names, (kind, joint))
     columns: Columns = {}
-    problem = None
+    problems = []
     for i, text in enumerate(header):
         name = text.lower()
         unit = None
@@ -111,21 +105,19 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
             name = match[1]
             unit = (match[2] or match[3]).replace("_per_", "/").replace("_", "/")
             unit = unit.replace("s2", "s^2")
-        if name not in meanings:
-            continue
-        if meanings[name] in columns:
-            problem = f"{_describe(*meanings[name])} is given twice"
-        columns[meanings[name]] = (i, unit)
+        key = meanings.get(name)
+        if key in columns:
+            problems.append(f"{_describe(*key)} is given twice")
+        if key is not None:
+            columns[key] = (i, unit)
     kinds = dict.fromkeys(["q", *(kind for kind, joint in columns if joint)])
     wanted = [("t", ""), *((kind, joint) for kind in kinds for joint in joints)]
-    for key in wanted:
-        if key not in columns and problem is None:
-            problem = f"{_describe(*key)} is missing"
-    if problem is not None:
-        names = [*header[:8], "..."] if len(header) > 8 else [*header]
+    missing = [key for key in wanted if key not in columns]
+    problems += [f"{_describe(*key)} is missing" for key in missing]
+    if problems:
         raise TaskError(
-            problem,
-            found=", ".join(names),
+            problems[0],
+            found=", ".join(header[:8]) + ", ..." * (len(header) > 8),
             allowed=_allowed_columns(joints),
             where=where,
         )
@@ -259,18 +251,17 @@ def read_recording(
     )
     where = f"{source}: line {table.header_line}"
     t, time_unit, _ = _read_column(table, columns, ("t", ""), "s", units, where)
-    parts = {}
-    for kind in ("q", "qdot", "qddot"):
-        if (kind, joints[0]) in columns:
-            read = [
-                _read_column(table, columns, (kind, joint), base, units, where)
-                for joint, base in zip(joints, robot.position_units, strict=True)
-            ]
-            values, found, digits = zip(*read, strict=True)
-            parts[kind] = np.column_stack(values)
-            if kind == "q":
-                position_units = found
-                rounding = np.array(digits)
+    read = {
+        kind: [
+            _read_column(table, columns, (kind, joint), base, units, where)
+            for joint, base in zip(joints, robot.position_units, strict=True)
+        ]
+        for kind in ("q", "qdot", "qddot")
+        if (kind, joints[0]) in columns
+    }
+    parts = {kind: np.column_stack([each[0] for each in read[kind]]) for kind in read}
+    _, position_units, digits = zip(*read["q"], strict=True)
+    rounding = np.array(digits)
     q = parts["q"]
     _check_times(t, table, source)
     if "angle" not in units:
