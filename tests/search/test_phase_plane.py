@@ -32,8 +32,8 @@ def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
         for build in (TorqueLimit.build, VelocityLimit.build, AccelerationLimit.build)
     )
     limits = [limit for limit in built if limit is not None]
-    times = PhasePlane(limits, JointPath.through(s, q)).times()
-    return np.inf if times is None else float(times[-1])
+    timing = PhasePlane(limits, JointPath.through(s, q)).solve()
+    return np.inf if timing is None else timing.t_end
 
 
 def joint_path(distance: float) -> np.ndarray:

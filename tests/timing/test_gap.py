@@ -82,5 +82,5 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
 )
 def test_the_warning_says_where_time_is_lost(part, where):
     gap = TimingGap(2.0, 1.8, 100, (), part)
-    (issue,) = gap.issues(intervals_are_given=True)
+    (issue,) = gap.issues()
     assert where in issue.message

@@ -83,8 +83,8 @@ def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
     """Let a limit hold at rest in postures, (K, n), that exceed it within the tolerance."""
     if limit.at_rest == "nothing":
         return limit
-    values = limit.values(Moments.at_rest(postures))
-    excess = limit.violation(values).max(axis=0)
+    values, beyond = beyond_at_rest(limit, postures, 0.0)
+    excess = beyond.max(axis=0)
     is_near = (excess > 0.0) & (excess <= tolerance)
     if not is_near.any():
         return limit
@@ -158,7 +158,7 @@ def _check_at_rest(
         label = limit.labels[worst]
         found, allowed = in_figures(limit, worst, float(values[worst]))
         remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
-        subjects = [str(one.subject) for one in weak if one is not label]
+        subjects = [one.subject for one in weak if one is not label]
         others = name_first(subjects, ", ")
         more = ""
         if others:
@@ -281,14 +281,15 @@ def check_movable(task_map: TaskMap) -> None:
     moves = np.abs(jacobian).max(axis=(0, 2)) > _REGULAR
     if moves.all():
         return
-    fixed = [row for row, own in zip(task_map.rows, moves, strict=True) if not own]
-    others = [row for row, own in zip(task_map.rows, moves, strict=True) if own]
-    is_usual = set(others) <= {"x", "y", "z"}
+    rows = np.array(task_map.rows)
+    fixed = rows[~moves]
+    others = rows[moves]
+    is_usual = len(others) > 0 and set(others) <= {"x", "y", "z"}
     raise InputError(
         f"no joint changes {', '.join(fixed)} of the tool",
         where="task_space",
         found=f"[{', '.join(task_map.rows)}]",
-        allowed=f"[{', '.join(others)}]" if others and is_usual else None,
+        allowed=f"[{', '.join(others)}]" if is_usual else None,
     )
 
 
@@ -331,24 +332,3 @@ def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -
             hint="Bend the arm a little, or choose other redundant joints",
         )
     return branch
-
-
-def other_branch(
-    name: str, found: str, allowed: str, *, is_start_given: bool
-) -> StartError:
-    """Return the error that a posture is on another branch than the start posture, or than the task asks for."""
-    if name == "end" and is_start_given:
-        return StartError(
-            "the end posture is on another branch than the start posture",
-            where="end.joints",
-            found=found,
-            allowed=allowed,
-            hint="Choose an end posture of the same branch, or leave end: free",
-        )
-    return StartError(
-        f"the {name} posture is on another branch",
-        where="branch",
-        found=found,
-        allowed=allowed,
-        hint=f"Leave out branch, or set {name}.joints to a posture of that branch",
-    )

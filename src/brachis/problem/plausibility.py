@@ -119,12 +119,9 @@ def _bodies(task: Task) -> Iterator[Check]:
         largest = max(body.size, *map(abs, body.position))
         yield _figure("scene", largest, where=f"scene: {body.name}")
     settings = task.collisions
-    lengths = {"collisions.clearance": settings.clearance}
-    lengths |= {
-        f"collisions.padding.{link}": more for link, more in settings.padding.items()
-    }
-    for where, length in lengths.items():
-        yield _figure("collisions", length, where=where)
+    yield _figure("collisions", settings.clearance, where="collisions.clearance")
+    for link, more in settings.padding.items():
+        yield _figure("collisions", more, where=f"collisions.padding.{link}")
 
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
@@ -132,17 +129,14 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
     task_map = problem.task_map
     along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
     of_joints = isinstance(task_map, JointSpace)
-    postures = {
-        "start.joints": problem.start,
-        "path": along if of_joints else None,
-        "end.joints": problem.end,
-    }
-    figures = [
-        figure
-        for key, given in postures.items()
-        if given is not None
-        for figure in _positions(task_map.robot, key, given, may_wind=of_joints)
-    ]
+    figures: list[Check] = []
+    for key, given in (
+        ("start.joints", problem.start),
+        ("path", along if of_joints else None),
+        ("end.joints", problem.end),
+    ):
+        if given is not None:
+            figures += _positions(task_map.robot, key, given, may_wind=of_joints)
     if YAW in task_map.rows:
         path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
@@ -382,32 +376,26 @@ def _magnitudes(robot: Robot) -> Iterator[Check]:
         values = values / getattr(robot.settings.limits.scale, kind)
         if usual.overridden:
             values = values / robot.settings.speed_override
-        for i, (name, unit, value) in enumerate(
-            zip(robot.joint_names, robot.position_units, values, strict=True)
-        ):
+        for i, value in enumerate(values.tolist()):
             has_curve = usual.by_curve and robot.limits.torque_speed[i]
+            if has_curve or not 0.0 < value < math.inf:
+                continue
             largest = _largest_usual(robot, usual, i)
-            if not has_curve and not _placeholder(
-                value, usual, largest, _stated(robot, usual, i)
-            ):
-                yield Check(
-                    f"robot.limits.{kind}.{name}",
-                    f"the {row.name.replace('_', ' ')} limit looks like {usual.mistaken_unit[unit]}",
-                    float(value),
-                    largest,
-                    row.units[unit],
-                )
-
-
-def _placeholder(
-    value: float, usual: UsualLimit, largest: float, stated: float | None
-) -> bool:
-    """Tell whether a limit is written for "no limit": a power of ten, of torques one that no figure in mNm can be."""
-    if not 0.0 < value < math.inf:
-        return True
-    if not round(math.log10(value), 9).is_integer():
-        return False
-    return not usual.compares_weight or value == stated or value > 1e3 * largest
+            # A power of ten is written for "no limit"; of torques one that no figure in mNm can be.
+            is_placeholder = round(math.log10(value), 9).is_integer()
+            if usual.compares_weight:
+                is_stated = value == _stated(robot, usual, i)
+                is_placeholder &= is_stated or value > 1e3 * largest
+            if is_placeholder:
+                continue
+            unit = robot.position_units[i]
+            yield Check(
+                f"robot.limits.{kind}.{robot.joint_names[i]}",
+                f"the {row.name.replace('_', ' ')} limit looks like {usual.mistaken_unit[unit]}",
+                value,
+                largest,
+                row.units[unit],
+            )
 
 
 def _stated(robot: Robot, usual: UsualLimit, joint: int) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -33,7 +33,6 @@ from brachis.problem.feasibility import (
     check_regular,
     check_smoothness,
     lacks_a_direction,
-    other_branch,
 )
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
@@ -150,18 +149,19 @@ class Problem(Summary):
     @cached_property
     def given_time(self) -> float:
         """Time that passes at given speeds and in dwells, s."""
-        laws = [law.duration for law in self.time_laws if law is not None]
-        return sum(laws) + sum(leg.dwell for leg in self.legs)
+        moving = sum(law.duration for law in self.time_laws if law is not None)
+        return moving + sum(leg.dwell for leg in self.legs)
+
+    def _law_rate(self, leg: int, end: int) -> float:
+        """Return ds/dt at an end (0 or -1) of a leg, 1/s; 0 where its speed is free."""
+        law = self.time_laws[leg]
+        return 0.0 if law is None else float(law.at_end(end)[1])
 
     def _rate_between(self, before: int, after: int) -> float:
         """Return ds/dt where a leg ends and another one begins, 1/s."""
         if self.legs[before].stops:
             return 0.0
-        for number, end in ((before, -1), (after, 0)):
-            law = self.time_laws[number]
-            if law is not None:
-                return float(law.at_end(end)[1])
-        return 0.0
+        return self._law_rate(before, -1) or self._law_rate(after, 0)
 
     @property
     def end_rates(self) -> tuple[float, float]:
@@ -170,16 +170,10 @@ class Problem(Summary):
         if boundary.periodic:
             rate = self._rate_between(-1, 0)
             return rate, rate
-        rates = []
-        for end, speed in ((0, boundary.start_speed), (-1, boundary.end_speed)):
-            law = self.time_laws[end]
-            if law is not None:
-                rates.append(float(law.at_end(end)[1]))
-            elif speed:
-                per_s = path_speed(self.task_map, self.path, -float(end))
-                rates.append(speed / per_s)
-            else:
-                rates.append(0.0)
+        rates = [self._law_rate(end, end) for end in (0, -1)]
+        for end, speed in enumerate((boundary.start_speed, boundary.end_speed)):
+            if speed and self.time_laws[-end] is None:
+                rates[end] = speed / path_speed(self.task_map, self.path, float(end))
         first, last = rates
         return first, last
 
@@ -231,11 +225,10 @@ class Decomposition(Summary):
 
     def joint_map(self, start: np.ndarray, branch: int) -> ClosedFormMap:
         """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
-        given = self.problem
+        task_map = self.problem.task_map
+        path = self.problem.path
         solver = self.match.solver
-        return ClosedFormMap(
-            given.task_map, given.path, solver, self.redundant, branch, start
-        )
+        return ClosedFormMap(task_map, path, solver, self.redundant, branch, start)
 
 
 class Decompositions(Sequence[Decomposition]):
@@ -250,24 +243,20 @@ class Decompositions(Sequence[Decomposition]):
     """
 
     def __init__(self, problem: Problem, families: Sequence[ik.Family] = ()) -> None:
-        self._problem = problem
-        self._families = families
+        self._find = partial(decompositions_of, problem, families)
 
     @cached_property
-    def _all(self) -> list[Decomposition]:
-        return decompositions_of(self._problem, self._families)
-
-    def find(self) -> list[Decomposition]:
-        """Return them all; raises as `decompositions_of` does."""
-        return self._all
+    def found(self) -> list[Decomposition]:
+        """All of them; raises as `decompositions_of` does."""
+        return self._find()
 
     def __len__(self) -> int:
         """How many they are."""
-        return len(self.find())
+        return len(self.found)
 
     def __getitem__(self, index: Any) -> Any:
         """Return one of them, or some."""
-        return self.find()[index]
+        return self.found[index]
 
 
 def decompositions_of(
@@ -361,8 +350,12 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
             continue
         branch = branch_of(task_map, match, posture, name)
         if branch not in branches:
-            allowed = labels[branches[0]]
-            is_given = problem.start is not None
-            raise other_branch(name, labels[branch], allowed, is_start_given=is_given)
+            raise StartError(
+                f"the {name} posture is on another branch",
+                where=f"{name}.joints",
+                found=labels[branch],
+                allowed=labels[branches[0]],
+                hint=f"Leave out branch and {name}, or set {name}.joints to a posture of that branch",
+            )
         branches = (branch,)
     return Decomposition(problem, match, redundant, branches)

@@ -86,8 +86,11 @@ def fastest_times(
     for leg, rates, law in parts:
         stations, postures = stations_on(leg, s, q)
         plane = PhasePlane(problem.limits, JointPath.through(stations, postures))
-        times = plane.times(rates) if law is None else None
-        if law is not None:
+        times: np.ndarray | None
+        if law is None:
+            timing = plane.solve(rates)
+            times = None if timing is None else timing.times
+        else:
             times, rate, acceleration = follow_law(law, stations)
             if plane.speed_factor(rate, acceleration)[0] < _ROUGH:
                 times = None

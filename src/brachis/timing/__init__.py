@@ -2,13 +2,12 @@
 
 from brachis.timing.course import Course, TimedCourse
 from brachis.timing.gap import SlowTimingWarning, TimingGap, find_timing_gap
-from brachis.timing.joint_path import JointPath, Passage, Timing, divide_turns
+from brachis.timing.joint_path import JointPath, Timing, divide_turns
 from brachis.timing.phase_plane import PhasePlane, is_left_out
 
 __all__ = [
     "Course",
     "JointPath",
-    "Passage",
     "PhasePlane",
     "SlowTimingWarning",
     "TimedCourse",

@@ -34,14 +34,10 @@ class Course:
     @classmethod
     def through(cls, curves: np.ndarray, s: np.ndarray) -> Course:
         """Lay cubic splines through curves, (S, c), the first of them the path coordinate, and take them at s, (P,)."""
-        y = np.column_stack([s, np.empty((len(s), curves.shape[1] - 1))])
-        y_dp = np.zeros_like(y)
-        y_ddp = np.zeros_like(y)
-        y_dp[:, 0] = 1.0
-        if curves.shape[1] > 1:
-            spline = Spline.through(curves[:, 0], curves[:, 1:])
-            y[:, 1:], y_dp[:, 1:], y_ddp[:, 1:] = (spline(s, nu) for nu in range(3))
-        return cls(s, y, y_dp, y_ddp)
+        spline = Spline.through(curves[:, 0], curves[:, 1:])
+        own = (s, np.ones_like(s), np.zeros_like(s))  # s and its derivatives by s
+        parts = (np.column_stack([part, spline(s, nu)]) for nu, part in enumerate(own))
+        return cls(s, *parts)
 
 
 class TimedCourse:
@@ -76,10 +72,12 @@ class TimedCourse:
         limits: Sequence[Limit],
         rate: np.ndarray | None = None,
     ) -> None:
+        p = course.p
         still = np.zeros_like(course.y)
         curves = (course.y, course.y_dp, course.y_ddp, still)
-        state = joint_map.state(*curves, t=course.p - course.p[0])
-        self.path, kept = JointPath.of_state(course.p, state).by_length()
+        state = joint_map.state(*curves, t=p - p[0])
+        path = JointPath(p, state.s, state.q, state.qdot, state.qddot)
+        self.path, kept = path.by_length()
         self.speeds = np.linalg.norm(state.qdot, axis=1)
         by_length = None if rate is None else (rate * self.speeds)[kept]
         self._plane = PhasePlane(limits, self.path, by_length)
@@ -104,8 +102,8 @@ class TimedCourse:
 
     def curves(self, timing: Timing, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Curves and their rates, (K, c), at times of a timing, (K,), s: cubics between the stations."""
-        i = np.clip(np.searchsorted(timing.times, t, side="right") - 1, 0, None)
-        i = np.minimum(i, len(timing.acceleration) - 1)
+        i = np.searchsorted(timing.times, t, side="right") - 1
+        i = np.clip(i, 0, len(timing.acceleration) - 1)
         ahead = t - timing.times[i]
         acceleration = timing.acceleration[i]
         jerk = timing.jerk[i]

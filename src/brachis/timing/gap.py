@@ -94,7 +94,7 @@ class TimingGap(Summary):
             f"(on a grid of {self.places} places)"
         )
 
-    def issues(self, *, intervals_are_given: bool) -> tuple[Issue, ...]:
+    def issues(self) -> tuple[Issue, ...]:
         """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known."""
         if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
@@ -103,12 +103,10 @@ class TimingGap(Summary):
         where = "all along the path"
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
-        advice = "raise search.time_limit"
-        if intervals_are_given:
-            advice = "set spline.intervals: auto, or a larger number"
         message = (
             f"another timing of the same joint path is {saved:.1f} % faster: {self.least_time:.4g} s; this is lost "
-            f"{where}; to come closer, {advice}"
+            f"{where}; to come closer, set spline.intervals: auto or a larger number, or with auto raise "
+            "search.time_limit"
         )
         found = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"
@@ -149,8 +147,8 @@ def find_timing_gap(
     """
     total = 0.0
     places = 0
-    lost_s = []
-    lost = []
+    lost_s = [np.empty(0)]
+    lost = [np.empty(0)]
     for phase, spline in zip(trajectory.phases, trajectory.phase_splines, strict=True):
         if phase.kind != "move":
             total += phase.duration
@@ -164,9 +162,7 @@ def find_timing_gap(
         lost_s.append(path.s[1:])
         lost.append(np.diff(own) - np.diff(times))
     left_out = sorted({limit.name for limit in limits if is_left_out(limit)})
-    interval = (0.0, 1.0)
-    if lost:
-        interval = _narrowest(np.concatenate(lost_s), np.concatenate(lost))
+    interval = _narrowest(np.concatenate(lost_s), np.concatenate(lost))
     return TimingGap(trajectory.t_end, total, places, tuple(left_out), interval)
 
 
@@ -178,10 +174,7 @@ def _time_phase(
 ) -> tuple[JointPath, np.ndarray, np.ndarray] | None:
     """Stations of a phase's joint path, when the motion passes them, and when the fastest timing does, (P,), s."""
     count = max(PLACES, min(_LEAST_PLACES * intervals, _MOST_PLACES))
-    inner = trajectory.times[
-        (trajectory.times > phase.begin) & (trajectory.times < phase.end)
-    ]
-    ends = np.concatenate([[phase.begin], inner, [phase.end]])
+    ends = np.unique(np.clip(trajectory.times, phase.begin, phase.end))
     ends = ends[np.append(np.diff(ends) > _STILL * phase.duration, True)]
     steps = np.ceil(count * np.diff(ends) / phase.duration).astype(int)
     t = spread(ends, steps)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.kernel import Spline
-from brachis.kinematics import JointState
 from brachis.robot.dynamics import SharedTorques
 
 _STANDING = 1e-7
@@ -25,6 +24,11 @@ _TURN = 0.02
 """Largest change of a unit tangent between stations, rad: a path that turns may speed up or brake at once."""
 _MOST_PARTS = 64
 """Parts of one step, no more."""
+
+
+def halfway(values: np.ndarray) -> np.ndarray:
+    """Means of neighbours, (P - 1, ...), of values at stations, (P, ...)."""
+    return np.asarray(0.5 * (values[1:] + values[:-1]))
 
 
 def divide_turns(p: np.ndarray, q_dp: np.ndarray) -> np.ndarray:
@@ -64,11 +68,6 @@ class JointPath:
         spline = Spline.through(s, q)
         return cls(s, s, q, spline(s, 1), spline(s, 2))
 
-    @classmethod
-    def of_state(cls, p: np.ndarray, state: JointState) -> JointPath:
-        """Take a state whose derivatives by time are derivatives by p, (P,)."""
-        return cls(p, state.s, state.q, state.qdot, state.qddot)
-
     def by_length(self) -> tuple[JointPath, np.ndarray]:
         """Measure the path by its length in place of p.
 
@@ -97,7 +96,7 @@ class JointPath:
                 bend[end] = bend[beside]
         # The integral of the speed, by its values and slopes at the stations.
         step = np.diff(self.p[kept])
-        lengths = 0.5 * step * (speed[1:] + speed[:-1])
+        lengths = step * halfway(speed)
         lengths += step**2 / 12.0 * (along[:-1] - along[1:])
         # Stations of their own, also where a path all but stands still.
         lengths = np.maximum(lengths, _SHORTEST * lengths.sum())
@@ -107,10 +106,8 @@ class JointPath:
     def middles(self) -> JointPath:
         """Take the path half-way between its stations, by cubics between these."""
         steps = np.diff(self.p)[:, None]
-        p, s, q, q_dp, q_ddp = (
-            0.5 * (part[1:] + part[:-1])
-            for part in (self.p, self.s, self.q, self.q_dp, self.q_ddp)
-        )
+        parts = (self.p, self.s, self.q, self.q_dp, self.q_ddp)
+        p, s, q, q_dp, q_ddp = map(halfway, parts)
         q -= 0.125 * steps * np.diff(self.q_dp, axis=0)
         q_dp -= 0.125 * steps * np.diff(self.q_ddp, axis=0)
         return JointPath(p, s, q, q_dp, q_ddp)
@@ -165,12 +162,11 @@ class Timing:
     def of(cls, path: JointPath, rate: np.ndarray) -> Timing:
         """Integrate a rate, (P,), known at the stations."""
         steps = np.diff(path.p)
-        mean = 0.5 * (rate[1:] + rate[:-1])
+        mean = halfway(rate)
         durations = steps / mean
         acceleration = np.diff(rate) / durations
         # The smaller slope of both sides: none beside a jump.
-        between = 0.5 * (durations[1:] + durations[:-1])
-        slopes = np.pad(np.diff(acceleration) / between, 1)
+        slopes = np.pad(np.diff(acceleration) / halfway(durations), 1)
         smaller = np.minimum(np.abs(slopes[1:]), np.abs(slopes[:-1]))
         most = np.abs(acceleration) / durations
         is_smooth = slopes[1:] * slopes[:-1] > 0.0
@@ -190,5 +186,4 @@ class Timing:
     @property
     def middle_rate(self) -> np.ndarray:
         """dp/dt half-way between the stations, (P - 1,), 1/s."""
-        squares = self.rate**2
-        return np.sqrt(0.5 * (squares[1:] + squares[:-1]))
+        return np.sqrt(halfway(self.rate**2))

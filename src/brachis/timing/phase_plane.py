@@ -29,8 +29,9 @@ from functools import cached_property
 import numpy as np
 
 from brachis import kernel
+from brachis.common.arrays import apply_each
 from brachis.limits import Limit
-from brachis.timing.joint_path import JointPath, Passage, Timing
+from brachis.timing.joint_path import JointPath, Passage, Timing, halfway
 
 _TINY = 1e-9
 """Coefficients and slopes below this are taken for zero."""
@@ -95,48 +96,40 @@ class _Rows:
         rate = motion.rate[:, None]
         by_rate = np.zeros_like(values)
         if partials.qdot is not None:
-            by_rate = np.einsum("kcn,kn->kc", partials.qdot, path.q_dp)
+            by_rate = apply_each(partials.qdot, path.q_dp)
         if partials.qddot is None:
             if partials.qdot is None:
                 return None
-            with np.errstate(divide="ignore", invalid="ignore"):
-                bound = np.where(by_rate > 0.0, upper, lower)
-                largest = rate + (bound - values) / by_rate
-            largest = np.where(np.abs(by_rate) > _TINY, largest, np.inf)
-            squares = np.maximum(largest, 0.0) ** 2
+            room = np.where(by_rate > 0.0, upper, lower) - values
+            ahead = np.full_like(values, np.inf)
+            np.divide(room, by_rate, out=ahead, where=np.abs(by_rate) > _TINY)
+            squares = np.maximum(rate + ahead, 0.0) ** 2
             constant = values - by_rate * rate
-            lowest = np.zeros_like(squares)
-            return cls(limit, None, by_rate, constant, lowest, squares)
-        by_u = np.einsum("kcn,kn->kc", partials.qddot, path.q_dp)
-        by_x = np.einsum("kcn,kn->kc", partials.qddot, path.q_ddp)
+            return cls(limit, None, by_rate, constant, np.zeros_like(squares), squares)
+        by_u = apply_each(partials.qddot, path.q_dp)
+        by_x = apply_each(partials.qddot, path.q_ddp)
         by_x += by_rate / (2.0 * rate)
         constant = values - by_u * motion.acceleration[:, None] - by_x * rate**2
         return cls(limit, by_u, by_x, constant, lower - constant, upper - constant)
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the values."""
-        return [str(label) for label in self.limit.labels]
 
     def is_tangent_below(self, motion: Passage) -> bool:
         """Tell whether the rows, from another motion, may be kept: those of sizes of vectors, which are convex."""
         if self.by_u is None or np.isfinite(self.limit.lower).any():
             return False
-        values = self.limit.values(motion)
-        return bool((self._predict(motion) <= values + _TINY).all())
+        return bool((self._excess(motion) <= _TINY).all())
 
     def error(self, motion: Passage) -> float:
         """How far the rows are from the values along a motion."""
-        values = self.limit.values(motion)
-        return float(np.abs(values - self._predict(motion)).max(initial=0.0))
+        return float(np.abs(self._excess(motion)).max(initial=0.0))
 
-    def _predict(self, motion: Passage) -> np.ndarray:
-        """Values along a motion by the rows, (P, c)."""
+    def _excess(self, motion: Passage) -> np.ndarray:
+        """How much larger values are by the rows than by the limit along a motion, (P, c)."""
         rate = motion.rate[:, None]
         if self.by_u is None:
-            return np.asarray(self.by_x * rate + self.constant)
-        of_acceleration = self.by_u * motion.acceleration[:, None]
-        return np.asarray(of_acceleration + self.by_x * rate**2 + self.constant)
+            values = self.by_x * rate
+        else:
+            values = self.by_u * motion.acceleration[:, None] + self.by_x * rate**2
+        return np.asarray(values + self.constant - self.limit.values(motion))
 
 
 class PhasePlane:
@@ -171,7 +164,7 @@ class PhasePlane:
         self._rounds: list[list[_Rows]] = []
         if rate is None:
             rate = np.full(len(path.p), path.p[-1] - path.p[0])
-        middle = _not_too_slow(0.5 * (rate[1:] + rate[:-1]))
+        middle = _not_too_slow(halfway(rate))
         self._linearise(Passage(self._middles, middle, np.zeros_like(middle)))
 
     def _linearise(self, motion: Passage, kept: Sequence[_Rows] = ()) -> None:
@@ -203,7 +196,9 @@ class PhasePlane:
         sloped = [own for own in rows + earlier if own.by_u is not None]
         levels = [own for own in rows if own.by_u is None]
         blank = [np.empty((len(self._steps), 0))]
-        self._labels = [name for own in sloped + levels for name in own.names]
+        self._labels = [
+            str(label) for own in sloped + levels for label in own.limit.labels
+        ]
         a, b, low, high = (
             np.hstack(blank + [getattr(own, part) for own in sloped])
             for part in ("by_u", "by_x", "lower", "upper")
@@ -236,7 +231,7 @@ class PhasePlane:
         self, rows: Sequence[_Rows], rate: np.ndarray
     ) -> np.ndarray:
         """Largest x at the stations, (P, c), by limits without acceleration."""
-        rates = np.concatenate([rate[:1], 0.5 * (rate[1:] + rate[:-1]), rate[-1:]])
+        rates = np.concatenate([rate[:1], halfway(rate), rate[-1:]])
         motion = Passage(self.path, rates, np.zeros_like(rates))
         levels = [np.empty((len(self.path.p), 0))]
         for own in rows:
@@ -355,35 +350,31 @@ class PhasePlane:
         rows = (own for own in self._rounds[0] if own.by_u is not None)
         return any(own.error(motion) > AGREEMENT for own in rows)
 
-    def times(self, rates: tuple[float, float] = (0.0, 0.0)) -> np.ndarray | None:
-        """Find when the stations are passed, (P,), s; see `solve`."""
-        timing = self.solve(rates)
-        return None if timing is None else timing.times
-
     def fastest(self, rates: tuple[float, float]) -> np.ndarray | None:
         """Largest dp/dt at the stations, (P,), 1/s, within the rows as they are; see `solve`."""
         first, last = (rate**2 for rate in rates)
-        reach = self._go_backwards(last)
+        if last > self._ceiling[-1] * (1.0 + _ROUNDING):
+            return None
+        # The intervals of x from which the end can be reached.
+        reach = kernel.go_backwards(
+            (self._factor, self._least, self._most),
+            (self._floor, self._ceiling[:-1]),
+            last,
+            flat=_TINY,
+            rounding=_ROUNDING,
+        )
         if reach is None:
             return None
         low, high = reach
         if not low[0] * (1.0 - _ROUNDING) <= first <= high[0] * (1.0 + _ROUNDING):
             return None
-        squares = kernel.go_forwards(self._factor, self._most, (low, high), first)
+        squares = kernel.go_forwards(self._factor, self._most, reach, first)
         if not squares.max() > 0.0:
             return None
         # Between stations nothing stops; a station where the grid says so is an artefact of its width.
         slowest = (_STOPPED * np.median(np.sqrt(squares))) ** 2
         squares[1:-1] = np.maximum(squares[1:-1], slowest)
         return np.sqrt(squares)
-
-    def _go_backwards(self, last: float) -> tuple[np.ndarray, np.ndarray] | None:
-        """Find the intervals of x, (P,), from which the end can be reached with x = `last`; None if one is empty."""
-        if last > self._ceiling[-1] * (1.0 + _ROUNDING):
-            return None
-        steps = (self._factor, self._least, self._most)
-        levels = (self._floor, self._ceiling[:-1])
-        return kernel.go_backwards(steps, levels, last, flat=_TINY, rounding=_ROUNDING)
 
     def speed_factor(
         self, rate: np.ndarray, acceleration: np.ndarray
@@ -400,8 +391,8 @@ class PhasePlane:
         tuple of float, float and str
             The largest factor of its speed; the path coordinate and the label of the limit that allow no more.
         """
-        rate = np.sqrt(0.5 * (rate[1:] ** 2 + rate[:-1] ** 2))
-        acceleration = 0.5 * (acceleration[1:] + acceleration[:-1])
+        rate = np.sqrt(halfway(rate**2))
+        acceleration = halfway(acceleration)
         self._linearise(Passage(self._middles, rate, acceleration))
         factors = self._factors(rate, acceleration)
         least = factors.min(axis=1)

@@ -241,7 +241,7 @@ def test_two_rows_that_hold_alike_give_way_together_only():
     )
     assert active_set.dependent
     for weights in ([1.0, 0.0], [0.3, 0.7]):
-        both = Multipliers(active_set, np.array(weights), "solver", 0.0, unique=False)
+        both = Multipliers(active_set, np.array(weights), "solver", 0.0)
         assert both.change(np.array([1.0, 0.0])) == pytest.approx(0.0)
         assert both.change(np.array([0.0, 1.0])) == pytest.approx(0.0)
         assert both.change(np.array([1.0, 2.0])) == pytest.approx(-1.0)
@@ -274,7 +274,7 @@ def test_branch_boundary_is_told_apart(scara):
 def test_what_balances_less_than_the_residual_costs_nothing(residual, cost):
     active_set = ActiveSet(np.eye(2), np.array([0, 1]), np.ones(2))
     weights = np.array([1.0, 1e-4])
-    found = Multipliers(active_set, weights, "least squares", residual, unique=True)
+    found = Multipliers(active_set, weights, "least squares", residual)
     assert found.change(np.array([1.0, 0.0])) == -1.0
     assert found.change(np.array([0.0, 1.0])) == -cost
 
@@ -285,7 +285,7 @@ def test_so_do_two_rows_that_hold_alike(residual, cost):
     active_set = ActiveSet(slopes, np.arange(3), np.ones(3))
     assert active_set.dependent
     weights = np.array([1.0, 3e-5, 7e-5])
-    found = Multipliers(active_set, weights, "least squares", residual, unique=False)
+    found = Multipliers(active_set, weights, "least squares", residual)
     both = found.change(np.array([0.0, 1.0, 1.0]))
     assert both == pytest.approx(-cost, rel=1e-2, abs=1e-12)
     assert found.change(np.array([0.0, 1.0, 0.0])) == pytest.approx(0.0, abs=1e-7)

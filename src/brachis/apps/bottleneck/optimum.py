@@ -150,25 +150,25 @@ def _problem(
     """Build the problem over the saved knots; the motion is its point x."""
     task = trajectory.task
     robot = trajectory.robot
-    joint_map: JointMap
-    if len(trajectory.chart_rows):
-        problem = Problem.of(robot, task, own_limits)
-        rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
-        s = trajectory.path_coordinate(trajectory.times)
-        path = problem.path
-        joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
-    elif task.task_space == JOINTS:
-        problem = Problem.of(robot, task, own_limits)
-        joint_map = JointSpaceMap(problem.robot, problem.path)
-    else:
+    is_on_branch = task.task_space != JOINTS and not len(trajectory.chart_rows)
+    if is_on_branch:
         names = [
             name for name in trajectory.redundant_joints if name in robot.urdf_joints
         ]
         chosen = {"redundant_joints": tuple(names), "branch": trajectory.branch}
-        own = Problem.of(robot, task.model_copy(update=chosen), own_limits)
-        decomposition = _find_decomposition(own, families)
-        problem = decomposition.problem
+        task = task.model_copy(update=chosen)
+    problem = Problem.of(robot, task, own_limits)
+    joint_map: JointMap
+    if is_on_branch:
+        decomposition = _find_decomposition(problem, families)
         joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
+    elif task.task_space == JOINTS:
+        joint_map = JointSpaceMap(problem.robot, problem.path)
+    else:
+        rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
+        s = trajectory.path_coordinate(trajectory.times)
+        path = problem.path
+        joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)
     parts = zip(trajectory.phases, trajectory.phase_splines, strict=True)
     moving = [(phase, spline) for phase, spline in parts if not phase.is_dwell]
     starts = trajectory.position([phase.begin for phase, _ in moving])

@@ -194,24 +194,23 @@ def report(
         active = saturations(trajectory)
         phases = limits_by_phase(trajectory, active)
         return BottleneckReport(trajectory.t_end, None, active, phases)
-    if isinstance(motion, Trajectory):
-        listener("solving the problem of the motion again")
-        refined = optimum = solve_again(
-            trajectory, listener, families=families, own_limits=own_limits
-        )
-    elif motion.candidate.refined is None:
+    refined = None if isinstance(motion, Trajectory) else motion.candidate.refined
+    if refined is None and motion is not trajectory:
         raise InputError(
             "the result contains no solved optimisation problem",
             where="result",
             allowed="a result of brachis.plan",
         )
-    else:
-        refined = optimum = motion.candidate.refined
-        if refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r:
-            listener("solving the problem of the motion again")
-            optimum = solve_again(
-                trajectory, listener, families=families, own_limits=own_limits
-            )
+    if refined is not None and not (
+        refined.report.solver == SOLVER and refined.program.phases[0].joint_map.r
+    ):
+        optimum = refined
+    else:  # loaded, or a timing alone, which says nothing of limits that another joint path would relieve
+        listener("solving the problem of the motion again")
+        optimum = solve_again(
+            trajectory, listener, families=families, own_limits=own_limits
+        )
+    refined = refined or optimum
     listener("computing what every limit costs")
     found = sensitivities(optimum)
     tolerance = trajectory.task.refinement.tolerance
@@ -270,9 +269,10 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     lines += costly
     if len(costly) < len(found.limits):
         lines.append("no other limit costs time" if costly else "no limit costs time")
-    how = f"multipliers by the {found.source}, residual {found.residual:.0e}"
     if found.source == TIMINGS:
         how = "timings of the same joint path with limits raised"
+    else:
+        how = f"multipliers by the {found.source}, residual {found.residual:.0e}"
     lines.append(f"(to first order, from {how})")
     for boundary in found.boundaries:
         saved = boundary.derivative * boundary.margin
@@ -304,11 +304,11 @@ def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
 
 def _timing(found: TimingGap, t_end: float) -> list[str]:
     """Say what the timing costs from 1 % on: ``intervals: auto`` leaves 0.1 %."""
-    saved = 1.0 - found.least_time / t_end
-    if saved < 0.01 or found.left_out:
+    saved = t_end - found.least_time
+    if saved < 0.01 * t_end or found.left_out:
         return []
     line = (
-        f"the timing costs about {_part(saved * t_end, t_end)}: the same joint path takes {found.least_time:.4g} s "
+        f"the timing costs about {_part(saved, t_end)}: the same joint path takes {found.least_time:.4g} s "
         "with torques that may jump; to come closer, set spline.intervals: auto or a larger number"
     )
     return [line]

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,8 +57,8 @@ def rows_and_jacobian(
     return program.rows(x), jacobian.tocsr()
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ActiveSet(Summary):
+@dataclass(frozen=True, eq=False)
+class ActiveSet:
     """Rows and variables at their bounds at a point x.
 
     Attributes
@@ -103,7 +104,7 @@ class ActiveSet(Summary):
         twice = len(rows) - len(np.unique(rows)) + int((at_lower & at_upper).sum())
         return cls(slopes, rows, signs[kept], twice)
 
-    @property
+    @cached_property
     def dependent(self) -> bool:
         """Whether several sets of multipliers may balance a gradient; those of equalities have either sign."""
         count = len(self.slopes) - self.equalities
@@ -128,8 +129,8 @@ class ActiveSet(Summary):
         return np.asarray(nnls(self.slopes.T, gradient)[0])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Multipliers(Summary):
+@dataclass(frozen=True, eq=False)
+class Multipliers:
     """Multipliers at an answer, and how well they balance the gradient.
 
     Attributes
@@ -141,15 +142,12 @@ class Multipliers(Summary):
         ``"solver"`` or ``"least squares"``.
     residual : float
         Norm of what the weights leave of the gradient, relative to the gradient's; 1 if nothing balances.
-    unique : bool
-        False if other multipliers balance the gradient as well.
     """
 
     active_set: ActiveSet
     weights: np.ndarray
     source: str
     residual: float
-    unique: bool
 
     def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
         """Directional derivative of t_E if bounds are relaxed.
@@ -180,7 +178,7 @@ class Multipliers(Summary):
         if by_these <= self.residual * balanced:
             return 0.0
         saved = float(rates @ self.weights)
-        if self.unique:
+        if not self.active_set.dependent:
             return -saved
         from scipy.optimize import linprog
 
@@ -218,12 +216,11 @@ def multipliers_of(
     # A row that is near its bound without being active would count as one that takes over within any step.
     for near in (1e-8, 1e-7, 1e-6, 1e-5):
         active_set = ActiveSet.at(program, x, near)
-        unique = not active_set.dependent
         for source, own in sources.items():
             weights = active_set.weights_of(gradient, own)
             rest = np.linalg.norm(gradient - weights @ active_set.slopes)
             residual = float(rest / np.linalg.norm(gradient))
-            found = Multipliers(active_set, weights, source, residual, unique=unique)
+            found = Multipliers(active_set, weights, source, residual)
             if residual <= 1e-5:
                 return found
             tried.append(found)
@@ -407,7 +404,7 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
         tuple(boundaries),
         multipliers.source,
         multipliers.residual,
-        multipliers.unique,
+        not multipliers.active_set.dependent,
     )
 
 

@@ -342,8 +342,8 @@ def plot_both_motions(comparison: Comparison) -> Figure:
         largest = np.abs(ratios.values).max(axis=1, initial=0.0)
         if name == "recorded" and comparison.proven:
             t = comparison.proven[0].t
-            proven = [bounds.ratios.max(axis=1) for bounds in comparison.proven]
-            known = np.max(proven, axis=0)
+            proven = np.hstack([bounds.ratios for bounds in comparison.proven])
+            known = proven.max(axis=1)
             least = np.interp(ratios.t, t, known)
             ratio.fill_between(
                 ratios.t,

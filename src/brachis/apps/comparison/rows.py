@@ -15,6 +15,7 @@ from math import factorial
 
 import numpy as np
 
+from brachis.common.arrays import apply_each
 from brachis.limits import Limit, Moments, Role, limits_of
 from brachis.trajectory import Trajectory
 
@@ -83,7 +84,7 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
         off = np.zeros((len(windows), len(limit.labels)))
         for slope, error in zip(limit.partials(means).by_joints, errors, strict=True):
             if slope is not None:
-                off += (np.abs(slope) @ error[:, :, None])[:, :, 0]
+                off += apply_each(np.abs(slope), error)
         values = limit.values(means)
         values = values - np.clip(values - harmless, -off, off)
         middle = windows[:, order // 2]

@@ -63,23 +63,27 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
             allowed="at least one verified plan",
         )
     columns = list(zip(*cells, strict=True))
-    values = [_sort_values(column) for column in columns]
     is_line = len(keys) == 1
-    is_heat_map = not is_line and 2 * len(cells) >= math.prod(map(len, values))
-    places = [
-        _places(column, distinct, is_heat_map)
-        for column, distinct in zip(columns, values, strict=True)
-    ]
+    is_heat_map = not is_line and 2 * len(cells) >= math.prod(
+        len(set(column)) for column in columns
+    )
+    places, names = zip(
+        *(_locate(column, side_by_side=is_heat_map) for column in columns), strict=True
+    )
     height = _HEIGHT if is_line else 1.4 * _HEIGHT
     if is_heat_map:
-        height = min(180.0, max(_HEIGHT, 24.0 + 8.0 * len(values[1])))
+        height = min(180.0, max(_HEIGHT, 24.0 + 8.0 * len(names[1])))
     width = style.COLUMN_WIDTH if is_line else style.PAGE_WIDTH
     figure = style.new_figure(width, height)
     ax = figure.add_subplot()
     x = places[0]
     if is_line:
         y = np.full(len(x), np.nanmax(times))
-        _draw_line(ax, x, times, is_joined=_are_numbers(values[0]))
+        order = np.argsort(x)
+        look = style.joint_style(0)
+        if names[0]:
+            look["linestyle"] = "none"
+        ax.plot(x[order], times[order], marker="o", markersize=3.0, **look)
         style.dress(ax, _title(keys[0]), _END_TIME)
     else:
         y = places[1]
@@ -92,11 +96,21 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
         style.dress(figure.colorbar(image, ax=ax).ax, "", _END_TIME)
         style.dress(ax, _title(keys[0]), _title(keys[1]))
     if is_missing.any():
-        _draw_crosses(ax, x[is_missing], y[is_missing])
-    for axis, distinct in zip((ax.xaxis, ax.yaxis), values, strict=False):
-        if is_heat_map or not _are_numbers(distinct):
-            ticks = range(0, len(distinct), math.ceil(len(distinct) / _MOST_TICKS))
-            axis.set_ticks(ticks, [_write_value(distinct[tick]) for tick in ticks])
+        ax.scatter(
+            x[is_missing],
+            y[is_missing],
+            marker="x",
+            color=style.COLOURS[1],
+            s=18.0,
+            linewidths=0.8,
+            label="no verified plan",
+            zorder=3.0,
+        )
+        style.legend_above(ax, style.COLUMN_WIDTH)
+    for axis, named in zip((ax.xaxis, ax.yaxis), names, strict=False):
+        if named:
+            ticks = range(0, len(named), math.ceil(len(named) / _MOST_TICKS))
+            axis.set_ticks(ticks, [_write_value(named[tick]) for tick in ticks])
     return figure
 
 
@@ -112,36 +126,20 @@ def _find_fastest(
     return cells
 
 
-def _places(
-    column: Sequence[Any], distinct: Sequence[Any], side_by_side: bool
-) -> np.ndarray:
-    """Return where values lie on an axis: numbers at themselves, others, and all of a heat map, side by side."""
-    if _are_numbers(distinct) and not side_by_side:
-        return np.array(column, float)
+def _locate(
+    column: Sequence[Any], *, side_by_side: bool
+) -> tuple[np.ndarray, list[Any]]:
+    """Return where values lie on an axis, and what is written there in place of numbers.
+
+    Numbers lie at themselves; others, and all of a heat map, side by side.
+    """
+    distinct = list(dict.fromkeys(column))
+    if all(type(value) in {int, float} for value in distinct):
+        if not side_by_side:
+            return np.array(column, float), []
+        distinct.sort()
     place = {value: i for i, value in enumerate(distinct)}
-    return np.array([place[value] for value in column], float)
-
-
-def _sort_values(found: Sequence[Any]) -> list[Any]:
-    """List the values of a key: numbers sorted, others in their order."""
-    values = list(dict.fromkeys(found))
-    return sorted(values) if _are_numbers(values) else values
-
-
-def _are_numbers(values: Sequence[Any]) -> bool:
-    return all(
-        isinstance(value, int | float) and not isinstance(value, bool)
-        for value in values
-    )
-
-
-def _draw_line(ax: Axes, x: np.ndarray, times: np.ndarray, *, is_joined: bool) -> None:
-    """Draw times over numbers as a line, or over names as points alone."""
-    order = np.argsort(x)
-    look = style.joint_style(0)
-    if not is_joined:
-        look["linestyle"] = "none"
-    ax.plot(x[order], times[order], marker="o", markersize=3.0, **look)
+    return np.array([place[value] for value in column], float), distinct
 
 
 def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
@@ -171,21 +169,6 @@ def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) ->
     return image
 
 
-def _draw_crosses(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Mark where no plan is verified."""
-    ax.scatter(
-        x,
-        y,
-        marker="x",
-        color=style.COLOURS[1],
-        s=18.0,
-        linewidths=0.8,
-        label="no verified plan",
-        zorder=3.0,
-    )
-    style.legend_above(ax, style.COLUMN_WIDTH)
-
-
 def _title(key: str) -> str:
     """Name a key with its unit."""
     unit = unit_of(key)
@@ -195,4 +178,5 @@ def _title(key: str) -> str:
 def _write_value(value: Any) -> str:
     if value is None:
         return "not set"
-    return f"{value:.4g}" if _are_numbers([value]) else style.plain(str(value))
+    is_number = type(value) in {int, float}
+    return f"{value:.4g}" if is_number else style.plain(str(value))

@@ -10,7 +10,7 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import takewhile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ from brachis.task.messages import show, validate
 from brachis.task.yaml_reader import read_yaml
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """What is sent to a worker; no file is needed there.
 
@@ -93,20 +93,8 @@ class Outcome:
         return cls(facts)
 
 
-@dataclass(frozen=True)
-class Row:
-    """One row of the sweep's table.
-
-    Attributes
-    ----------
-    changes : mapping
-        Values of the varied keys.
-    plan : Plan or BrachisError
-        An error if the task is refused.
-    """
-
-    changes: Mapping[str, Any]
-    plan: Plan | BrachisError
+Row = tuple[Mapping[str, Any], Plan | BrachisError]
+"""Values of the varied keys, and the plan, or an error if the task is refused: one row of the sweep's table."""
 
 
 @dataclass(frozen=True)
@@ -153,15 +141,8 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         content = _read(path, folder)
         name = str(path)
         folder = path.absolute().parent
-    if not isinstance(content, Mapping):
-        raise TaskError(
-            "the sweep is not a mapping of keys",
-            found=show(content),
-            allowed=", ".join(SweepSettings.model_fields),
-            where=name,
-        )
-    if isinstance(content.get("task"), Task):
-        content = {**content, "task": content["task"].to_dict()}
+    elif isinstance(source.get("task"), Task):
+        content = {**source, "task": source["task"].to_dict()}
     settings = validate(SweepSettings, content, name)
     base: object = settings.task
     task_name = f"{name}: task"
@@ -176,7 +157,7 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         )
     base = with_keys(base, settings.fixed)
     rows = tuple(
-        Row(changes, _plan(base, changes, task_name, folder))
+        (changes, _plan(base, changes, task_name, folder))
         for changes in settings.changes()
     )
     _check_keys(settings, rows, name)
@@ -219,34 +200,31 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
     ------
     TaskError
     """
-    unknown: dict[str, BrachisError | None] = {}
 
+    @cache
     def find_error(plan: Plan | BrachisError) -> BrachisError | None:
         """Return why a task is refused, or a name that its robot does not have."""
         if isinstance(plan, BrachisError):
             return plan
-        if plan.digest not in unknown:
-            unknown[plan.digest] = None
-            try:
-                Problem.of(robot_of(plan), plan.task)
-            except BrachisError as error:
-                # Other errors depend on values, and other values of the same key may be right.
-                if isinstance(error, UnknownNameError):
-                    unknown[plan.digest] = error
-        return unknown[plan.digest]
+        try:
+            Problem.of(robot_of(plan), plan.task)
+        except UnknownNameError as error:
+            return error
+        except BrachisError:  # other values of the same key may be right
+            return None
+        return None
 
     refused = {}
     for key in settings.keys or ("task",):
-        plans = [row.plan for row in rows if key in row.changes or not row.changes]
+        plans = [plan for changes, plan in rows if key in changes or not changes]
         plans.sort(key=lambda plan: isinstance(plan, BrachisError))
-        errors = list(takewhile(bool, map(find_error, plans)))
-        if len(errors) == len(plans):
+        if all(map(find_error, plans)):
             refused[key] = (
-                f"refused in every plan that sets it ({len(plans)}); the first: {errors[0]}"
+                f"refused in every plan that sets it ({len(plans)}); the first: {find_error(plans[0])}"
             )
     if refused:
         # One wrong key refuses the plans of all others.
-        key = next((key for key in refused if key in refused[key]), next(iter(refused)))
+        key = max(refused, key=lambda key: key in refused[key])
         raise TaskError(refused[key], where=f"{name}: {key}")
 
 

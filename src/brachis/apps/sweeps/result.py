@@ -146,13 +146,13 @@ class Store:
         """
         from pyarrow import csv
 
-        pa = self._arrow
-        columns = {"plan": pa.array(range(len(rows)), "int64")}
+        columns: dict[str, Any] = {"plan": range(len(rows))}
         for key in keys:
             columns[key] = _column([changes.get(key) for changes, _ in rows])
         for name, kind in COLUMNS.items():
-            columns[name] = pa.array([facts.get(name) for _, facts in rows], kind)
-        table = pa.table(columns)
+            column = [facts.get(name) for _, facts in rows]
+            columns[name] = self._arrow.array(column, kind)
+        table = self._arrow.table(columns)
         writers = (self._parquet.write_table, csv.write_csv)
         for name, write in zip(TABLES, writers, strict=True):
             with atomic_write(self.folder / name) as stream:
@@ -256,7 +256,7 @@ class SweepResult(Summary):
     def varied(self) -> tuple[str, ...]:
         """Keys that take more than one value."""
         return tuple(
-            key for key in self.keys if len(set(self.table.column(key).to_pylist())) > 1
+            key for key in self.keys if len(self.table.column(key).unique()) > 1
         )
 
     @property

@@ -99,14 +99,13 @@ def sweep(
         )
         found = _run(planned, store, pool, retry=retry, tell=tell)
     rows = []
-    for row in planned.rows:
-        plan = row.plan
+    for changes, plan in planned.rows:
         facts = (
             found[plan.digest]
             if isinstance(plan, Plan)
             else Outcome.of_error(plan).facts
         )
-        rows.append((row.changes, facts))
+        rows.append((changes, facts))
     keys = planned.settings.keys
     return SweepResult(store.folder, keys, store.write_table(keys, rows))
 
@@ -115,9 +114,7 @@ def _run(
     planned: SweepPlan, store: Store, pool: Pool, *, retry: bool, tell: Listener
 ) -> dict[str, dict[str, Any]]:
     """Make the plans that are not stored yet, and return the columns of all, by digest."""
-    plans = {
-        row.plan.digest: row.plan for row in planned.rows if isinstance(row.plan, Plan)
-    }
+    plans = {plan.digest: plan for _, plan in planned.rows if isinstance(plan, Plan)}
     found = {}
     for digest in plans:
         facts = store.read(digest)

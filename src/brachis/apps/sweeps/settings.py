@@ -39,9 +39,14 @@ def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
 class _OneKey(Model):
     """A mapping with exactly one of its keys."""
 
+    @property
+    def given(self) -> dict[str, Any]:
+        """The key that is given, with its value."""
+        return {key: value for key, value in self if value is not None}
+
     @model_validator(mode="after")
     def _check_keys(self) -> Self:
-        keys = [key for key, value in self if value is not None]
+        keys = self.given
         if len(keys) != 1:
             raise refuse(
                 "exactly one key is needed",
@@ -63,10 +68,9 @@ class Spacing(_OneKey):
 
     def values(self) -> list[JsonValue]:
         """List them."""
-        if self.linear is not None:
-            return np.linspace(*self.linear).tolist()
-        assert self.logarithmic is not None
-        return np.geomspace(*self.logarithmic).tolist()
+        ((key, values),) = self.given.items()
+        spread = np.linspace if key == "linear" else np.geomspace
+        return spread(*values).tolist()
 
 
 GridValues = Annotated[
@@ -95,16 +99,16 @@ class Distribution(_OneKey):
 
     def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
         """Draw values."""
-        if self.choice is not None:
-            chosen = generator.integers(len(self.choice), size=count)
-            return [self.choice[i] for i in chosen]
-        if self.normal is not None:
-            return generator.normal(*self.normal, size=count).tolist()
-        if self.uniform is not None:
-            return generator.uniform(*self.uniform, size=count).tolist()
-        assert self.log_uniform is not None
-        low, high = map(math.log, self.log_uniform)
-        return np.exp(generator.uniform(low, high, size=count)).tolist()
+        ((key, values),) = self.given.items()
+        if key == "choice":
+            return [values[i] for i in generator.integers(len(values), size=count)]
+        first, second = values
+        if key == "normal":
+            return generator.normal(first, second, count).tolist()
+        if key == "uniform":
+            return generator.uniform(first, second, count).tolist()
+        logarithms = generator.uniform(math.log(first), math.log(second), count)
+        return np.exp(logarithms).tolist()
 
 
 class RandomSettings(Model):
