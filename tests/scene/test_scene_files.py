@@ -211,7 +211,7 @@ def test_inspect_lists_pairs_and_json_has_all(tmp_path, capfd):
 
 def test_the_viewer_draws_the_bodies_where_they_are():
     trimesh = pytest.importorskip("trimesh")
-    from brachis.apps.view.solids import scene_meshes
+    from brachis.apps.view.bodies import scene_meshes
 
     scene = [
         brachis.Box([0.2, 0.4, 0.6], position=[1, 0, 0], name="box"),

@@ -33,11 +33,10 @@ class Chain:
         """Take the chain of a Pinocchio model."""
         joints = range(1, model.njoints)
         placements = [model.jointPlacements[i].homogeneous for i in joints]
-        twists = np.array([model.joints[i].createData().S for i in joints])
-        twists = twists.reshape(-1, 6)
-        revolute = np.any(twists[:, 3:], axis=1)
-        axes = np.where(revolute[:, None], twists[:, 3:], twists[:, :3])
-        return cls(np.array(placements), axes, revolute)
+        twists = [model.joints[i].createData().S for i in joints]
+        sliding, turning = np.hsplit(np.reshape(twists, (-1, 6)), 2)
+        axes = sliding + turning  # one of them is zero
+        return cls(np.array(placements), axes, np.any(turning, axis=1))
 
     def place(self, q: np.ndarray) -> Placed:
         """Place the joints in postures, (K, n)."""

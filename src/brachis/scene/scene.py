@@ -74,7 +74,7 @@ class Scene:
         return f"{self.solids[first].name} and {self.solids[second].name}"
 
     def with_pairs(self, chosen: np.ndarray) -> Scene:
-        """Return the scene with some of its pairs, by number."""
+        """Return the scene with some of its pairs, by number or mask."""
         return replace(self, pairs=self.pairs[chosen])
 
     def __getstate__(self) -> dict[str, object]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 
 from brachis.common.files import mesh_file, read_text
 from brachis.errors import InputError, TaskError, UrdfError
@@ -23,7 +24,7 @@ from brachis.robot.urdf_elements import (
     numbers_of,
     read_tree,
 )
-from brachis.task.scene import SceneBody
+from brachis.task.scene import Round, SceneBody
 
 _HULL = (True, "Qt")
 """Keep the triangles; options of Qhull."""
@@ -44,19 +45,26 @@ class Solid:
     geometry : coal.CollisionGeometry
     placement : (4, 4) ndarray
         In the link's frame, or in the world.
+    padding : float
+        By how much it is larger than the geometry says, m.
     """
 
     name: str
     link: str | None
     geometry: Geometry
     placement: np.ndarray
+    padding: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Give the geometry its padding and its box."""
+        self.geometry.setSweptSphereRadius(self.padding)
+        self.geometry.computeLocalAABB()
 
     @property
     def radius(self) -> float:
         """Radius of a ball around it, m; infinite of a half-space."""
         # Coal leaves the padding out of the ball around a sphere.
-        shape = self.geometry
-        return shape.aabb_radius + shape.getSweptSphereRadius()
+        return self.geometry.aabb_radius + self.padding
 
 
 def build_solids(body: SceneBody) -> Iterator[Solid]:
@@ -111,15 +119,12 @@ def _build_solid(body: SceneBody) -> Solid:
             geometry = _hull(Path(shape), np.full(3, body.scale))
         except InputError as error:
             raise TaskError(str(error), where=f"scene: {body.name}") from error
-    elif body.sphere is not None:
-        geometry = coal.Sphere(shape)
-    elif body.box is not None:
-        geometry = coal.Box(*shape)
     else:
-        kind = coal.Cylinder if body.cylinder is not None else coal.Capsule
-        geometry = kind(shape.radius, shape.length)
+        is_round = isinstance(shape, Round)
+        lengths = (shape.radius, shape.length) if is_round else np.ravel(shape)
+        geometry = _SHAPES[body.shape][0](*lengths)
     placement = placement_matrix(body.placement)
-    return _solid(str(body.name), body.link, geometry, placement, 0.0)
+    return Solid(str(body.name), body.link, geometry, placement)
 
 
 def read_solids(
@@ -142,7 +147,7 @@ def read_solids(
                 problem = f"the collision geometry cannot be read: {error}"
                 raise UrdfError(problem, where=f"link {name!r}") from error
             placement = origin_of(collision, "origin")
-            yield _solid(label, name, geometry, placement, padding.get(name, 0.0))
+            yield Solid(label, name, geometry, placement, padding.get(name, 0.0))
 
 
 def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Solid]:
@@ -158,31 +163,12 @@ def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Sol
             continue
         geometry = coal.Capsule(thick, length)
         placement = np.eye(4)
-        placement[:3, :3] = _turn_to(end / length)
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end)
+        placement[:3, :3] = turn.matrix()
         placement[:3, 3] = 0.5 * end
-        yield _solid(
+        yield Solid(
             f"{link} {number}", link, geometry, placement, padding.get(link, 0.0)
         )
-
-
-def _turn_to(direction: np.ndarray) -> np.ndarray:
-    """Return a rotation, (3, 3), that turns the z axis to a direction, (3,)."""
-    from scipy.spatial.transform import Rotation
-
-    turn, _ = Rotation.align_vectors(direction, [0.0, 0.0, 1.0])
-    return turn.as_matrix()
-
-
-def _solid(
-    name: str,
-    link: str | None,
-    geometry: Geometry,
-    placement: np.ndarray,
-    padding: float,
-) -> Solid:
-    geometry.setSweptSphereRadius(padding)
-    geometry.computeLocalAABB()
-    return Solid(name, link, geometry, placement)
 
 
 def _geometry(collision: Element, folder: Path) -> Geometry:
@@ -197,7 +183,11 @@ def _geometry(collision: Element, folder: Path) -> Geometry:
         )
     (shape,) = shapes
     if shape.tag == "mesh":
-        return _read_mesh(shape, folder)
+        name = str(shape.get("filename"))
+        path = mesh_file(name, folder)
+        if path is None:
+            raise InputError("the mesh file is missing", where=name)
+        return _hull(path, np.array(numbers_of(shape, ".", "scale", "1 1 1")))
     kind, attributes, count = _SHAPES[shape.tag]
     return kind(*_lengths(shape, attributes, count))
 
@@ -225,14 +215,6 @@ def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[fl
             allowed=f"{count} numbers > 0, m, under {' and '.join(attributes)}",
         )
     return found
-
-
-def _read_mesh(shape: Element, folder: Path) -> Geometry:
-    name = str(shape.get("filename"))
-    path = mesh_file(name, folder)
-    if path is None:
-        raise InputError("the mesh file is missing", where=name)
-    return _hull(path, np.array(numbers_of(shape, ".", "scale", "1 1 1")))
 
 
 def _hull(path: Path, scale: np.ndarray) -> Geometry:

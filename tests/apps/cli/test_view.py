@@ -92,7 +92,7 @@ def test_a_port_in_use_is_refused(run, saved, looked_at, monkeypatch):
     run("view", saved, "--port", 0)
     (refused,) = looked_at
     assert refused.code == 2
-    assert "--port: the port is in use" in refused.err
+    assert "Address already in use" in refused.err
 
 
 def test_other_machines_are_let_in_with_a_warning(run, saved, looked_at):

@@ -136,10 +136,10 @@ def test_many_angles_go_to_more_panels_in_order():
     ("rows", "message", "where"),
     [
         ([], "the list of rows is empty", "rows"),
-        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "the case is not valid", "rows[1]"),
-        ([(0.0, "j1", 0.0)], "the end time is not valid", "rows[0]"),
-        ([(0.0, "j1", -1.0)], "the end time is not valid", "rows[0]"),
-        ([(0.0, "j1", math.inf)], "the end time is not valid", "rows[0]"),
+        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "the row is not valid", "rows[1]"),
+        ([(0.0, "j1", 0.0)], "the row is not valid", "rows[0]"),
+        ([(0.0, "j1", -1.0)], "the row is not valid", "rows[0]"),
+        ([(0.0, "j1", math.inf)], "the row is not valid", "rows[0]"),
         ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "already in another row", "rows[1]"),
     ],
 )

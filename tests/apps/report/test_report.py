@@ -328,23 +328,23 @@ def test_paths_of_many_segments_are_told_in_short():
 
 def test_angles_may_be_in_degrees_and_lengths_stay(rail):
     reported = reported_motion(rail.trajectory, degrees=True)
-    rows = {row.name: row for row in tables.joint_rows(reported)}
+    rows = {row["name"]: row for row in tables.joint_rows(reported)}
     q = rail.trajectory.q
-    assert rows["rail"].start == f"{q[0, 0]:.4f} m"
-    assert rows["joint_1"].start == f"{np.rad2deg(q[0, 1]):.4f} deg"
+    assert rows["rail"]["start"] == f"{q[0, 0]:.4f} m"
+    assert rows["joint_1"]["start"] == f"{np.rad2deg(q[0, 1]):.4f} deg"
     units = {row["found"].partition(" ")[2] for row in tables.check_rows(reported)}
     assert not any("rad" in unit for unit in units - {"m, rad"})
-    assert [row.value.split()[1] for row in rows["joint_1"].peaks] == [
+    assert [row["value"].split()[1] for row in rows["joint_1"]["peaks"]] == [
         "deg",
         "deg/s",
         "deg/s²",
         "Nm",
     ]
     in_rad = {
-        row.name: row for row in tables.joint_rows(reported_motion(rail.trajectory))
+        row["name"]: row for row in tables.joint_rows(reported_motion(rail.trajectory))
     }
-    assert [row.share for row in rows["joint_1"].peaks] == [
-        row.share for row in in_rad["joint_1"].peaks
+    assert [row["share"] for row in rows["joint_1"]["peaks"]] == [
+        row["share"] for row in in_rad["joint_1"]["peaks"]
     ]
     titles = [
         axis["title"]["text"]
@@ -367,9 +367,9 @@ def test_positions_are_told_by_their_place_in_the_range(rail):
     (row,) = (
         row
         for row in tables.joint_rows(reported_motion(rail.trajectory))
-        if row.name == "joint_1"
+        if row["name"] == "joint_1"
     )
-    assert row.peaks[0].share == f"{100 * share:.1f} %"
+    assert row["peaks"][0]["share"] == f"{100 * share:.1f} %"
 
 
 def test_the_task_and_the_versions_are_in_it(planar_page):

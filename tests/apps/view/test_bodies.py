@@ -81,5 +81,5 @@ def test_meshes_that_are_missing_leave_the_skeleton(motion_of):
     bodies = bodies_of(motion_of(robot))
     assert not bodies.shows_links
     (reason,) = bodies.unread
-    assert "mesh files are missing" in reason
+    assert "missing mesh files" in reason
     assert set(bodies.skeleton) == set(range(8))

@@ -64,7 +64,7 @@ def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(
     taken = server.get_port()
     with pytest.raises(
         InputError,
-        match=rf"the port is in use; found {taken} on 127.0.0.1.*next free port",
+        match=rf"found 127.0.0.1, port {taken}: Address already in use.*next free port",
     ):
         start_server(LOOPBACK, taken)
     monkeypatch.setattr("brachis.apps.view.server.FIRST_PORT", taken)
@@ -77,7 +77,7 @@ def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(
 
 def test_a_port_that_somebody_takes_in_between_is_refused_as_well(server, monkeypatch):
     monkeypatch.setattr("brachis.apps.view.server._check", lambda *_address: None)
-    with pytest.raises(InputError, match="the port is in use"):
+    with pytest.raises(InputError, match="already in use"):
         start_server(LOOPBACK, server.get_port())
 
 
@@ -96,7 +96,7 @@ def test_a_host_that_is_not_here_is_refused(monkeypatch):
 
     with pytest.raises(
         InputError,
-        match=r"--host: the viewer cannot listen on this address; found 192\.0\.2\.1",
+        match=r"--host, --port: the viewer cannot listen on this address; found 192\.0\.2\.1",
     ):  # an address of no machine
         start_server("192.0.2.1", 0)
     monkeypatch.setattr(socket, "getaddrinfo", unknown)

@@ -14,7 +14,6 @@ from brachis.apps.plots.style import COLOURS
 from brachis.apps.view import Viewer
 from brachis.apps.view.bodies import placements, prescribed_path
 from brachis.apps.view.panel import look
-from brachis.apps.view.scene import LAYERS
 from brachis.apps.view.tables import candidates_table, state_table, summary
 from brachis.robot import Robot
 from brachis.search.same_motion import SAME_MOTION
@@ -31,12 +30,7 @@ def shown(line_result):
 
 
 def poses(viewer):
-    return np.array(
-        [
-            [*frame.position, *frame.wxyz]
-            for frame in (*viewer._scene._frames, viewer._scene._tool)
-        ]
-    )
+    return np.array([[*frame.position, *frame.wxyz] for frame in viewer._scene._frames])
 
 
 def test_the_robot_is_where_the_motion_has_it_at_the_chosen_instant(shown, line_result):
@@ -49,18 +43,19 @@ def test_the_robot_is_where_the_motion_has_it_at_the_chosen_instant(shown, line_
         poses(shown), np.hstack([found[0][0], found[1][0]]), atol=1e-6
     )
     assert np.abs(poses(shown) - before).max() > 0.1
-    assert shown._panel._slider.value == pytest.approx(0.6 * motion.t_end, abs=0.01)
+    assert shown._slider.value == pytest.approx(0.6 * motion.t_end, abs=0.01)
 
 
 def test_plots_and_table_follow_the_slider(shown, line_result):
     motion = line_result.trajectory
     shown.playback.go_to(0.25 * motion.t_end)
     shown.show()
-    for chart in shown._panel._charts:
-        assert 'data-part="0.25000"' in chart._line.content
+    assert len(shown._lines) > 2
+    for line in shown._lines:
+        assert 'data-part="0.25000"' in line.content
     assert (
         f"t = {0.25 * motion.t_end:.4f} s of {motion.t_end:.4f} s"
-        in shown._panel._state.content
+        in shown._state.content
     )
 
 
@@ -68,7 +63,16 @@ def test_path_and_trace_are_one_curve_and_every_layer_can_be_hidden(shown):
     samples = shown._scene.samples
     path = prescribed_path(shown._trajectory, samples)
     np.testing.assert_allclose(path, samples.tool_position, atol=1e-8)
-    assert [*shown._scene.layers, "closest pair"] == list(LAYERS)
+    assert set(shown._scene.layers) == {
+        "robot",
+        "skeleton",
+        "ghost postures",
+        "path",
+        "tool trace",
+        "tool frame",
+        "world frame",
+        "ground",
+    }
     for name in shown._scene.layers:
         assert shown._scene.layers[name]
         shown._scene.set_visible(name, visible=False)
@@ -126,7 +130,7 @@ def test_more_joints_than_colours_are_drawn_apart(motion_of):
     eight = Robot.from_urdf(ROOT / "robots/arm8/robot.urdf")
     assert eight.n > len(COLOURS)
     with Viewer(motion_of(eight), port=0) as viewer:
-        assert eight.joint_names[-1] in viewer._panel._state.content
+        assert eight.joint_names[-1] in viewer._state.content
 
 
 def test_angles_may_be_in_degrees(bare_robot, motion_of):
@@ -138,7 +142,7 @@ def test_angles_may_be_in_degrees(bare_robot, motion_of):
     assert f"{now.q[0, 0]:.3f} m</td>" in table
     with Viewer(motion, degrees=True, port=0) as viewer:
         viewer.show()
-        assert " deg/s</td>" in viewer._panel._state.content
+        assert " deg/s</td>" in viewer._state.content
 
 
 def test_the_report_button_sends_the_page_to_whoever_asks(
@@ -153,13 +157,13 @@ def test_the_report_button_sends_the_page_to_whoever_asks(
         def add_notification(self, title, body):
             told.append((title, body))
 
-    shown._panel._send_report(SimpleNamespace(client=Client()))
+    shown._send_report(SimpleNamespace(client=Client()))
     page, at_once = sent["report.html"]
     assert at_once
     assert "<h1>VERIFIED</h1>" in page
     assert f"{line_result.t_end:.4f} s" in page
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    shown._panel._send_report(SimpleNamespace(client=Client()))
+    shown._send_report(SimpleNamespace(client=Client()))
     assert told == [("The report cannot be made", ANY)]
     assert "Jinja2" in told[0][1]
 

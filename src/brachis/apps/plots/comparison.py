@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.apps.plots import style
+from brachis.common.arguments import check_list
 from brachis.errors import InputError
 from brachis.optimise.candidate import Candidate, coordinates
 from brachis.search.same_motion import SAME_MOTION
@@ -81,40 +82,34 @@ def plot_comparison(
 
 def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], float]:
     """Check the rows and key them by case and choice."""
-    row_type = "(case, choice, end time in s)"
-    if not isinstance(rows, Sequence):
-        allowed = f"a list of {row_type}"
-        raise InputError("wrong type", where="rows", found=repr(rows), allowed=allowed)
+    check_list(rows, "rows", _ROW)
     if not rows:
-        raise InputError(
-            "the list of rows is empty",
-            where="rows",
-            found="no rows",
-            allowed="at least one",
-        )
-    cells = {}
+        raise InputError("the list of rows is empty", where="rows", allowed=_ROW)
+    cells: dict[tuple[Case, str], float] = {}
     for number, row in enumerate(rows):
-        allowed = None
-        if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 3:
-            problem = "wrong type"
-            found = repr(row)
-            allowed = row_type
-        elif not isinstance(row[0], str) and not math.isfinite(row[0]):
-            problem = "the case is not valid"
-            found = f"{row[0]}"
-            allowed = "a finite number, or a name"
-        elif not (math.isnan(row[2]) or 0.0 < row[2] < math.inf):
-            problem = "the end time is not valid"
-            found = f"{row[2]} s"
-            allowed = "> 0 s, or NaN for no plan"
-        elif (row[0], row[1]) in cells:
+        where = f"rows[{number}]"
+        if not _is_row(row):
+            problem = "the row is not valid"
+            raise InputError(problem, where=where, found=repr(row), allowed=_ROW)
+        case, choice, t_end = row
+        if (case, choice) in cells:
             problem = "this case and choice are already in another row"
-            found = f"{_name(row[0])} with {row[1]!r}"
-        else:
-            cells[row[0], row[1]] = row[2]
-            continue
-        raise InputError(problem, where=f"rows[{number}]", found=found, allowed=allowed)
+            found = f"{_name(case)} with {choice!r}"
+            raise InputError(problem, where=where, found=found)
+        cells[case, choice] = t_end
     return cells
+
+
+_ROW = "(case, choice, end time in s); the case is a finite number or a name, the time > 0 s or NaN for no plan"
+
+
+def _is_row(row: object) -> bool:
+    """Tell whether something is a row of the table."""
+    if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 3:
+        return False
+    case, _, t_end = row
+    is_case = isinstance(case, str) or math.isfinite(case)
+    return is_case and (math.isnan(t_end) or 0.0 < t_end < math.inf)
 
 
 def _name(case: Case) -> str:
@@ -133,17 +128,16 @@ def _draw_bars(
         shift = (column - 0.5 * (len(choices) - 1)) * width
         bars = {}
         for place, case in enumerate(cases):
-            t_end = cells.get((case, choice))
-            if t_end is None:
+            if (case, choice) not in cells:
                 continue
-            text = "no plan"
-            if not math.isnan(t_end):
-                text = f"{t_end:.3f}"
+            t_end = cells[case, choice]
+            is_found = not math.isnan(t_end)
+            if is_found:
                 bars[place + shift] = t_end
             others = [cells.get((case, other), math.inf) for other in choices]
-            is_best = not any(other < t_end for other in others) and text != "no plan"
+            is_best = is_found and not any(other < t_end for other in others)
             ax.annotate(
-                text,
+                f"{t_end:.3f}" if is_found else "no plan",
                 (place + shift, bars.get(place + shift, 0.0)),
                 xytext=(0.0, 2.0),
                 textcoords="offset points",
@@ -211,18 +205,12 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     InputError
         `candidates` is empty, or has other entries than candidates.
     """
-    problem = None
-    if not isinstance(candidates, Sequence) or not all(
-        isinstance(each, Candidate) for each in candidates
-    ):
-        problem = "wrong type"
-    elif not candidates:
-        problem = "the list of candidates is empty"
-    if problem:
+    check_list(candidates, "candidates", "candidates")
+    if not candidates or not all(isinstance(each, Candidate) for each in candidates):
         raise InputError(
-            problem,
+            "the list of candidates is empty, or has other entries",
             where="candidates",
-            found=type(candidates).__name__ if candidates else "no candidates",
+            found=f"{candidates!r:.60}",
             allowed="the candidates of a result: result.candidates",
         )
     fastest, *others = candidates

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -226,11 +226,8 @@ def _draw_panel(ax: Axes, panel: Panel) -> None:
             ax.axhspan(level, outer, facecolor="#EFEFEF", edgecolor="none", zorder=0.0)
             continue
         for place, curve in enumerate(curves):
-            look = {
-                **style.LIMIT,
-                "color": style.joint_style(curve.style)["color"],
-                "linestyle": style.limit_dashes(place, len(curves)),
-            }
+            look = {**style.joint_style(curve.style), **style.LIMIT}
+            look["linestyle"] = style.limit_dashes(place, len(curves))
             ax.plot(panel.t, limit, **look)
     if panel.is_ratio:
         ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
@@ -285,34 +282,39 @@ def plot_timeline(
     from matplotlib.patches import Patch
 
     ratios = limit_ratios(trajectory, limits)
-    found = {entry.label: entry for entry in saturations(ratios)}
-    shown = {
-        column: found[label]
-        for column, label in enumerate(ratios.labels)
-        if found[label].is_half_used
-    }
-    figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * max(len(shown), 1))
+    used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
+    found = [entry for entry in saturations(ratios) if entry.is_half_used]
+    found.sort(key=lambda entry: ratios.labels.index(entry.label))
+    rows = max(len(found), 1)
+    figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * rows)
     ax = figure.add_subplot()
-    blue: dict[str, Any] = {"cmap": "Blues", "norm": Normalize(0.0, 1.0)}
     orange = style.COLOURS[1]
     thick = 0.84  # of the distance between rows
-    for row, (column, entry) in enumerate(shown.items()):
-        used = np.abs(ratios.values[:, column])
-        cells = 0.5 * (used[1:] + used[:-1])[None]
+    for row, entry in enumerate(found):
+        part = used[entry.label]
+        cells = 0.5 * (part[1:] + part[:-1])[None]
         edges = (row - 0.5 * thick, row + 0.5 * thick)
-        ax.pcolormesh(ratios.t, edges, cells, shading="flat", rasterized=True, **blue)
+        ax.pcolormesh(
+            ratios.t,
+            edges,
+            cells,
+            cmap="Blues",
+            vmin=0.0,
+            vmax=1.0,
+            shading="flat",
+            rasterized=True,
+        )
         spans = [(active.begin, active.end - active.begin) for active in entry.active]
         ax.broken_barh(spans, (edges[0], thick), color=orange, linewidth=0.8)
     dress(ax, trajectory, "")
     style.mark_phases(ax, trajectory.phases, labels=False)
-    ax.set_ylim(max(len(shown), 1) - 0.5, -0.5)
-    labels = [entry.label for entry in shown.values()]
-    names = [f"{style.plain(label.subject)} {label.kind}" for label in labels]
-    ax.set_yticks(range(len(shown)), names)
+    ax.set_ylim(rows - 0.5, -0.5)
+    ax.set_yticks(range(len(found)), [style.plain(str(each.label)) for each in found])
     ax.tick_params(axis="y", length=0.0)
-    if not shown:
+    if not found:
         style.write(ax, 0.5, 0.5, "no limit is used by 50 % or more", ha="center")
-    bar = figure.colorbar(ScalarMappable(**blue), ax=ax, pad=0.01, fraction=0.03)
+    blue = ScalarMappable(Normalize(0.0, 1.0), "Blues")
+    bar = figure.colorbar(blue, ax=ax, pad=0.01, fraction=0.03)
     bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
     bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)
     words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond, with ripple down to {100.0 * RIPPLE:g} %"

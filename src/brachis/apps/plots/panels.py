@@ -39,8 +39,8 @@ class Curve:
     values : (K,) ndarray
     lower, upper : float or (K,) ndarray
         Limits; infinite without one.
-    centre : float
-        Value that uses nothing of the limits: zero, or the middle of a range of positions.
+    is_range : bool
+        Whether the limits are the ends of a range, whose middle uses nothing of them; otherwise zero does.
     """
 
     name: str
@@ -48,19 +48,19 @@ class Curve:
     values: np.ndarray
     lower: Bound = -np.inf
     upper: Bound = np.inf
-    centre: float = 0.0
+    is_range: bool = False
 
     @property
     def is_limited(self) -> bool:
         """Whether it has limits in both directions at all times."""
-        return bool(np.isfinite(self.lower).all() and np.isfinite(self.upper).all())
+        return bool(np.all(np.isfinite(self.upper - self.lower)))
 
     @property
     def ratios(self) -> np.ndarray:
         """Values over the limits of their directions, both from the centre, (K,); of a curve that has both."""
-        away = self.values - self.centre
-        above = self.upper - self.centre
-        return away / np.where(away > 0.0, above, self.centre - self.lower)
+        centre = 0.5 * self.lower + 0.5 * self.upper if self.is_range else 0.0
+        away = self.values - centre
+        return away / np.where(away > 0.0, self.upper - centre, centre - self.lower)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +161,7 @@ class Row:
     ratio_title : str
         Title of the values over their limits if it is not ``... / limit``.
     is_range : bool
-        Whether the limits are the ends of ranges, whose middle uses nothing of them.
+        See `Curve`.
     only_if_limited : bool
         Whether the row is of interest only if the robot limits it.
     unit : str or None
@@ -301,25 +301,24 @@ def _joint_panels(
     row = PANELS[name]
     robot = trajectory.robot
     lower, upper = robot.limits.both_ways(name)
-    middle = np.zeros(robot.n)
-    if row.is_range:
-        is_range = np.isfinite(lower) & np.isfinite(upper)
-        middle[is_range] = 0.5 * lower[is_range] + 0.5 * upper[is_range]
     columns = row.values(trajectory, samples).T
+    names = trajectory.joint_names
     found = []
     for base, is_shown in (("rad", robot.revolute), ("m", ~robot.revolute)):
         unit, factor = shown_unit(UNITS[name][base], degrees=degrees)
         curves = []
         for joint in np.flatnonzero(is_shown).tolist():
-            scaled = (factor * each[joint] for each in (columns, lower, upper, middle))
-            curves.append(Curve(trajectory.joint_names[joint], joint, *scaled))
-        if not curves:
-            continue
-        own = row.prismatic if base == "m" else None
-        title, symbol = own or (name, row.symbol)
-        unit = unit.replace("^2", "²").replace("^3", "³")
-        ratio = row.ratio_title or f"{title} / limit"
-        found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
+            values, low, high = (
+                factor * each[joint] for each in (columns, lower, upper)
+            )
+            curve = Curve(names[joint], joint, values, low, high, row.is_range)
+            curves.append(curve)
+        if curves:
+            own = row.prismatic if base == "m" else None
+            title, symbol = own or (name, row.symbol)
+            unit = unit.replace("^2", "²").replace("^3", "³")
+            ratio = row.ratio_title or f"{title} / limit"
+            found.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
     return found
 
 
@@ -348,27 +347,24 @@ def ratio_panel(
     """
     subjects = [label.subject for label in ratios.labels]
     order = list(dict.fromkeys((*trajectory.joint_names, *subjects)))
-    shown = [k for k, label in enumerate(ratios.labels) if label.axis in titles]
-    if len(shown) > MOST_CURVES:
-        nearest = np.abs(ratios.values[:, shown]).max(axis=0)
-        shown = np.array(shown)[np.argsort(-nearest)[:MOST_CURVES]].tolist()
-    values = ratios.values[:, shown]
-    is_signed = values.min() < 0.0
+    peaks = np.abs(ratios.values).max(axis=0)
+    chosen = [k for k, label in enumerate(ratios.labels) if label.axis in titles]
+    nearest = sorted(chosen, key=lambda k: -peaks[k])[:MOST_CURVES]
+    shown = sorted((order.index(subjects[k]), k) for k in nearest)
+    is_signed = ratios.values[:, nearest].min() < 0.0
     lower = -1.0 if is_signed else -np.inf
-    curves = []
-    for k, column in zip(shown, values.T, strict=True):
-        number = order.index(subjects[k])
-        curves.append(Curve(subjects[k], number, column, lower, 1.0))
-    curves.sort(key=lambda curve: curve.style)
+    curves = [
+        Curve(subjects[k], number, ratios.values[:, k], lower, 1.0)
+        for number, k in shown
+    ]
     title = ", ".join(titles)
-    top = 1.15 * max(1.0, float(np.abs(values).max()))
+    top = 1.15 * max(1.0, *peaks[nearest].tolist())
     return Panel(
         title,
         symbol or title,
         "",
         ratios.t,
         tuple(curves),
-        ratio_title=title,
         is_ratio=True,
         ends=(-top if is_signed else -0.05 * top, top),
     )

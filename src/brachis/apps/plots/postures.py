@@ -211,13 +211,12 @@ def _draw_floor(ax: Any, z: float) -> None:
     """Draw a grid of the ticks on the floor, up to the edges of the axes."""
     x = ax.get_xlim()
     y = ax.get_ylim()
+    grid = np.meshgrid(
+        np.union1d(x, np.clip(ax.get_xticks(), *x)),
+        np.union1d(y, np.clip(ax.get_yticks(), *y)),
+    )
     look = {"color": style.FAINT, "linewidth": 0.6, "zorder": 0.1, "gid": "floor"}
-    for tick in (*x, *ax.get_xticks()):
-        if x[0] <= tick <= x[1]:
-            ax.plot([tick, tick], y, z, **look)
-    for tick in (*y, *ax.get_yticks()):
-        if y[0] <= tick <= y[1]:
-            ax.plot(x, [tick, tick], z, **look)
+    ax.plot_wireframe(*grid, np.full_like(grid[0], z), **look)
     ax.set(xlim=x, ylim=y)
 
 

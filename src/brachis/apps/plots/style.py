@@ -24,15 +24,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = ("png", "pdf", "svg")
-"""Formats of `save_figure`."""
-
 _DPI = 300
 _METADATA: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
+SUFFIXES = tuple(_METADATA)
+"""Formats of `save_figure`."""
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
@@ -133,15 +132,15 @@ LINE_WIDTH = 1.2
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's colours, which colour-blind readers can distinguish; without yellow, which is too faint on white."""
-LINE_STYLES: tuple[Any, ...] = (
-    "-",
-    (0, (6.0, 1.6)),
-    (0, (1.2, 1.2)),
-    (0, (6.0, 1.6, 1.2, 1.6)),
-    (0, (2.6, 1.2)),
-    (0, (6.0, 1.3, 1.2, 1.3, 1.2, 1.3)),
+DASHES: tuple[tuple[float, ...], ...] = (
+    (),
+    (6.0, 1.6),
+    (1.2, 1.2),
+    (6.0, 1.6, 1.2, 1.6),
+    (2.6, 1.2),
+    (6.0, 1.3, 1.2, 1.3, 1.2, 1.3),
 )
-"""Line styles that differ in print without colours; one fewer than colours, so that joints of long chains differ."""
+"""Dashes that differ in print without colours; one fewer than colours, so that joints of long chains differ."""
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
 """Hatchings of bars that differ in print without colours."""
 LIMIT: dict[str, Any] = {
@@ -167,7 +166,7 @@ def joint_style(joint: int) -> dict[str, Any]:
     """Line properties of the joint with this index: a colour and, for print in greys, a line style."""
     return {
         "color": COLOURS[joint % len(COLOURS)],
-        "linestyle": LINE_STYLES[joint % len(LINE_STYLES)],
+        "linestyle": (0.0, DASHES[joint % len(DASHES)]),
         "linewidth": LINE_WIDTH,
     }
 
@@ -199,8 +198,8 @@ def mark_phases(ax: Axes, phases: Sequence[MotionPhase], *, labels: bool) -> Non
     for number, phase in enumerate(phases, start=1):
         if phase.duration < 0.06 * phases[-1].end:
             continue
-        speed = f"{phase.speed} m/s"
-        text = {"move": str(number), "given speed": speed}.get(phase.kind, phase.kind)
+        texts = {"move": str(number), "given speed": f"{phase.speed} m/s"}
+        text = texts.get(phase.kind, phase.kind)
         place = 0.5 * (phase.begin + phase.end) / phases[-1].end
         write(ax, place, 0.98, text, ha="center", va="top", color=GREY)
 

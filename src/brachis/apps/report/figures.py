@@ -30,9 +30,8 @@ Figure = dict[str, Any]
 
 def encode(values: np.ndarray) -> dict[str, Any]:
     """Write an array as Plotly reads it: single precision, base64."""
-    data = np.ascontiguousarray(values, dtype="<f4")
-    shape = {"shape": ",".join(map(str, data.shape))} if data.ndim > 1 else {}
-    return {"dtype": "f4", "bdata": base64.b64encode(data.tobytes()).decode(), **shape}
+    data = base64.b64encode(values.astype("<f4").tobytes()).decode()
+    return {"dtype": "f4", "shape": ",".join(map(str, values.shape)), "bdata": data}
 
 
 def motion_figure(motion: ReportedMotion) -> Figure:
@@ -43,8 +42,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     """
     trajectory = motion.trajectory
     samples = motion.samples
-    rows = joint_rows_of(trajectory)
-    panels = panels_of(trajectory, samples, *rows, degrees=motion.degrees)
+    panels = list(motion.panels)
     over_limits = torque_panels(trajectory, samples, motion.ratios)
     panels += [panel for panel in over_limits if panel.is_ratio]
     panels += panels_of(trajectory, samples, *tool_rows_of(trajectory))
@@ -78,10 +76,8 @@ def _traces(
     look = style.joint_style(curve.style)
     shared = {"yaxis": axis, "name": curve.name, "legendrank": curve.style}
     hover = f"%{{y:.4g}} {panel.unit}".rstrip()
-    dash = "solid"
-    if isinstance(look["linestyle"], tuple):  # of Matplotlib: offset and lengths
-        lengths = look["linestyle"][1]
-        dash = ",".join(f"{1.8 * length:.1f}px" for length in lengths)
+    lengths = look["linestyle"][1]
+    dash = ",".join(f"{1.8 * length:.1f}px" for length in lengths) or "solid"
     line = {
         **shared,
         "x": encode(panel.t),
@@ -97,27 +93,25 @@ def _traces(
     line["hovertemplate"] = f"{hover}<extra>{name}</extra>"
     traces = [line]
     for limit in (curve.lower, curve.upper):
-        if not np.isfinite(limit).any():
-            continue
-        t = panel.t if np.ndim(limit) else panel.t[[0, -1]]
-        dashed = {
-            **shared,
-            "x": encode(t),
-            "y": encode(np.where(np.isfinite(limit), limit, np.nan) + 0.0 * t),
-            "line": {"color": look["color"]},
-            "meta": "limit",
-        }
-        traces.append(dashed)
+        if np.isfinite(limit).any():
+            t = panel.t if np.ndim(limit) else panel.t[[0, -1]]
+            dashed = {
+                **shared,
+                "x": encode(t),
+                "y": encode(np.where(np.isfinite(limit), limit, np.nan) + 0.0 * t),
+                "line": {"color": look["color"]},
+                "meta": "limit",
+            }
+            traces.append(dashed)
     return traces
 
 
 def timeline_figure(motion: ReportedMotion) -> Figure:
     """Draw how near the motion is to every limit over time, a row each: blue, orange where active, red beyond it."""
     ratios = at_distinct_times(motion.ratios)
-    columns = {label: column for column, label in enumerate(ratios.labels)}
+    used = dict(zip(ratios.labels, np.abs(ratios.values.T), strict=True))
     entries = [entry for entry in motion.saturations if entry.is_half_used][::-1]
-    shown = [columns[entry.label] for entry in entries]
-    part = np.abs(ratios.values[:, shown].T)
+    part = np.array([used[entry.label] for entry in entries])
     colours = part.copy()
     for row, entry in zip(colours, entries, strict=True):
         for active in entry.active:  # ripple included

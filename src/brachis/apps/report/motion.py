@@ -16,6 +16,7 @@ from brachis.apps.bottleneck.saturation import (
     limits_in,
     saturations,
 )
+from brachis.apps.plots.panels import Panel, joint_rows_of, panels_of
 from brachis.errors import BrachisError
 from brachis.limits import Limit, describe_guarantees, limits_of
 from brachis.optimise.candidate import Candidate
@@ -35,6 +36,8 @@ class ReportedMotion:
     trajectory : Trajectory
     samples : Samples
         Dense ones.
+    panels : list of Panel
+        Of all quantities of the joints.
     verification : Verification
     ratios : LimitRatios
     saturations : tuple of Saturation
@@ -57,6 +60,7 @@ class ReportedMotion:
 
     trajectory: Trajectory
     samples: Samples
+    panels: list[Panel]
     verification: Verification
     ratios: LimitRatios
     saturations: tuple[Saturation, ...]
@@ -93,9 +97,12 @@ def reported_motion(
     except BrachisError as error:
         unknown = f"What the limits cost is not known: {error}"
         held_back = [*write_active(found), unknown]
+    samples = dense_samples(trajectory)
+    rows = joint_rows_of(trajectory)
     return ReportedMotion(
         trajectory=trajectory,
-        samples=dense_samples(trajectory),
+        samples=samples,
+        panels=panels_of(trajectory, samples, *rows, degrees=degrees),
         ratios=ratios,
         saturations=found,
         held_back=tuple(held_back),

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from brachis.apps.export.rows import require_library
@@ -115,7 +115,6 @@ def make_report(
     template = _template()
     plotly = _plotly()
     reported = reported_motion(motion, degrees=degrees)
-    checks = tables.check_rows(reported)
     parts = {
         "motion": motion_figure(reported),
         "timeline": timeline_figure(reported),
@@ -125,22 +124,12 @@ def make_report(
     page = template.render(
         title=title or reported.trajectory.robot.name or "motion",
         motion=reported,
-        failed=[check for check in checks if not check["passed"]],
-        checks=checks,
-        figures=tables.figures_of_merit(reported),
-        what_limits=tables.what_limits(reported),
-        joints=tables.joint_rows(reported),
+        tables=tables,
         phase_columns=(*PHASE_COLUMNS, "active limits"),
-        phases=tables.phases_with_limits(reported),
-        identity=tables.identity(reported),
         kinds=joint_rows_of(reported.trajectory),
-        pictures=list(_pictures(reported)),
-        task=tables.task_text(reported.trajectory.task),
-        versions=tables.versions(),
+        pictures=_pictures(reported),
         data=data.replace("<", "\\u003c"),  # no text ends the script element
         plotly=plotly,
-        style=_part("page.css"),
-        program=_part("page.js"),
     )
     return Report(page, reported.verification.passed)
 
@@ -158,21 +147,20 @@ def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
         yield caption, as_html(plot_fit(trajectory))
 
 
-def _part(name: str) -> str:
-    folder = resources.files("brachis.apps.report")
-    return folder.joinpath(name).read_text(encoding="utf-8")
-
-
 def _template() -> Any:
-    """Read the page's template; what is filled in is escaped unless the template marks it as safe."""
+    """Read the page's template, which includes its style and program.
+
+    What is filled in is escaped unless the template marks it as safe.
+    """
     jinja2 = require_library("jinja2", "a report", library="Jinja2", extra="report")
     environment = jinja2.Environment(
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
     )
-    return environment.from_string(_part("page.html"))
+    return environment.get_template("page.html")
 
 
 @cache

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import platform
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any
@@ -15,7 +14,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
-from brachis.apps.plots.panels import Curve, Panel, curves_of, joint_rows_of, panels_of
+from brachis.apps.plots.panels import Curve, Panel, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
 from brachis.optimise.candidate import describe_coordinates
@@ -27,50 +26,6 @@ NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
 _LISTED = 6
 """Segments of a path, and numbers of one, that are named."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A joint's extreme value of one quantity.
-
-    Attributes
-    ----------
-    value, limit : str
-        With units; the limit is empty for a joint without one.
-    share : str
-        Percentage of the limit; empty without a limit.
-    level : str
-        ``beyond``, ``at``, ``near`` or empty: how near to the limit.
-    """
-
-    value: str
-    limit: str
-    share: str
-    level: str
-
-
-@dataclass(frozen=True)
-class JointRow:
-    """What a joint does.
-
-    Attributes
-    ----------
-    name : str
-    redundant : bool
-    start, end : str
-        Positions with their unit.
-    travel : str
-        Lowest and highest position.
-    peaks : tuple of Row
-        Of every kind of quantity, the position first.
-    """
-
-    name: str
-    redundant: bool
-    start: str
-    end: str
-    travel: str
-    peaks: tuple[Row, ...]
 
 
 def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
@@ -135,26 +90,26 @@ def describe_path(task: Task) -> str:
     for segment in task.path:
         for shape, given in segment.model_dump(exclude_defaults=True).items():
             if isinstance(given, dict):
-                entries = [_entry(key, value) for key, value in given.items()]
+                entries = [
+                    f"{key.replace('_', ' ')} {_write_entry(value)}"
+                    for key, value in given.items()
+                ]
                 found.append(f"{shape.replace('_', ' ')} ({', '.join(entries)})")
     text = ", then ".join(found[:_LISTED])
     rest = len(found) - _LISTED
     return f"{text}, and {rest} more" if rest > 0 else text
 
 
-def _entry(key: str, value: object) -> str:
+def _write_entry(value: object) -> str:
     """Write an entry of a segment: short lists as they are, long ones and mappings by their length."""
     nested = (list, tuple, dict)
     if isinstance(value, float):
-        shown = f"{value:.4g}"
-    elif not isinstance(value, nested):
-        shown = _file_name(str(value))
-    elif len(value) > _LISTED or any(isinstance(each, nested) for each in value):
-        shown = f"{len(value)} entries"
-    else:
-        numbers = [f"{x:.4g}" if isinstance(x, float) else str(x) for x in value]
-        shown = f"[{', '.join(numbers)}]"
-    return f"{key.replace('_', ' ')} {shown}"
+        return f"{value:.4g}"
+    if not isinstance(value, nested):
+        return _file_name(str(value))
+    if len(value) > _LISTED or any(isinstance(each, nested) for each in value):
+        return f"{len(value)} entries"
+    return f"[{', '.join(map(_write_entry, value))}]"
 
 
 def task_text(task: Task) -> str:
@@ -200,48 +155,55 @@ def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
     return [(*row, str(each)) for row, each in zip(rows, phases, strict=True)]
 
 
-def joint_rows(motion: ReportedMotion) -> list[JointRow]:
-    """List what every joint does, in chain order."""
+def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
+    """List what every joint does, in chain order.
+
+    Returns
+    -------
+    list of dict
+        ``name``; ``redundant``; the positions ``start``, ``end`` and, from the lowest to the highest, ``travel``, with
+        their unit; ``peaks``: of every kind of quantity the extreme ``value`` with its unit, the ``limit`` and the
+        ``share`` of it, both empty without a limit, and how near it is: the ``level`` ``beyond``, ``at``, ``near`` or
+        none.
+    """
     trajectory = motion.trajectory
     tolerance = trajectory.task.refinement.tolerance
-    rows = joint_rows_of(trajectory)
-    panels = panels_of(trajectory, motion.samples, *rows, degrees=motion.degrees)
     found = []
     for name in trajectory.joint_names:
-        own = curves_of(panels, name)
+        own = curves_of(motion.panels, name)
         panel, position = own[0]
         q = position.values
         unit = panel.unit
-        row = JointRow(
-            name=name,
-            redundant=name in trajectory.redundant_joints,
-            start=f"{q[0]:z.4f} {unit}",
-            end=f"{q[-1]:z.4f} {unit}",
-            travel=f"{q.min():z.4f} to {q.max():z.4f} {unit}",
-            peaks=tuple(_peak(*each, tolerance) for each in own),
-        )
+        row = {
+            "name": name,
+            "redundant": name in trajectory.redundant_joints,
+            "start": f"{q[0]:z.4f} {unit}",
+            "end": f"{q[-1]:z.4f} {unit}",
+            "travel": f"{q.min():z.4f} to {q.max():z.4f} {unit}",
+            "peaks": [_find_peak(*each, tolerance) for each in own],
+        }
         found.append(row)
     return found
 
 
-def _peak(panel: Panel, curve: Curve, tolerance: float) -> Row:
+def _find_peak(panel: Panel, curve: Curve, tolerance: float) -> dict[str, str]:
     """Find the value of a joint that is nearest to its limit, or without a limit the largest one."""
-    if not curve.is_limited:
-        largest = curve.values[np.argmax(np.abs(curve.values))]
-        return Row(f"{_write_number(largest)} {panel.unit}", "", "", "")
-    ratios = np.abs(curve.ratios)
+    ratios = np.abs(curve.ratios if curve.is_limited else curve.values)
     worst = np.argmax(ratios)
+    value = f"{_write_number(curve.values[worst])} {panel.unit}"
+    if not curve.is_limited:
+        return {"value": value, "limit": "", "share": "", "level": ""}
     share = ratios[worst]
     limit = f"{_write_number(float(curve.upper))} {panel.unit}"
     if curve.upper != -curve.lower:
         limit = f"{_write_number(float(curve.lower))} to {limit}"
     edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", NEAR))
-    return Row(
-        value=f"{_write_number(curve.values[worst])} {panel.unit}",
-        limit=limit,
-        share=f"{100.0 * share:.1f} %",
-        level=next((level for level, edge in edges if share >= edge), ""),
-    )
+    return {
+        "value": value,
+        "limit": limit,
+        "share": f"{100.0 * share:.1f} %",
+        "level": next((level for level, edge in edges if share >= edge), ""),
+    }
 
 
 def _write_number(value: float) -> str:

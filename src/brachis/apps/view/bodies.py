@@ -1,4 +1,4 @@
-"""What is drawn of a robot: the shapes of its URDF or a skeleton, and where they are.
+"""What is drawn of a robot and its scene: the shapes of the URDF or a skeleton, and where they are.
 
 Shapes belong to the joint that moves them; joint 0 is the world, which stands still.
 """
@@ -7,28 +7,30 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+import coal
 import numpy as np
 import pinocchio as pin
 from lxml import etree
 
-from brachis.apps.view.solids import scene_meshes
 from brachis.common.files import mesh_file
+from brachis.common.words import name_first
 from brachis.errors import InputError
 from brachis.path import path_of
 from brachis.robot import Robot, task_map_of
 from brachis.robot.urdf_elements import Element, read_tree
+from brachis.scene import Solid, scene_of
+from brachis.scene.chain import Chain
 from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
     import trimesh
 
-    from brachis.apps.view.solids import Meshes
+    Meshes = dict[int, list[trimesh.Trimesh]]
 
 _COLOURS = {
     "shape": (150, 160, 172, 255),  # of a shape without a colour of its own
@@ -40,6 +42,11 @@ _COLOURS = {
 """RGBA from 0 to 255."""
 _LARGEST = 200_000_000
 """Size of all mesh files of a robot together, unpacked, bytes; readers take several times as much memory."""
+
+_FLOOR = 4.0
+"""Length and width of what is drawn of a half-space, m."""
+_THIN = 0.002
+"""Its thickness, m."""
 
 
 def link_shapes(
@@ -67,44 +74,29 @@ def link_shapes(
     absent = []
     room = _LARGEST
     materials = tree.robot.findall("material")
-    visuals = [
-        (name, visual)
-        for name, link in tree.links.items()
-        for visual in link.findall("visual")
-    ]
-    for name, visual in visuals:
-        files = _find_meshes(visual, folder)
-        missing = [file for file, path in files.items() if path is None]
-        absent += missing
-        if missing:
+    for visual in tree.robot.iterfind("link/visual"):
+        name = visual.getparent().get("name")
+        meshes = list(visual.iter("mesh"))
+        files = [str(mesh.get("filename")) for mesh in meshes]
+        paths = [path for file in files if (path := mesh_file(file, folder))]
+        if len(paths) < len(files):
+            absent += files
             continue
         try:
-            for path in files.values():
-                room -= _check_size(Path(str(path)), room)
-            meshes = _meshes(name, visual, materials)
-            shapes.setdefault(name, []).extend(meshes)
+            for mesh, path in zip(meshes, paths, strict=True):
+                room -= _check_size(path, room)
+                mesh.set("filename", str(path))
+            found = _meshes(name, visual, materials)
+            shapes.setdefault(name, []).extend(found)
         except InputError as error:
             unread.append(f"{name}: {error}")
         except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
             unread.append(f"{name}: {type(error).__name__}: {error}")
     if absent:
-        count = f"{len(absent)} mesh files are" if len(absent) > 1 else "a mesh file is"
-        more = ", ..." if len(absent) > 1 else ""
-        where = ""
-        if absent[0].startswith("package://"):
-            where = "; ROS_PACKAGE_PATH may name the folder of its package"
-        unread.insert(0, f"{count} missing: {absent[0]}{more}{where}")
+        hint = "ROS_PACKAGE_PATH may name the folder of a package"
+        names = name_first(absent, ", ")
+        unread.insert(0, f"missing mesh files: {names}; {hint}")
     return shapes, [reason[:500] for reason in unread]
-
-
-def _find_meshes(visual: Element, folder: Path) -> dict[str, Path | None]:
-    """Put the paths of a visual's mesh files in the place of their names; return them by name, None if missing."""
-    found = {}
-    for mesh in visual.iter("mesh"):
-        name = str(mesh.get("filename"))
-        found[name] = mesh_file(name, folder)
-        mesh.set("filename", str(found[name]))
-    return found
 
 
 def _check_size(path: Path, room: int) -> int:
@@ -158,12 +150,10 @@ def _meshes(
         filename_handler=yourdfpy.filename_handler_null,
     )
     found = []
-    for node in read.scene.graph.nodes_geometry:
-        placement, geometry = read.scene.graph.get(node)
-        mesh = read.scene.geometry[geometry]
+    for mesh in read.scene.dump():
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
             bare = trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual)
-            found.append(_place(bare, placement))
+            found.append(_paint(bare))
     if not found or not all(np.isfinite(mesh.vertices).all() for mesh in found):
         file = next((mesh.get("filename") for mesh in visual.iter("mesh")), None)
         raise InputError(
@@ -172,16 +162,15 @@ def _meshes(
     return found
 
 
-def _place(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
-    """Place a mesh, and colour it unless it has a picture on it."""
+def _paint(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Colour a mesh unless it has a picture on it."""
     # A material, or colours of the faces.
     look = getattr(mesh.visual, "material", mesh.visual)
     pictures = [getattr(look, name, None) for name in ("baseColorTexture", "image")]
-    if pictures == [None, None]:
-        own = tuple(map(int, look.main_color)) if mesh.visual.defined else None
-        mesh = with_colour(mesh, own or _COLOURS["shape"])
-    mesh.apply_transform(placement)
-    return mesh
+    if pictures != [None, None]:
+        return mesh
+    own = tuple(map(int, look.main_color)) if mesh.visual.defined else None
+    return with_colour(mesh, own or _COLOURS["shape"])
 
 
 def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
@@ -207,10 +196,12 @@ def placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     quaternions : (K, n + 2, 4) ndarray
         w, x, y, z.
     """
-    frames = np.empty((len(q), robot.n + 2, 7))
-    for rows, data in zip(frames, robot.place_joints(q), strict=True):
-        placed = (*data.oMi, data.oMf[robot.frame_id])
-        rows[:] = [pin.SE3ToXYZQUAT(placement) for placement in placed]
+    tool = robot.frame_id
+    rows = [
+        [pin.SE3ToXYZQUAT(placed) for placed in (*data.oMi, data.oMf[tool])]
+        for data in robot.place_joints(q)
+    ]
+    frames = np.array(rows)
     return frames[..., :3], frames[..., [6, 3, 4, 5]]
 
 
@@ -232,8 +223,8 @@ class Bodies:
         Of the box that its joints, what they move, and the tool keep within, m.
     """
 
-    links: Mapping[int, Sequence[trimesh.Trimesh]]
-    skeleton: Mapping[int, Sequence[trimesh.Trimesh]]
+    links: Meshes
+    skeleton: Meshes
     unread: tuple[str, ...]
     box: np.ndarray
     moving_box: np.ndarray
@@ -262,7 +253,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         links.setdefault(joint, []).extend(coloured)
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     positions, quaternions = placements(robot, q)
-    size = np.ptp(positions.reshape(-1, 3), axis=0).max()
+    size = np.ptp(positions, axis=(0, 1)).max()
     skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
     moving = [positions[:, 1:].reshape(-1, 3)]
     still: list[np.ndarray] = []
@@ -286,6 +277,9 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
     model = robot.model
     base = model.getFrameId(robot.base_frame, pin.FrameType.BODY)
     begin = model.frames[base].placement.translation
+    ranges = robot.limits.both_ways("position")
+    used = trajectory.q.min(axis=0), trajectory.q.max(axis=0)
+    ranges = np.where(np.isfinite(ranges), ranges, used)
     drawn: Meshes = {}
 
     def draw(joint: int, mesh: trimesh.Trimesh, kind: str) -> None:
@@ -301,30 +295,22 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
             rod = trimesh.creation.cylinder(thick * radius, segment=ends, sections=24)
             draw(joint, rod, kind)
 
-    for joint in range(robot.n):
-        placement = model.jointPlacements[joint + 1]
-        subspace = model.joints[joint + 1].createData().S.reshape(6, -1)
-        axis = subspace[:3, 0] + subspace[3:, 0]  # one of them is zero
-        draw_rod(joint, begin, placement.translation, 1.0, "bone")
-        if robot.revolute[joint]:
+    chain = Chain.of(model)
+    for joint, axis in enumerate(chain.axes):
+        origin = chain.placements[joint, :3, 3]
+        draw_rod(joint, begin, origin, 1.0, "bone")
+        if chain.revolute[joint]:
             half = 2.0 * radius * axis
             draw_rod(joint + 1, -half, half, 1.7, "joint")
         else:
-            low, high = _range(trajectory, joint)
-            rail = (placement.act(axis * low), placement.act(axis * high))
-            draw_rod(joint, *rail, 0.5, "axis")
+            direction = chain.placements[joint, :3, :3] @ axis
+            low, high = origin + np.outer(ranges[:, joint], direction)
+            draw_rod(joint, low, high, 0.5, "axis")
             draw(joint + 1, trimesh.creation.box((3.0 * radius,) * 3), "joint")
         begin = np.zeros(3)
     tool = model.frames[robot.frame_id]
     draw_rod(tool.parentJoint, begin, tool.placement.translation, 1.0, "bone")
     return drawn
-
-
-def _range(trajectory: Trajectory, joint: int) -> np.ndarray:
-    """Positions between which a prismatic joint can move, (2,), m; ends that it does not have are the motion's."""
-    q = trajectory.q[:, joint]
-    ends = trajectory.robot.limits.both_ways("position")[:, joint]
-    return np.where(np.isfinite(ends), ends, [q.min(), q.max()])
 
 
 def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
@@ -337,3 +323,40 @@ def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
         target = path.sample(np.clip(samples.s, 0.0, 1.0)).target
         points[:, axes] = target[:, : len(axes)]
     return points
+
+
+def scene_meshes(trajectory: Trajectory) -> Meshes:
+    """Make the meshes of the bodies of a task's scene, without the robot's own, in the frames of their joints, m."""
+    task = trajectory.task
+    found = scene_of(trajectory.robot, task)
+    meshes: Meshes = {}
+    if found is None:
+        return meshes
+    for number, solid in enumerate(found.solids[found.own :], found.own):
+        mesh = _mesh_of(solid)
+        mesh.apply_transform(found.placements[number])
+        meshes.setdefault(int(found.joints[number]), []).append(mesh)
+    return meshes
+
+
+def _mesh_of(solid: Solid) -> trimesh.Trimesh:
+    """Make the mesh of a solid in its own axes."""
+    import trimesh
+
+    shape = solid.geometry
+    make = trimesh.creation
+    if isinstance(shape, coal.Box):
+        return make.box(2.0 * shape.halfSide)
+    if isinstance(shape, coal.Sphere):
+        return make.icosphere(radius=shape.radius)
+    if isinstance(shape, coal.Cylinder):
+        return make.cylinder(shape.radius, height=2.0 * shape.halfLength)
+    if isinstance(shape, coal.Capsule):
+        mesh = make.capsule(2.0 * shape.halfLength, shape.radius)
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))
+        return mesh
+    if isinstance(shape, coal.Halfspace):
+        placed = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], shape.n)
+        placed[:3, 3] = shape.n * (shape.d - 0.5 * _THIN)
+        return make.box([_FLOOR, _FLOOR, _THIN], placed)
+    return trimesh.Trimesh(np.array(shape.points())).convex_hull

@@ -1,14 +1,10 @@
-"""The viewer's controls, tables, clock, and plots with a line at the instant shown."""
+"""The viewer's clock, and its plots with a line at the instant shown."""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from brachis.apps.bottleneck.saturation import limit_ratios
 from brachis.apps.plots import style
@@ -20,9 +16,6 @@ from brachis.apps.plots.panels import (
     titles_of,
     tool_rows_of,
 )
-from brachis.apps.view import tables
-from brachis.apps.view.scene import Scene, speed_colours
-from brachis.errors import BrachisError
 from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
@@ -65,51 +58,37 @@ def shown_panels(
     return [*found, *panels_of(trajectory, samples, *tool_rows_of(trajectory))]
 
 
-class Chart:
-    """One plot over time.
-
-    Parameters
-    ----------
-    gui : viser.GuiApi
-        Where it is added.
-    panel : Panel
-    """
-
-    def __init__(self, gui: viser.GuiApi, panel: Panel) -> None:
-        self._t_end = panel.t[-1]
-        data = [panel.t]
-        series: list[uplot.Series] = [{"label": "time (s)"}]
-        for limit, _ in panel.near_limits():
-            data.append(limit)
-            series.append(_series("limit", style.GREY, (5.0, 4.0), 1.0))
-        for curve in panel.curves:
-            data.append(curve.values)
-            series.append(_series(curve.name, *look(curve.style)))
-        gui.add_html(_heading(panel))
-        gui.add_uplot(
-            tuple(data),
-            tuple(series),
-            scales={"x": {"time": False}, "y": {"range": panel.view()}},
-            axes=(
-                {
-                    "font": _FONT,
-                    "size": _PIXELS["below"] - _PIXELS["label"],
-                    "label": "time (s)",
-                    "labelSize": _PIXELS["label"],
-                    "labelFont": _FONT,
-                },
-                {"font": _FONT, "size": _PIXELS["left"]},
-            ),
-            legend={"show": False},
-            cursor={"drag": {"x": False, "y": False, "setScale": False}},
-            height=_PIXELS["height"],
-            padding=(_PIXELS["above"], _PIXELS["right"], 0, 0),
-        )
-        self._line = gui.add_html(_line(0.0))
-
-    def mark(self, t: float) -> None:
-        """Draw the line at time `t`, s."""
-        self._line.content = _line(t / self._t_end)
+def add_plot(gui: viser.GuiApi, panel: Panel) -> viser.GuiHtmlHandle:
+    """Add one plot over time; return what holds the line at the instant shown."""
+    data = [panel.t]
+    series: list[uplot.Series] = [{"label": "time (s)"}]
+    for limit, _ in panel.near_limits():
+        data.append(limit)
+        series.append(_series("limit", style.GREY, (5.0, 4.0), 1.0))
+    for curve in panel.curves:
+        data.append(curve.values)
+        series.append(_series(curve.name, *look(curve.style)))
+    gui.add_html(_heading(panel))
+    gui.add_uplot(
+        tuple(data),
+        tuple(series),
+        scales={"x": {"time": False}, "y": {"range": panel.view()}},
+        axes=(
+            {
+                "font": _FONT,
+                "size": _PIXELS["below"] - _PIXELS["label"],
+                "label": "time (s)",
+                "labelSize": _PIXELS["label"],
+                "labelFont": _FONT,
+            },
+            {"font": _FONT, "size": _PIXELS["left"]},
+        ),
+        legend={"show": False},
+        cursor={"drag": {"x": False, "y": False, "setScale": False}},
+        height=_PIXELS["height"],
+        padding=(_PIXELS["above"], _PIXELS["right"], 0, 0),
+    )
+    return gui.add_html("")
 
 
 def _series(
@@ -125,7 +104,7 @@ def _series(
     }
 
 
-def _line(part: float) -> str:
+def line_at(part: float) -> str:
     """Line over the plot above it, at a part of its width; a plot whose data are replaced so often would blink."""
     before = _PIXELS["outside left"] + _PIXELS["left"]
     around = _PIXELS["outside"] + _PIXELS["left"] + _PIXELS["right"]
@@ -143,10 +122,8 @@ def _line(part: float) -> str:
 def look(number: int) -> tuple[str, tuple[float, ...]]:
     """Colour and dashes of the curve with this number: solid until all colours are used."""
     turn, colour = divmod(number, len(style.COLOURS))
-    dashes = style.LINE_STYLES[turn % len(style.LINE_STYLES)]
-    solid = isinstance(dashes, str)
-    lengths = () if solid else tuple(2.0 * length for length in dashes[1])
-    return style.COLOURS[colour], lengths
+    lengths = style.DASHES[turn % len(style.DASHES)]
+    return style.COLOURS[colour], tuple(2.0 * length for length in lengths)
 
 
 def _heading(panel: Panel) -> str:
@@ -229,156 +206,3 @@ class Playback:
         self.playing = not self.playing
         if self.playing and self.time >= self.t_end:
             self.time = 0.0
-
-
-class Controls:
-    """Controls, tables and plots at the sides of the scene.
-
-    Parameters
-    ----------
-    server : viser.ViserServer
-    trajectory : Trajectory
-    scene : Scene
-    playback : Playback
-        Which the controls set.
-    show : callable
-        Called when the user has chosen another instant.
-    candidates : sequence of mapping
-        What the search looked at, as `Candidate.to_dict` gives it.
-    verified : bool or None
-        None if it is not known.
-    degrees : bool
-        Whether angles are in degrees.
-    """
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        trajectory: Trajectory,
-        scene: Scene,
-        playback: Playback,
-        show: Callable[[], None],
-        candidates: Sequence[Mapping[str, Any]],
-        *,
-        verified: bool | None,
-        degrees: bool,
-    ) -> None:
-        self._degrees = degrees
-        self._gui = server.gui
-        self._trajectory = trajectory
-        self._scene = scene
-        self._playback = playback
-        self._show = show
-        self._gui.configure_theme(show_logo=False, show_share_button=False)
-        notes = [f"not shown: {reason}" for reason in scene.bodies.unread]
-        self._gui.add_html(tables.summary(trajectory, notes, verified=verified))
-        self._add_controls()
-        colours = speed_colours(np.linspace(0.0, 1.0, 9)).tolist()
-        stops = [f"rgb{tuple(colour)}" for colour in colours]
-        fastest = scene.samples.tool_speed.max()
-        self._gui.add_html(tables.speed_legend(stops, fastest))
-        self._state = self._gui.add_html("")
-        self._gui.add_html(tables.phases_table(trajectory))
-        self._add_switches()
-        self._charts = self._add_plots(candidates)
-        self.update()
-
-    def update(self) -> None:
-        """Show the instant of the playback in the slider, the table and the plots."""
-        t = self._playback.time
-        self.follow()
-        now = self._trajectory.at(np.array([t]))
-        table = tables.state_table(self._trajectory, now, degrees=self._degrees)
-        self._state.content = table
-        for chart in self._charts:
-            chart.mark(t)
-
-    def follow(self) -> None:
-        """Let the slider and the button follow the playback."""
-        self._slider.value = round(self._playback.time, self._digits)
-        self._button.label = "Pause" if self._playback.playing else "Play"
-
-    def _add_controls(self) -> None:
-        """Add slider, button and speed."""
-        t_end = self._playback.t_end
-        step = float(10.0 ** np.floor(np.log10(t_end / 200)))
-        self._digits = max(0, round(-np.log10(step)))
-        inner = [(float(t), "") for t in self._trajectory.phase_ends[:-1]]
-        ends = ((0.0, "0"), *inner, (t_end, f"{t_end:.4g}"))
-        self._slider = self._gui.add_slider(
-            "time (s)", 0.0, t_end, step, initial_value=0.0, marks=ends
-        )
-        self._slider.on_update(self._drag)
-        self._button = self._gui.add_button("Pause")
-        self._button.on_click(self._toggle)
-        self._rates = {f"{rate:g} x real time": rate for rate in RATES}
-        rate = f"{self._playback.rate:g} x real time"
-        rates = self._gui.add_dropdown("speed", tuple(self._rates), initial_value=rate)
-        rates.on_update(self._set_rate)
-        repeats = self._gui.add_checkbox("again and again", self._playback.repeats)
-        repeats.on_update(self._set_repeats)
-        hint = "The motion as one HTML page"
-        download = self._gui.add_button("Download the report", hint=hint)
-        download.on_click(self._send_report)
-
-    def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-        """Show what the user chose with the slider, and stay there."""
-        if event.client is not None:  # else the slider follows the playback
-            self._playback.go_to(event.target.value)
-            self._show()
-
-    def _toggle(self, _event: object) -> None:
-        self._playback.toggle()
-        self._show()
-
-    def _set_rate(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
-        self._playback.rate = self._rates[event.target.value]
-
-    def _set_repeats(self, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
-        self._playback.repeats = event.target.value
-
-    def _send_report(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-        """Make the report for whoever asks, as a file that the browser keeps."""
-        from brachis.apps.report import make_report
-
-        if event.client is None:
-            return
-        try:
-            page = make_report(self._trajectory, degrees=self._degrees)
-        except BrachisError as error:
-            event.client.add_notification("The report cannot be made", str(error))
-            return
-        event.client.send_file_download(
-            "report.html", page.content, save_immediately=True
-        )
-
-    def _add_switches(self) -> None:
-        """Add a box to tick for every layer of the scene."""
-        title = f"show (a cell of the grid is {self._scene.cell:g} m)"
-        with self._gui.add_folder(title, expand_by_default=False):
-            for name, handles in self._scene.layers.items():
-                if handles:
-                    box = self._gui.add_checkbox(name, handles[0].visible)
-                    box.on_update(partial(self._switch, name))
-
-    def _switch(
-        self, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]
-    ) -> None:
-        """Show or hide a layer of the scene."""
-        self._scene.set_visible(name, visible=event.target.value)
-
-    def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> list[Chart]:
-        """Add a panel with the plots and the list of candidates."""
-        panel = self._gui.add_panel()
-        with panel.add_tab("limits"):
-            samples = self._scene.samples
-            shown = shown_panels(self._trajectory, samples, degrees=self._degrees)
-            charts = [Chart(self._gui, each) for each in shown]
-        count = f" ({len(candidates)})" if candidates else ""
-        with panel.add_tab(f"candidates{count}"):
-            self._gui.add_html(tables.candidates_table(candidates))
-        panel.dock_left()
-        panel.set_width(350)
-        self._gui.main_panel.dock_right()
-        self._gui.main_panel.set_width(400)
-        return charts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,21 +15,6 @@ from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import viser
-
-    Layer = list[viser.SceneNodeHandle]
-
-LAYERS = (
-    "robot",
-    "skeleton",
-    "ghost postures",
-    "path",
-    "tool trace",
-    "tool frame",
-    "world frame",
-    "ground",
-    "closest pair",
-)
-"""What can be shown and hidden."""
 
 
 class Scene:
@@ -45,7 +31,7 @@ class Scene:
         The motion at even times.
     bodies : Bodies
     layers : dict of str to list of handles
-        What can be shown and hidden, by `LAYERS`.
+        What can be shown and hidden, by its name.
     cell : float
         Size of the cells of the ground's grid, m.
     """
@@ -65,49 +51,44 @@ class Scene:
             ground_color=(120, 120, 130),
             intensity=2.0,
         )
-        self.layers: dict[str, Layer] = {name: [] for name in LAYERS}
+        self.layers: dict[str, list[viser.SceneNodeHandle]] = defaultdict(list)
         self._frames = [
             self._api.add_frame(f"/joint {k}", show_axes=False)
             for k in range(self._robot.n + 1)
         ]
-        self._tool = self._frame("/tool", 0.1)
-        self.layers["tool frame"].append(self._tool)
-        self.layers["world frame"].append(self._frame("/world", 0.15))
         self._draw_bodies()
         self._draw_ghosts()
         self._draw_path()
         self._draw_trace()
-        self.cell = self._draw_ground()
+        tool = self._frame("/tool", 0.1)
+        self._frames.append(tool)
+        self.layers["tool frame"].append(tool)
+        self.layers["world frame"].append(self._frame("/world", 0.15))
+        self._draw_ground()
         self._cell = scene_of(self._robot, trajectory.task)
-        self._chain = Chain.of(self._robot.model)
         if self._cell is not None and len(self._cell.pairs):
-            self._draw_closest()
-        else:
-            del self.layers["closest pair"]
+            line = (np.zeros((2, 3)), (200, 30, 30), 3.0)
+            self._draw_line("closest pair", "/closest/line", *line)
+            label = self._api.add_label("/closest/label", "")
+            self.layers["closest pair"].append(label)
         hidden = "skeleton" if self.bodies.shows_links else "robot"
         for name in ("world frame", hidden):
             self.set_visible(name, visible=False)
         self._aim(server)
 
     def set_visible(self, name: str, *, visible: bool) -> None:
-        """Show or hide one of `LAYERS`."""
+        """Show or hide one of the `layers`."""
         for handle in self.layers[name]:
             handle.visible = visible
 
     def show(self, q: np.ndarray) -> None:
         """Move the robot into the posture `q`, (n,)."""
         positions, quaternions = placements(self._robot, q[None])
-        for k, handle in enumerate((*self._frames, self._tool)):
+        for k, handle in enumerate(self._frames):
             handle.position = positions[0, k]
             handle.wxyz = quaternions[0, k]
         if "closest pair" in self.layers:
             self._show_closest(q)
-
-    def _draw_closest(self) -> None:
-        """Draw the line between the closest bodies, and a label."""
-        layer = "closest pair"
-        self._draw_line(layer, "/closest/line", np.zeros((2, 3)), (200, 30, 30), 3.0)
-        self.layers[layer].append(self._api.add_label("/closest/label", ""))
 
     def _show_closest(self, q: np.ndarray) -> None:
         """Move the line to the closest bodies in a posture, (n,), and write their distance."""
@@ -115,7 +96,7 @@ class Scene:
         line, label = self.layers["closest pair"]
         if cell is None or not line.visible:
             return
-        found = cell.find_closest(self._chain.place(q[None]))
+        found = cell.find_closest(Chain.of(self._robot.model).place(q[None]))
         line.points = found.points
         label.position = found.points[0].mean(axis=0)
         distance = 1e3 * found.distance[0]
@@ -153,15 +134,14 @@ class Scene:
         shades = np.linspace([190, 214, 235], [25, 75, 125], 6).astype(np.uint8)
         for joint, meshes in bodies.items():
             positions, quaternions = (each[:, joint] for each in frames)
-            turned = np.ptp(quaternions, axis=0).max()
-            if max(turned, np.ptp(positions, axis=0).max()) < 1e-9:  # it stands still
+            placed = np.hstack([positions, quaternions])
+            if np.ptp(placed, axis=0).max() < 1e-9:  # it stands still
                 continue
             coarse = [
                 mesh.convex_hull if len(mesh.faces) > 2000 else mesh for mesh in meshes
             ]
-            whole = trimesh.util.concatenate(
-                [trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse]
-            )
+            bare = [trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse]
+            whole = trimesh.util.concatenate(bare)
             handle = self._api.add_batched_meshes_simple(
                 f"/ghosts/{joint}",
                 whole.vertices,
@@ -213,18 +193,18 @@ class Scene:
         )
         self.layers[layer].append(line)
 
-    def _draw_ground(self) -> float:
-        """Draw a grid below everything; returns the size of its cells, m."""
+    def _draw_ground(self) -> None:
+        """Draw a grid below everything."""
         low, high = self.bodies.box
-        cell = float(10.0 ** np.round(np.log10(0.06 * self._size)))
-        section = 10.0 * cell
+        self.cell = float(10.0 ** np.round(np.log10(0.06 * self._size)))
+        section = 10.0 * self.cell
         width, height = section * np.ceil((high - low)[:2] / section + 1.0)
         centre = section * np.round(0.5 * (low + high)[:2] / section)
         grid = self._api.add_grid(
             "/ground",
             width=float(width),
             height=float(height),
-            cell_size=cell,
+            cell_size=self.cell,
             section_size=section,
             cell_color=(225, 225, 225),
             section_color=(170, 170, 170),
@@ -232,7 +212,6 @@ class Scene:
             position=(*centre, min(0.0, float(low[2])) - 1e-3 * self._size),
         )
         self.layers["ground"].append(grid)
-        return cell
 
     def _aim(self, server: viser.ViserServer) -> None:
         """Look at the whole motion: a planar one at its plane, any other from the side to which the arm reaches."""

@@ -8,6 +8,7 @@ import importlib.util
 import io
 import ipaddress
 import logging
+import os
 import socket
 from typing import TYPE_CHECKING
 
@@ -59,7 +60,7 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
         server = Server(host=host, port=first, label="brachis", verbose=False)
     if port and port != server.get_port():  # another process took it in between
         server.stop()
-        raise _in_use(host, port)
+        raise _cannot_listen(host, port, os.strerror(errno.EADDRINUSE))
     return server
 
 
@@ -76,11 +77,8 @@ def require_viser() -> None:
 
 def is_local(host: str) -> bool:
     """Tell whether an address that was listened on is reached from this machine alone."""
-    addresses = {
-        str(found[4][0])
-        for found in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
-    }
-    return all(ipaddress.ip_address(address).is_loopback for address in addresses)
+    found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    return all(ipaddress.ip_address(each[4][0]).is_loopback for each in found)
 
 
 def _is_of_a_page(record: logging.LogRecord) -> bool:
@@ -90,12 +88,12 @@ def _is_of_a_page(record: logging.LogRecord) -> bool:
     return record.exc_info is None or not isinstance(record.exc_info[1], InvalidMessage)
 
 
-def _in_use(host: str, port: int) -> InputError:
+def _cannot_listen(host: str, port: int, reason: str) -> InputError:
     return InputError(
-        "the port is in use",
-        where="--port",
-        found=f"{port} on {host}",
-        allowed="a free one",
+        "the viewer cannot listen on this address",
+        where="--host, --port",
+        found=f"{host}, port {port}: {reason}",
+        allowed=f"an address of this machine, for example {LOOPBACK}, or 0.0.0.0 for all of them; a free port",
         hint="Leave out --port to use the next free port",
     )
 
@@ -110,11 +108,5 @@ def _check(host: str, port: int) -> None:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         socket.create_server(found[4], family=found[0]).close()
     except (OSError, UnicodeError) as error:
-        if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
-            raise _in_use(host, port) from error
-        raise InputError(
-            "the viewer cannot listen on this address",
-            where="--host",
-            found=f"{host}, port {port}: {getattr(error, 'strerror', None) or error}",
-            allowed=f"an address of this machine, for example {LOOPBACK}, or 0.0.0.0 for all of them",
-        ) from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise _cannot_listen(host, port, reason) from error

@@ -44,7 +44,7 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     for name in trajectory.joint_names:
         own = zip(curves_of(panels, name), _STATE.values(), strict=True)
         cells = [
-            f"{_write_number(curve.values[0], digits)} {panel.unit}"
+            f"{curve.values[0]:z.{digits}f} {panel.unit}"
             for (panel, curve), digits in own
         ]
         rows.append([name, *cells])
@@ -95,11 +95,6 @@ def summary(
     }[verified]
     text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{verdict}</div>'
     return text + (_paragraph(*notes) if notes else "")
-
-
-def _write_number(value: float, digits: int) -> str:
-    """Write a number without a minus sign before zero."""
-    return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
 def _paragraph(*lines: str) -> str:

@@ -8,13 +8,28 @@ import sys
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from functools import partial
+from typing import TYPE_CHECKING, Any, Self
 
-from brachis.apps.view.panel import Controls, Playback, first_rate
-from brachis.apps.view.scene import Scene
+import numpy as np
+
+from brachis.apps.view import tables
+from brachis.apps.view.panel import (
+    RATES,
+    Playback,
+    add_plot,
+    first_rate,
+    line_at,
+    shown_panels,
+)
+from brachis.apps.view.scene import Scene, speed_colours
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
 from brachis.common import interrupts
+from brachis.errors import BrachisError
 from brachis.trajectory import Trajectory, motion_of
+
+if TYPE_CHECKING:
+    import viser
 
 
 class Viewer:
@@ -67,20 +82,13 @@ class Viewer:
             loops=trajectory.task.boundary.periodic,
         )
         self._trajectory = trajectory
+        self._degrees = degrees
         self._lock = threading.RLock()
         self._server = start_server(host, port)
+        self._gui = self._server.gui
         try:
             self._scene = Scene(self._server, trajectory)
-            self._panel = Controls(
-                self._server,
-                trajectory,
-                self._scene,
-                self.playback,
-                self.show,
-                candidates,
-                verified=verified,
-                degrees=degrees,
-            )
+            self._add_panels(candidates, verified=verified)
             self.show()
         except BaseException:
             self._server.stop()
@@ -99,7 +107,7 @@ class Viewer:
         """Show the instant of the playback."""
         with self._lock, self._server.atomic():
             self._scene.show(self._trajectory.position(self.playback.time))
-            self._panel.update()
+            self._update()
 
     def wait(self) -> None:
         """Wait until Ctrl-C, then stop."""
@@ -146,9 +154,127 @@ class Viewer:
                 self._scene.show(self._trajectory.position(t))
                 picture += 1
                 if picture % 3 == 0:
-                    self._panel.update()
+                    self._update()
                 else:
-                    self._panel.follow()
+                    self._follow()
+
+    def _add_panels(
+        self, candidates: Sequence[Mapping[str, Any]], *, verified: bool | None
+    ) -> None:
+        """Add controls, tables and plots at the sides of the scene."""
+        self._gui.configure_theme(show_logo=False, show_share_button=False)
+        notes = [f"not shown: {reason}" for reason in self._scene.bodies.unread]
+        summary = tables.summary(self._trajectory, notes, verified=verified)
+        self._gui.add_html(summary)
+        self._add_controls()
+        colours = speed_colours(np.linspace(0.0, 1.0, 9)).tolist()
+        stops = [f"rgb{tuple(colour)}" for colour in colours]
+        fastest = self._scene.samples.tool_speed.max()
+        self._gui.add_html(tables.speed_legend(stops, fastest))
+        self._state = self._gui.add_html("")
+        self._gui.add_html(tables.phases_table(self._trajectory))
+        self._add_switches()
+        self._add_plots(candidates)
+
+    def _update(self) -> None:
+        """Show the instant of the playback in the slider, the table and the plots."""
+        t = self.playback.time
+        self._follow()
+        now = self._trajectory.at(np.array([t]))
+        table = tables.state_table(self._trajectory, now, degrees=self._degrees)
+        self._state.content = table
+        line = line_at(t / self.playback.t_end)
+        for holder in self._lines:
+            holder.content = line
+
+    def _follow(self) -> None:
+        """Let the slider and the button follow the playback."""
+        self._slider.value = round(self.playback.time, self._digits)
+        self._button.label = "Pause" if self.playback.playing else "Play"
+
+    def _add_controls(self) -> None:
+        """Add slider, button and speed."""
+        t_end = self.playback.t_end
+        step = float(10.0 ** np.floor(np.log10(t_end / 200)))
+        self._digits = max(0, round(-np.log10(step)))
+        inner = [(float(t), "") for t in self._trajectory.phase_ends[:-1]]
+        ends = ((0.0, "0"), *inner, (t_end, f"{t_end:.4g}"))
+        self._slider = self._gui.add_slider(
+            "time (s)", 0.0, t_end, step, initial_value=0.0, marks=ends
+        )
+        self._slider.on_update(self._drag)
+        self._button = self._gui.add_button("Pause")
+        self._button.on_click(self._toggle)
+        speeds = [f"{rate:g} x real time" for rate in RATES]
+        first = speeds[RATES.index(self.playback.rate)]
+        rates = self._gui.add_dropdown("speed", speeds, initial_value=first)
+        rates.on_update(self._set_rate)
+        repeats = self._gui.add_checkbox("again and again", self.playback.repeats)
+        repeats.on_update(self._set_repeats)
+        hint = "The motion as one HTML page"
+        download = self._gui.add_button("Download the report", hint=hint)
+        download.on_click(self._send_report)
+
+    def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+        """Show what the user chose with the slider, and stay there."""
+        if event.client is not None:  # else the slider follows the playback
+            self.playback.go_to(event.target.value)
+            self.show()
+
+    def _toggle(self, _event: object) -> None:
+        self.playback.toggle()
+        self.show()
+
+    def _set_rate(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+        self.playback.rate = float(event.target.value.partition(" ")[0])
+
+    def _set_repeats(self, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+        self.playback.repeats = event.target.value
+
+    def _send_report(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        """Make the report for whoever asks, as a file that the browser keeps."""
+        from brachis.apps.report import make_report
+
+        if event.client is None:
+            return
+        try:
+            page = make_report(self._trajectory, degrees=self._degrees)
+        except BrachisError as error:
+            event.client.add_notification("The report cannot be made", str(error))
+            return
+        event.client.send_file_download(
+            "report.html", page.content, save_immediately=True
+        )
+
+    def _add_switches(self) -> None:
+        """Add a box to tick for every layer of the scene."""
+        title = f"show (a cell of the grid is {self._scene.cell:g} m)"
+        with self._gui.add_folder(title, expand_by_default=False):
+            for name, handles in self._scene.layers.items():
+                if handles:
+                    box = self._gui.add_checkbox(name, handles[0].visible)
+                    box.on_update(partial(self._switch, name))
+
+    def _switch(
+        self, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]
+    ) -> None:
+        """Show or hide a layer of the scene."""
+        self._scene.set_visible(name, visible=event.target.value)
+
+    def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> None:
+        """Add a panel with the plots and the list of candidates."""
+        panel = self._gui.add_panel()
+        with panel.add_tab("limits"):
+            samples = self._scene.samples
+            shown = shown_panels(self._trajectory, samples, degrees=self._degrees)
+            self._lines = [add_plot(self._gui, each) for each in shown]
+        count = f" ({len(candidates)})" if candidates else ""
+        with panel.add_tab(f"candidates{count}"):
+            self._gui.add_html(tables.candidates_table(candidates))
+        panel.dock_left()
+        panel.set_width(350)
+        self._gui.main_panel.dock_right()
+        self._gui.main_panel.set_width(400)
 
 
 def view(
