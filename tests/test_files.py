@@ -38,9 +38,7 @@ def test_a_file_of_the_kernel_that_has_nothing_to_say_yet_is_empty(
             return None
 
     (tmp_path / "kmsg").touch()
-    monkeypatch.setattr(
-        files.os, "fdopen", lambda descriptor, *_: os.close(descriptor) or Silent()
-    )
+    monkeypatch.setattr(files.os, "fdopen", lambda *_, **__: Silent())
     assert read_file(tmp_path / "kmsg") == b""
     with pytest.raises(ResultFileError, match="the file is not a brachis result"):
         Trajectory.load(tmp_path / "kmsg")
@@ -66,7 +64,7 @@ def endless(request, tmp_path):
         return tmp_path / "a\0b", "not the name of a file"
     with path.open("wb") as stream:
         stream.truncate(LARGE)  # takes no room
-    return path, r"it is 1000000.0 MB long, at most 16 MB are read"
+    return path, r"it is longer than 16 MB"
 
 
 @pytest.mark.parametrize(

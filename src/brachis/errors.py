@@ -69,32 +69,32 @@ class Remedy:
 
 _NAMES_HERE = {
     name: tuple(here.split())
-    for names, here in (
-        ("duration end_time total_time", "t_end"),
-        ("success ok valid feasible", "verified"),
-        ("t ts time timestamps", "t times"),
-        ("positions joint_positions qs pos", "q position"),
-        ("velocities qd dq qs_dot", "qdot velocity"),
-        ("accelerations qdd ddq", "qddot acceleration"),
-        ("tau torques", "tau torque"),
-        ("eval evaluate interpolate value", "at"),
-        ("dof ndof nq nv num_joints", "n"),
-        ("fk forward_kinematics tool_pose", "tool_placement"),
-        ("show animate display visualize", "view"),
-        ("to_csv to_file write dump export", "brachis.export.write"),
-        ("q0 q_start initial start_joints start_posture start_state", "start"),
-        ("goal target q_goal q_end goal_state stop finish", "end to"),
-        ("waypoints points", "path through"),
-        ("timeout max_time", "time_limit"),
-        ("verbose callback", "progress"),
-        ("workers n_jobs num_workers processes threads", "jobs"),
-        ("gridpoints n_intervals segments", "intervals"),
-        ("optimize optimise solve generate compute_trajectory", "plan"),
-        ("load read open", "load_task"),
-        ("load_robot load_urdf from_urdf model", "Robot"),
-        ("version", "__version__"),
-        ("end", "to"),
-    )
+    for names, here in {
+        "duration end_time total_time": "t_end",
+        "success ok valid feasible": "verified",
+        "t ts time timestamps": "t times",
+        "positions joint_positions qs pos": "q position",
+        "velocities qd dq qs_dot": "qdot velocity",
+        "accelerations qdd ddq": "qddot acceleration",
+        "tau torques": "tau torque",
+        "eval evaluate interpolate value": "at",
+        "dof ndof nq nv num_joints": "n",
+        "fk forward_kinematics tool_pose": "tool_placement",
+        "show animate display visualize": "view",
+        "to_csv to_file write dump export": "brachis.export.write",
+        "q0 q_start initial start_joints start_posture start_state": "start",
+        "goal target q_goal q_end goal_state stop finish": "end to",
+        "waypoints points": "path through",
+        "timeout max_time": "time_limit",
+        "verbose callback": "progress",
+        "workers n_jobs num_workers processes threads": "jobs",
+        "gridpoints n_intervals segments": "intervals",
+        "optimize optimise solve generate compute_trajectory": "plan",
+        "load read open": "load_task",
+        "load_robot load_urdf from_urdf model": "Robot",
+        "version": "__version__",
+        "end": "to",
+    }.items()
     for name in names.split()
 }
 """Names that other libraries use, and those used here, of which the first one that exists is meant."""
@@ -348,8 +348,7 @@ class DecompositionError(InputError):
         redundant_joints: Sequence[str],
         reasons: dict[str, str] | None = None,
         available: Sequence[tuple[str, ...]] = (),
-        found: object = None,
-        allowed: object = None,
+        **details: Unpack[Details],
     ) -> None:
         self.redundant_joints = tuple(redundant_joints)
         self.reasons = dict(reasons or {})
@@ -357,14 +356,11 @@ class DecompositionError(InputError):
         if self.reasons:
             tried = (f"{family}: {why}" for family, why in self.reasons.items())
             problem += f"; tried {'; '.join(tried)}"
-        choices = " | ".join(f"[{', '.join(names)}]" for names in self.available)
-        super().__init__(
-            problem,
-            found=found,
-            allowed=allowed,
-            where="redundant_joints",
-            hint=f"Choices with a closed form: {choices}" if choices else None,
-        )
+        details["where"] = "redundant_joints"
+        if self.available:
+            choices = " | ".join(f"[{', '.join(names)}]" for names in self.available)
+            details["hint"] = f"Choices with a closed form: {choices}"
+        super().__init__(problem, **details)
 
 
 class ResultFileError(InputError):

@@ -295,7 +295,7 @@ def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
         ({"name": "post"}, "exactly one shape"),
         ({"box": [1, 1]}, "box"),
         ({"sphere": -1.0}, "sphere"),
-        ({"half_space": {"normal": [0, 0, 0]}}, "no direction"),
+        ({"half_space": {"normal": [0, 0, 0]}}, "cannot have zero length"),
         ({"half_space": {"normal": [0, 0, 1]}, "link": "tool"}, "fixed to the world"),
         ({"sphere": 1.0, "link": "tol"}, "tool"),
         (

@@ -68,7 +68,8 @@ def test_corners_become_blends() -> None:
     assert [corner.blend for corner in made.fits[0].corners] == [
         segment.blend for segment in made.path[:-1]
     ]
-    assert "2 corners blended: row 30" in str(made.fits[0])
+    assert f"2 corners blended: {made.fits[0].corners[0]}, " in str(made.fits[0])
+    assert " deg at row 30" in str(made.fits[0].corners[0])
     wider = task(tolerance={"position": "0.1 mm", "corner": "1 mm"})
     assert all(
         one.blend < other.blend
@@ -99,7 +100,8 @@ def test_the_tool_stops_at_corners(tolerance: Any, turn_back: bool) -> None:
     assert [corner.blend for corner in fit.corners] == [0.0]
     assert fit.corners[0].row == 42
     assert fit.corners[0].distance == pytest.approx(0.2, abs=1e-6)
-    assert "1 corner at which the tool stops: row 42" in str(fit)
+    angle = 180 if turn_back else 90
+    assert f"1 corner at which the tool stops: {angle} deg at row 42" in str(fit)
     path = build_path(made.path, rows[0] * MM, ["x", "y", "z"])
     (stop,) = path.stops
     np.testing.assert_allclose(

@@ -18,12 +18,8 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
-def check_keywords(
-    function: Callable[_P, _R], where: str | None = None
-) -> Callable[_P, _R]:
+def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Let a function refuse keywords that it does not have by naming those that it has.
-
-    `where` is what the user calls the function; None: as it is named.
 
     Raises
     ------
@@ -33,10 +29,9 @@ def check_keywords(
         One that is needed is missing, or there are too many without a name.
     """
     signature = inspect.signature(function)
-    name = where or function.__name__
-    parameters = {
-        each: own for each, own in signature.parameters.items() if each != "self"
-    }
+    name = function.__name__
+    parameters = dict(signature.parameters)
+    parameters.pop("self", None)
 
     @wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -60,7 +55,8 @@ def check_keywords(
 
 
 def _wrong_type(value: object, where: str, allowed: str) -> InputError:
-    return InputError("wrong type", where=where, found=repr(value), allowed=allowed)
+    found = f"{value!r:.60}"
+    return InputError("wrong type", where=where, found=found, allowed=allowed)
 
 
 def file_name(value: object, where: str) -> Path:
@@ -115,9 +111,7 @@ def check_array(
     InputError
     """
     if not isinstance(value, np.ndarray):
-        found = f"{type(value).__name__} {value!r:.60}"
-        allowed = f"a numpy array, {shape}"
-        raise InputError("wrong type", where=where, found=found, allowed=allowed)
+        raise _wrong_type(value, where, f"a numpy array, {shape}")
     if value.dtype.kind not in "fiu":
         raise InputError(
             "the array does not hold real numbers",

@@ -87,23 +87,18 @@ def read_file(
         )  # so as not to wait for a pipe's writer
     except ValueError as error:
         raise OSError(errno.EINVAL, f"not the name of a file: {error}") from error
-    status = os.fstat(descriptor)
-    kind = _SPECIAL.get(stat.S_IFMT(status.st_mode))
-    refusal = None
-    if kind is not None:
-        refusal = (errno.EINVAL, f"it is {kind}, not a file")
-    elif status.st_size > largest:
-        size = status.st_size / 1e6
-        text = f"it is {size:.1f} MB long, at most {largest / 1e6:g} MB are read"
-        refusal = (errno.EFBIG, text)
-    if refusal is not None:
+    try:
+        kind = _SPECIAL.get(stat.S_IFMT(os.fstat(descriptor).st_mode))
+        if kind is not None:
+            text = f"it is {kind}, not a file"
+            raise OSError(errno.EINVAL, text, os.fspath(path))
+        with os.fdopen(descriptor, "rb", closefd=False) as stream:
+            # None: a file of the kernel has nothing to say now.
+            content = stream.read(beginning or largest + 1) or b""
+    finally:
         os.close(descriptor)
-        raise OSError(*refusal, os.fspath(path))
-    with os.fdopen(descriptor, "rb") as stream:
-        # None: a file of the kernel has nothing to say now.
-        content = stream.read(largest + 1 if beginning is None else beginning) or b""
-    if len(content) > largest:  # files of the kernel have no size before they are read
-        text = f"it is longer than {largest / 1e6:g} MB"
+    if len(content) > largest:
+        text = f"it is longer than {largest / 1e6:g} MB, which is the most that is read"
         raise OSError(errno.EFBIG, text, os.fspath(path))
     return content
 
@@ -272,9 +267,15 @@ def shipped_robots() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in files))
 
 
+def absolute_path(name: str, folder: Path) -> str:
+    """Return the absolute path of a file relative to `folder`."""
+    # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
+    return os.path.abspath(folder / name)  # noqa: PTH100
+
+
 def locate_urdf(name: str, folder: Path) -> str:
     """Return the absolute path of a URDF: a file relative to `folder`; without such a file, an included robot's."""
-    own = os.path.abspath(folder / name)  # noqa: PTH100  (a linked folder keeps its name; meshes may be beside it)
+    own = absolute_path(name, folder)
     included = shipped_folder("robots") / name / "robot.urdf"
     is_name = Path(name).name == name and not is_file(own)
     return str(included) if is_name and is_file(included) else own

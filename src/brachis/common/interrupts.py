@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import FrameType
 from typing import TYPE_CHECKING, ClassVar
 
@@ -58,7 +58,14 @@ def install() -> None:
     """Remember presses from now on; where SIGINT is ignored, it stays so."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, SigintHandler())
-        sys.unraisablehook = _quiet(sys.unraisablehook)
+        hook = sys.unraisablehook
+
+        def quiet(unraisable: UnraisableHookArgs) -> None:
+            """Hand on all but a KeyboardInterrupt in a finaliser: the press is remembered."""
+            if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+                hook(unraisable)
+
+        sys.unraisablehook = quiet
 
 
 def sigint_handler() -> SigintHandler:
@@ -148,16 +155,3 @@ def block_in_children() -> Iterator[None]:
             yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _quiet(
-    hook: Callable[[UnraisableHookArgs], object],
-) -> Callable[[UnraisableHookArgs], object]:
-    """Return a hook that ignores a KeyboardInterrupt in a finaliser: the press is remembered."""
-
-    def quiet(unraisable: UnraisableHookArgs) -> None:
-        """Hand on all but a KeyboardInterrupt."""
-        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
-            hook(unraisable)
-
-    return quiet

@@ -38,7 +38,7 @@ def report_progress(
     """
     if progress is None:
         progress = listener is None and _in_notebook()
-    line = _Line() if progress else None
+    line = _Line()
     log = logging.getLogger("brachis")
 
     def report(text: str) -> None:
@@ -47,14 +47,13 @@ def report_progress(
         log.log(level, "%s", text)
         if listener is not None:
             listener(text)
-        if line is not None:
+        if progress:
             line.show(text)
 
     try:
         yield report
     finally:
-        if line is not None:
-            line.clear()
+        line.clear()
 
 
 class _Line:

@@ -22,11 +22,7 @@ def write_count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-_NAMED = 3
-"""Names that a sentence lists; the others are counted."""
-
-
-def name_first(names: Sequence[str], separator: str) -> str:
-    """Join the first three names, and say how many more there are."""
-    others = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return separator.join(names[:_NAMED]) + others
+def name_first(names: Sequence[str], separator: str, most: int = 3) -> str:
+    """Join the first names, and say how many more there are."""
+    others = f" and {len(names) - most} more" if len(names) > most else ""
+    return separator.join(names[:most]) + others

@@ -240,7 +240,7 @@ class PoseCoordinates(RowCoordinates):
         shape = segment.shape
         if isinstance(shape, SplineThrough) and shape.orientations is not None:
             return pose_spline(shape, context, rotation)
-        if isinstance(shape, BSplineCurve) and shape.has_quaternions:
+        if isinstance(shape, BSplineCurve) and shape.has_orientations:
             return pose_bspline(shape, context, rotation)
         curve = BUILDERS[type(shape)](shape, context)
         key = f"path[{index}].orientation"

@@ -44,6 +44,7 @@ from pydantic import (
     Tag,
 )
 from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core.core_schema import no_info_before_validator_function
 
 from brachis.common.summary import show_value
 from brachis.errors import MissingAttributeError
@@ -88,24 +89,20 @@ class Model(BaseModel):
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
-    def check(self, *rules: tuple[object, str, str, str]) -> Self:
+    def check(self, *rules: tuple[object, str, str, str], at: str = "") -> Self:
         """Return the model, unless its keys contradict each other.
 
         Parameters
         ----------
         *rules : tuple of object, str, str, str
             Whether the rule is broken; the key to blame, such as ``"spline.knots"``; what is wrong; what is allowed.
+        at : str, optional
+            Where the model is in the one that is validated, such as ``"path[2]."``.
         """
         for broken, key, problem, allowed in rules:
             if broken:
                 found = attrgetter(key)(self)
-                raise refuse(
-                    problem,
-                    key=key,
-                    found=found,
-                    allowed=allowed,
-                    absent=found is None,
-                )
+                raise refuse(problem, key=at + key, found=found, allowed=allowed)
         return self
 
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
@@ -126,9 +123,9 @@ def describe_fields(model: type) -> dict[str, str]:
     found: dict[str, str] = {}
     for base in model.__mro__[::-1]:
         found |= _docstrings_in(base.__module__).get(base.__name__, {})
-    fields = model.model_fields if issubclass(model, Model) else {}
+    fields = getattr(model, "model_fields", {}).items()
     return found | {
-        name: field.description for name, field in fields.items() if field.description
+        name: field.description for name, field in fields if field.description
     }
 
 
@@ -168,31 +165,54 @@ class _Shown:
         return show_value(self.value)
 
 
-_PERCENT = re.compile(r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$")
+_NUMBER_AND_UNIT = re.compile(
+    r"^\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([a-z/%]+)\s*$"
+)
 
 
-def _from_percent(value: object) -> object:
-    """Read ``1 %`` as 0.01."""
-    if not isinstance(value, str):
-        return value
-    percent = _PERCENT.match(value)
-    if percent is None:
-        raise refuse(
-            "this is not a percentage or a fraction",
-            found=value,
-            allowed="a percentage from 0 to 100 %, or a number such as 0.01",
-        )
-    return float(percent[1]) / 100.0
+@dataclass(frozen=True, eq=False)
+class WithUnit:
+    """Lets a number be written with a unit, such as ``0.05 mm``, in a task and in its JSON schema.
 
+    Attributes
+    ----------
+    units : mapping of str to float
+        Factors to the unit of bare numbers.
+    example : str
+        For messages.
+    pattern : str
+        For the JSON schema.
+    """
 
-class _OrPercent:
-    """Lets the JSON schema of a number, with its own bounds, also allow a percentage."""
+    units: Mapping[str, float]
+    example: str
+    pattern: str = "^[0-9.eE+-]+ *[a-z/]+$"
+
+    def __get_pydantic_core_schema__(
+        self, number: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Read a number with a unit before it is checked."""
+        return no_info_before_validator_function(self._read, handler(number))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        percentage = {"type": "string", "pattern": _PERCENT.pattern}
-        return {"anyOf": [handler(schema), percentage]}
+        """Allow a string beside the number."""
+        text = {"type": "string", "pattern": self.pattern}
+        return {"anyOf": [handler(schema), text]}
+
+    def _read(self, value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        match = _NUMBER_AND_UNIT.match(value)
+        if match is None or match[2] not in self.units:
+            raise refuse(
+                "this is not a number with a unit",
+                found=value,
+                allowed=f"a number with a unit ({', '.join(self.units)}), as {self.example}, or a number",
+            )
+        # Divided, for 7 % to be 0.07 and not 0.07000000000000001.
+        return float(match[1]) / (1.0 / self.units[match[2]])
 
 
 def _check_version(version: object) -> object:
@@ -213,7 +233,8 @@ Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Count = Annotated[int, Strict()]
-Share = Annotated[float, Strict(), BeforeValidator(_from_percent), _OrPercent()]
+_PERCENT = r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$"
+Share = Annotated[float, Strict(), WithUnit({"%": 0.01}, "50 %", _PERCENT)]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[str, Strict(), Field(min_length=1)]
 _T = TypeVar("_T")
@@ -256,7 +277,6 @@ def refuse(
     key: str = "",
     found: object = None,
     allowed: str = "",
-    absent: bool = False,
 ) -> PydanticCustomError:
     """Return the error that a validator raises to refuse a value.
 
@@ -267,15 +287,13 @@ def refuse(
     key : str, optional
         Where, below the validated value, for example ``"[2].blend"`` or ``"degree"``.
     found : object, optional
-        What was found; the validated value itself where it is None.
+        What was found; None where the fault is that nothing was given.
     allowed : str, optional
         What would have been accepted.
-    absent : bool, optional
-        Whether the fault is that nothing was given, so that there is nothing to show.
     """
     # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
-    facts = {"key": key, "found": found, "allowed": allowed, "absent": absent}
-    return PydanticCustomError(REFUSED, "{problem}", {"problem": problem, **facts})
+    facts = {"problem": problem, "key": key, "found": found, "allowed": allowed}
+    return PydanticCustomError(REFUSED, "{problem}", facts)
 
 
 def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterValidator:
@@ -325,7 +343,9 @@ class ByForm:
 
         def choose(value: object) -> str | None:
             """Return the tag of the member for a value; None if there is none."""
-            form = _form_of(value)
+            if hasattr(value, "homogeneous"):  # a transform, such as Pinocchio's SE3
+                return "<mapping>"
+            form = _form_of_class(type(value))
             return None if form == "<word>" and value not in words else form
 
         by_tag = Discriminator(
@@ -373,7 +393,6 @@ class ByKey:
             custom_error_context={
                 "problem": self.problem,
                 "allowed": " | ".join(forms),
-                "known": " ".join(itertools.chain(*required.values())),
             },
         )
         return _tagged_union(members, by_tag, handler)
@@ -392,26 +411,22 @@ def _tagged_union(
     return handler.generate_schema(Annotated[Union[tagged], by_tag])  # noqa: UP007
 
 
-def _form_of(value: object) -> str | None:
-    if isinstance(value, bool):
-        return None
-    if hasattr(value, "homogeneous"):  # a transform, such as Pinocchio's SE3
-        return "<mapping>"
-    forms = (form for kinds, form in _FORMS.items() if isinstance(value, kinds))
-    return next(forms, None)
-
-
 def _form_of_type(member: Any) -> str:
     if get_origin(member) is Annotated:
         return _form_of_type(get_args(member)[0])
     kind = get_origin(member) or member
     if kind is Literal:
         return "<word>"
+    return _form_of_class(kind) or "<mapping>"  # a union of models
+
+
+def _form_of_class(kind: type) -> str | None:
     forms = (form for kinds, form in _FORMS.items() if issubclass(kind, kinds))
-    return next(forms, "<mapping>")  # of a union of models
+    return next(forms, None)
 
 
-_FORMS: Final[dict[Any, str]] = {
+_FORMS: Final[dict[Any, str | None]] = {
+    bool: None,
     str: "<word>",
     NoneType: "<null>",
     (int, float): "<number>",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -82,49 +81,42 @@ def segments_along(
     else:
         parts, report = cut_at_corners(points, notes, stops=stops)
     _check_corners(report, segment, where)
-    first = report.model_copy(update={"source": settings.file})
-    last = len(parts) - 1
-    return [
-        _segment_along(parts[i], None if i else first, segment, is_last=i == last)
-        for i in range(len(parts))
-    ]
+    fit: FitReport | None = report.model_copy(update={"source": settings.file})
+    segments: list[SplineSegment | BSplineSegment] = []
+    for part in parts:
+        keys = _shared_keys(segment)
+        if part is not parts[-1]:
+            blend = None if isinstance(part, Points) else part.blend
+            keys |= {"blend": blend, "stop": blend is None, "dwell": 0.0}
+        if isinstance(part, Points):
+            spline = _spline_through(part, fit, settings)
+            segments.append(SplineSegment(spline=spline, **keys))
+        else:
+            curve = _curve_of(part, fit, settings)
+            segments.append(BSplineSegment(bspline=curve, **keys))
+        fit = None  # only the first one has it
+    return segments
 
 
-def _segment_along(
-    part: Points | FittedCurve,
-    fit: FitReport | None,
-    segment: CsvSegment,
-    *,
-    is_last: bool,
-) -> SplineSegment | BSplineSegment:
-    """Return the segment along a part of a file, of which only the first one has the report, `fit`."""
-    if isinstance(part, Points):
-        return SplineSegment(
-            **_end_of(segment, is_last=is_last),
-            spline=_spline_through(part, fit, segment.csv),
-        )
+def _shared_keys(segment: CsvSegment) -> dict[str, Any]:
+    """Return the keys that the last curve along a file takes from the file's segment."""
+    shared = ("orientation", "blend", "stop", "dwell")
+    return {key: getattr(segment, key) for key in shared}
+
+
+def _curve_of(
+    part: FittedCurve, fit: FitReport | None, settings: PointFile
+) -> BSplineCurve:
+    """Return the curve along a part of a file, of which only the first one has the report, `fit`."""
     curve = {
         "degree": part.spline.k,
         "knots": part.spline.t.tolist(),
         "control_points": part.spline.c.tolist(),
-        "relative": segment.csv.relative or fit is None,
+        "relative": settings.relative or fit is None,
         "speeds": part.speeds,
         "fit": fit,
     }
-    return BSplineSegment(
-        **_end_of(segment, is_last=is_last, blend=part.blend),
-        bspline=BSplineCurve.model_validate(curve),
-    )
-
-
-def _end_of(
-    segment: CsvSegment, *, is_last: bool, blend: float | None = None
-) -> dict[str, Any]:
-    """Return the keys that a curve takes from its file's segment, or at a corner from its `blend`, m."""
-    keys: dict[str, Any] = {"blend": blend, "stop": blend is None}
-    if is_last:
-        keys = {key: getattr(segment, key) for key in ("blend", "stop", "dwell")}
-    return {"orientation": segment.orientation, **keys}
+    return BSplineCurve.model_validate(curve)
 
 
 def _spline_through(
@@ -135,19 +127,13 @@ def _spline_through(
     Behind a corner the waypoints begin with it, so that the first one after it is passed, however near it is.
     """
     first = 1 if fit else 0
+    keys: dict[str, Any] = {"relative": settings.relative, "fit": fit}
     places = points.columns.tolist()
-    turns = None
     if points.has_quaternions:
         places = points.position.tolist()
         turns = [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()]
-    return SplineThrough(
-        through=places[first:],
-        orientations=tuple(turns[first:]) if turns else None,
-        relative=settings.relative,
-        starts_at=places[0],
-        starts_oriented=turns[0] if turns else None,
-        fit=fit,
-    )
+        keys |= {"orientations": turns[first:], "starts_oriented": turns[0]}
+    return SplineThrough(through=places[first:], starts_at=places[0], **keys)
 
 
 def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
@@ -160,17 +146,10 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
     """
     if not report.corners:
         return
-    most = 10
-    corners = [
-        f"{degrees(corner.angle):.3g} deg at row {corner.row}"
-        for corner in report.corners
-    ]
-    more = [f"{len(corners) - most} more"] if len(corners) > most else []
-    found = ", ".join([*corners[:most], *more])
     if segment.csv.corner == "refuse":
         raise TaskError(
-            f"the points have {write_count(len(corners), 'corner')}",
-            found=found,
+            f"the points have {write_count(len(report.corners), 'corner')}",
+            found=report.listed_corners,
             allowed="no corners",
             where=f"{where}.corner",
             hint="Set corner: blend to round them within the tolerance, or corner: stop to stop there",
@@ -178,7 +157,7 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
     if isinstance(segment.orientation, Rotate | TurnTo):
         raise TaskError(
             "the tool cannot turn at a constant rate over corners",
-            found=found,
+            found=report.listed_corners,
             where=f"{where}.orientation",
             hint="Give an orientation for every point, or orientation: tangent",
         )
@@ -273,7 +252,7 @@ def _along_joints(
         starts_at=start,
         joints=table.header,
     )
-    return SplineSegment(**_end_of(segment, is_last=True), spline=spline)
+    return SplineSegment(spline=spline, **_shared_keys(segment))
 
 
 def _check_count(rows: int, path: Path) -> None:

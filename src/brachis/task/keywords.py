@@ -104,14 +104,15 @@ class TaskKeywords(TypedDict, total=False):
     refinement: RefinementSettings | Settings
 
 
-_SECTIONS: dict[str, type[Model]] = {
-    "robot": RobotSettings,
-    "boundary": BoundarySettings,
-    "spline": SplineSettings,
-    "search": SearchSettings,
-}
 _SECTION_OF = {
-    key: section for section, model in _SECTIONS.items() for key in model.model_fields
+    key: section
+    for section, model in (
+        ("robot", RobotSettings),
+        ("boundary", BoundarySettings),
+        ("spline", SplineSettings),
+        ("search", SearchSettings),
+    )
+    for key in model.model_fields
 }
 
 
@@ -177,23 +178,18 @@ def check_keywords(
     ------
     UnknownNameError
     """
-    for name in keywords:
-        if name not in TaskKeywords.__annotations__:
-            raise _no_keyword(name, where, own)
-
-
-def _no_keyword(name: str, where: str, own: Sequence[str]) -> UnknownNameError:
-    words = [
-        name,
-        *(word for word in name.split("_") if word in LimitKeywords.__annotations__),
-    ]
-    paths = next(filter(None, (key_paths(word, Task) for word in words)), [])
+    known = TaskKeywords.__annotations__
+    name = next((name for name in keywords if name not in known), None)
+    if name is None:
+        return
+    limits = [word for word in name.split("_") if word in LimitKeywords.__annotations__]
+    found = (key_paths(word, Task) for word in (name, *limits))
+    paths = next(filter(None, found), [])
     hint = " or ".join(_as_keyword(path.split(".")) for path in paths)
-    valid = sorted((*TaskKeywords.__annotations__, *own))
-    return UnknownNameError(
+    raise UnknownNameError(
         "keyword",
         name,
-        valid,
+        sorted((*known, *own)),
         where=where,
         hint=hint and f"This name is a key inside another keyword: {hint}",
     )

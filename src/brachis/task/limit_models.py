@@ -14,7 +14,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, make_dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, Unpack
 
 import numpy as np
 from pydantic import (
@@ -186,14 +186,13 @@ def per_joint_values(
     value: object,
     names: Sequence[str],
     missing: object,
-    error: type[InputError] = InputError,
 ) -> list[object]:
     """Spread a scalar, list or mapping over the joints; `missing` where a mapping leaves a joint out.
 
     Raises
     ------
     InputError
-        Of the class `error`: a list has the wrong length.
+        A list has the wrong length.
     UnknownNameError
         A mapping names a joint that is not of the chain.
     """
@@ -202,7 +201,7 @@ def per_joint_values(
         return [value.get(name, missing) for name in names]
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
         if len(value) != len(names):
-            raise error(
+            raise InputError(
                 "the list has the wrong number of values",
                 where=key,
                 found=len(value),
@@ -217,10 +216,9 @@ def map_by_joint(
     value: object,
     names: Sequence[str],
     missing: object,
-    error: type[InputError] = InputError,
 ) -> dict[str, object]:
     """Return the values of the joints by name, without those that are `missing`; see `per_joint_values`."""
-    values = per_joint_values(key, value, names, missing, error)
+    values = per_joint_values(key, value, names, missing)
     pairs = zip(names, values, strict=True)
     return {name: each for name, each in pairs if each != missing}
 
@@ -243,14 +241,7 @@ class SpeedTable(Model):
     """Largest speed at each path coordinate, m/s."""
 
     @model_validator(mode="after")
-    def _is_a_table(self) -> SpeedTable:
-        if len(self.speed) != len(self.s):
-            raise refuse(
-                "the numbers of path coordinates and speeds differ",
-                key="speed",
-                found=write_count(len(self.speed), "speed"),
-                allowed=f"{len(self.s)}",
-            )
+    def _is_a_table(self) -> Self:
         for row, (before, place) in enumerate(itertools.pairwise(self.s), 1):
             if place < before:
                 raise refuse(
@@ -259,15 +250,21 @@ class SpeedTable(Model):
                     found=place,
                     allowed=f">= {before:g}",
                 )
-        for place, second_after in zip(self.s, self.s[2:], strict=False):
-            if place == second_after:
-                raise refuse(
-                    "a path coordinate has more than two speeds",
-                    key="s",
-                    found=place,
-                    allowed="each path coordinate once, or twice for a step",
-                )
-        return self
+        thrice = [a for a, b in zip(self.s, self.s[2:], strict=False) if a == b]
+        return self.check(
+            (
+                len(self.speed) != len(self.s),
+                "speed",
+                "the numbers of path coordinates and speeds differ",
+                write_count(len(self.s), "speed"),
+            ),
+            (
+                thrice,
+                "s",
+                f"there are more than two speeds at {thrice}",
+                "each path coordinate once, or twice for a step",
+            ),
+        )
 
 
 def _as_sequence(value: object) -> object:
@@ -323,17 +320,19 @@ class ToolLimits(Model):
     def _apart(cls, parts: tuple[ProcessSpeed, ...]) -> tuple[ProcessSpeed, ...]:
         for number, (before, part) in enumerate(itertools.pairwise(parts), 1):
             end = before.s[1]
-            if part.s[0] <= end:
-                raise refuse(
+            part.check(
+                (
+                    part.s[0] <= end,
+                    "s",
                     "the parts of the path overlap, meet or are out of order",
-                    key=f"[{number}].s",
-                    found=part.s,
-                    allowed=f"a begin above {end:g}, the end of the part before; the speed changes in the gap",
-                )
+                    f"a begin above {end:g}, the end of the part before; the speed changes in the gap",
+                ),
+                at=f"[{number}].",
+            )
         return parts
 
     @model_validator(mode="after")
-    def _speeds_agree(self) -> ToolLimits:
+    def _speeds_agree(self) -> Self:
         for number, part in enumerate(self.process_speed):
             cap = _least_between(self.speed, part.s)
             if cap is not None and cap < part.speed:

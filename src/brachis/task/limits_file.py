@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from brachis.common.files import check_kind, locate_urdf, read_text
 from brachis.errors import TaskError, check_names
@@ -20,14 +20,17 @@ from brachis.task.fields import (
     Positive,
     Version,
     merge,
+    plain,
 )
+from brachis.task.limit_kinds import LimitScale
 from brachis.task.limit_models import (
     FROM_URDF,
     LimitSpec,
     map_by_joint,
     without_defaults,
 )
-from brachis.task.messages import show, validate
+from brachis.task.messages import validate
+from brachis.task.settings import RobotSettings
 from brachis.task.yaml_reader import read_yaml
 
 
@@ -43,6 +46,26 @@ class LimitsFile(Model):
     limits: LimitSpec
     """Limits as in robot.limits, without scale. A list is in the order of `joints`; one number holds for all of them.
     """
+
+    @model_validator(mode="after")
+    def _without_factors(self) -> Self:
+        return self.check(
+            (
+                self.limits.scale != LimitScale(),
+                "limits.scale",
+                "a limits file cannot contain factors on limits",
+                "robot.limits.scale in the task",
+            )
+        )
+
+    def by_kind(self, where: str) -> dict[str, Any]:
+        """Return the limits by kind and joint, and the one of all joints together; `where` names the file."""
+        return {
+            kind: value
+            if kind == "total_power"
+            else map_by_joint(f"{where}: limits.{kind}", value, self.joints, FROM_URDF)
+            for kind, value in without_defaults(self.limits).items()
+        }
 
 
 _ROS_KINDS = {
@@ -124,9 +147,9 @@ class RosLimitsFile(Model):
             return {name + _SUFFIX: limits for name, limits in short.items()}
         return self.joint_limits
 
-    def by_kind(self) -> dict[str, dict[str, Any]]:
+    def by_kind(self, _where: str) -> dict[str, Any]:
         """Return the limits by our kinds and joints, and the factors on them."""
-        stated: dict[str, dict[str, Any]] = {}
+        stated: dict[str, Any] = {}
         for name, limits in self.joints.items():
             for kind, value in limits.by_kind().items():
                 stated.setdefault(kind, {})[name] = value
@@ -146,6 +169,8 @@ def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
     ------
     TaskError
         The file is missing, no YAML, or wrong; the message names its key.
+    InputError
+        A list of limits has the wrong length.
     UnknownNameError
         A limit is given for a joint that is not among the file's ``joints``.
 
@@ -156,7 +181,8 @@ def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
     >>> limits.velocity["panda_joint1"]
     2.175
     """
-    return LimitSpec(**_read_file(Path(path), str(path), Path.cwd(), None))
+    file = _read_file(Path(path), str(path), Path.cwd(), None)
+    return LimitSpec(**file.by_kind(str(path)))
 
 
 def with_limits_of_file(
@@ -176,99 +202,64 @@ def with_limits_of_file(
         What the file's path is relative to.
     """
     robot = content.get("robot")
-    if not isinstance(robot, Mapping) or not isinstance(
-        robot.get("limits_file"), str | os.PathLike
-    ):
+    if not isinstance(robot, Mapping) or robot.get("limits_file") is None:
         return content
-    file = Path(robot["limits_file"])
+    try:
+        settings = RobotSettings.model_validate(plain(robot))
+    except ValidationError:
+        return content  # the check of the task says what is wrong
     own = robot.get("limits") or {}
     if isinstance(own, LimitSpec):
         own = without_defaults(own)
-    if not isinstance(own, Mapping):
-        return content
-    merged = _read_file(
-        folder / file,
-        f"{source}: robot.limits_file",
-        folder,
-        str(file),
-        {**robot, "limits": own},
-    )
+    name = str(settings.limits_file)
+    path = folder / name
+    file = _read_file(path, f"{source}: robot.limits_file", folder, name)
+    if isinstance(file, RosLimitsFile) and settings.urdf is not None:
+        _check_joints(file, settings, own, folder, str(path))
     rest = {key: value for key, value in robot.items() if key != "limits_file"}
-    return {**content, "robot": {**rest, "limits": merge(merged, own)}}
+    limits = merge(file.by_kind(str(path)), own)
+    return {**content, "robot": {**rest, "limits": limits}}
 
 
 def _read_file(
-    path: Path,
-    where: str,
-    folder: Path,
-    found: str | None,
-    robot: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:
-    """Read and check a file, for the ``robot`` part of a task where there is one.
-
-    Return its limits by kind and joint, and the one of all joints together.
-    """
+    path: Path, where: str, folder: Path, found: str | None
+) -> LimitsFile | RosLimitsFile:
     check_kind(path, "a limits file", TaskError)
     text = read_text(path, where=where, folder=folder, found=found, largest=100_000)
     content = read_yaml(text, str(path))
-    if not isinstance(content, Mapping):
-        raise TaskError(
-            "the limits file is not a mapping of keys",
-            found=show(content),
-            allowed=", ".join(LimitsFile.model_fields),
-            where=str(path),
-        )
-    if "joint_limits" in content:
-        of_ros = validate(RosLimitsFile, content, str(path))
-        if robot is not None and isinstance(robot.get("urdf"), str | os.PathLike):
-            _check_joints(set(of_ros.joints), robot, folder, str(path))
-        return of_ros.by_kind()
-    file = validate(LimitsFile, content, str(path))
-    if file.limits.scale != LimitSpec().scale:
-        raise TaskError(
-            "a limits file cannot contain factors on limits",
-            where=f"{path}: limits.scale",
-            allowed="robot.limits.scale in the task",
-        )
-    return {
-        kind: value
-        if kind == "total_power"  # of the whole robot
-        else map_by_joint(
-            f"{path}: limits.{kind}", value, file.joints, FROM_URDF, TaskError
-        )
-        for kind, value in without_defaults(file.limits).items()
-        if kind != "scale"
-    }
+    if isinstance(content, Mapping) and "joint_limits" in content:
+        return validate(RosLimitsFile, content, str(path))
+    return validate(LimitsFile, content, str(path))
 
 
 def _check_joints(
-    limited: set[str], robot: Mapping[str, Any], folder: Path, where: str
+    file: RosLimitsFile,
+    robot: RobotSettings,
+    own: Mapping[str, Any],
+    folder: Path,
+    where: str,
 ) -> None:
-    """Refuse joints that the URDF does not have, and joints that move the tool and have no entry.
+    """Refuse joints that the URDF does not have, and joints that move the tool and have no limits there or in `own`.
 
     Raises
     ------
     UnknownNameError, TaskError
     """
-    tool = robot.get("tool_frame")
-    base = robot.get("base_frame")
-    locked = robot.get("locked_joints") or {}
-    words = all(isinstance(name, str | None) for name in (tool, base))
-    if not words or not isinstance(locked, Mapping):
-        return  # the robot's model says so
-    names, moving = _joints_of(Path(locate_urdf(robot["urdf"], folder)), tool, base)
+    limited = sorted(file.joints)
+    urdf = Path(locate_urdf(str(robot.urdf), folder))
+    names, moving = _joints_of(urdf, robot.tool_frame, robot.base_frame)
     if names:
-        check_names("URDF joint", sorted(limited), names, f"{where}: joint_limits")
-    own = [each for kind, each in robot["limits"].items() if kind != "scale"]
-    if any(isinstance(each, int | float | list | tuple) for each in own):
+        check_names("URDF joint", limited, names, f"{where}: joint_limits")
+    given = [each for kind, each in own.items() if kind != "scale"]
+    if any(isinstance(each, int | float | list | tuple) for each in given):
         return  # of all joints
-    by_name = [each for each in own if isinstance(each, Mapping)]
-    stated = set(limited).union(locked, *by_name)
+    by_name = [each for each in given if isinstance(each, Mapping)]
+    stated = set(limited).union(robot.locked_joints, *by_name)
     missing = [name for name in moving if name not in stated]
     if missing:
         raise TaskError(
             f"joint {missing[0]!r}, which moves the tool, has no entry",
-            found=", ".join(sorted(limited)),
+            found=", ".join(limited),
             where=f"{where}: joint_limits",
             hint=f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}",
         )

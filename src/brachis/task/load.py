@@ -15,8 +15,10 @@ from typing import Any
 from brachis.common.files import (
     TASK_SUFFIXES,
     Kind,
+    absolute_path,
     check_kind,
     is_task_file,
+    locate_urdf,
     read_text,
 )
 from brachis.errors import InputError, NotInstalledError, TaskError, UrdfError
@@ -25,7 +27,7 @@ from brachis.task.fitted import expand_csv_files
 from brachis.task.limits_file import with_limits_of_file
 from brachis.task.messages import show, validate
 from brachis.task.models import Task
-from brachis.task.scene_file import with_absolute_files, with_scene_of_file
+from brachis.task.scene import with_paths, with_scene_of_file
 from brachis.task.settings import RobotSettings
 from brachis.task.yaml_reader import read_yaml
 
@@ -93,10 +95,7 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
             f"{where} is a list of {len(place)}",
             where=key,
             found=f"{where}.{part}",
-            allowed=f"{where}.0"
-            + (f" to {where}.{len(place) - 1}" if len(place) > 1 else "")
-            if place
-            else "no index, as the list is empty",
+            allowed=f"an index below {len(place)}",
         )
     return int(part)
 
@@ -183,17 +182,11 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
         return load_task(source.to_dict(), changes=changes) if changes else source
     if isinstance(source, Mapping):
         return task_from(source, "task", Path.cwd(), changes or {})
-    if not isinstance(source, str | os.PathLike):
+    if not isinstance(source, str | os.PathLike) or "\n" in str(source):
         raise TaskError(
             "a task cannot be loaded from this",
-            found=type(source).__name__,
-            allowed="a file name, a mapping, or a Task",
-        )
-    if isinstance(source, str) and "\n" in source:
-        raise TaskError(
-            "this text is not the name of a file",
             found=show(source),
-            allowed="a file name; for the text of a URDF, Robot.from_urdf(name, urdf_text=text)",
+            allowed="a file name, a mapping, or a Task; a URDF as text is for Robot.from_urdf(name, urdf_text=text)",
         )
     path = Path(source)
     check_kind(path, Kind.TASK, TaskError)
@@ -306,7 +299,7 @@ def task_from(
             where=source,
         ) from None
     task = _with_start(expand_csv_files(task, source, folder), source)
-    return with_absolute_files(task, folder)
+    return _with_absolute_files(task, folder)
 
 
 def _with_start(task: Task, source: str) -> Task:
@@ -326,3 +319,17 @@ def _with_start(task: Task, source: str) -> Task:
         posture = dict(zip(names, place, strict=True)) if names else place
         changes = {"start": {"joints": posture}}
     return validate(Task, task.model_copy(update=changes), source)
+
+
+def _with_absolute_files(task: Task, folder: Path) -> Task:
+    """Return the task with the paths of a URDF, an SRDF and meshes, relative to `folder`, made absolute."""
+    changes: dict[str, object] = {}
+    if task.robot.urdf is not None:
+        urdf = {"urdf": locate_urdf(task.robot.urdf, folder)}
+        changes["robot"] = task.robot.model_copy(update=urdf)
+    if task.scene:
+        changes["scene"] = with_paths(task.scene, folder)
+    if task.collisions.srdf is not None:
+        srdf = {"srdf": absolute_path(task.collisions.srdf, folder)}
+        changes["collisions"] = task.collisions.model_copy(update=srdf)
+    return task.model_copy(update=changes)

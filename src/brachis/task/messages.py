@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import is_dataclass
 from typing import Final, TypeVar, get_args, get_type_hints
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from brachis.errors import TaskError, nearest
+from brachis.errors import TaskError, suggest
 from brachis.task.fields import (
     REFUSED,
     WRONG_FORM,
@@ -101,7 +101,12 @@ def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
 
 
 def _is_tag(part: str | int) -> bool:
-    return isinstance(part, str) and part.startswith("<") and part.endswith(">")
+    return str(part).startswith("<")
+
+
+def _names_in(location: _Location) -> list[str]:
+    """Return the keys of a location, without indices and tags of unions."""
+    return [part for part in location if isinstance(part, str) and not _is_tag(part)]
 
 
 def _write_location(location: _Location, key: str) -> str:
@@ -169,16 +174,15 @@ def key_paths(name: str, model: type[Model]) -> list[str]:
 
 def _description_at(location: _Location, model: type[Model]) -> str | None:
     """Return what is said of the key at a location."""
-    names = [part for part in location if isinstance(part, str) and not _is_tag(part)]
+    names = _names_in(location)
     if not names:
         return None
     last = names[-1]
     models = _models_at(location[: location.index(last)], model)
-    known = [describe_fields(one) for one in models if issubclass(one, Model)]
-    found = [own[last] for own in known if last in own]
-    if len(found) != 1:
+    texts = {describe_fields(one).get(last, "") for one in models} - {""}
+    if len(texts) != 1:
         return None
-    return f"{last}: {' '.join(found[0].split()).removesuffix('.')}"
+    return f"{last}: {' '.join(texts.pop().split()).removesuffix('.')}"
 
 
 def _is_echo(detail: ErrorDetails) -> bool:
@@ -195,44 +199,33 @@ _Parts = tuple[str, *tuple[str | None, ...]]
 
 def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
     if isinstance(detail["loc"][-1], int):
-        problem = "the list is too short: this item is missing"
-        return problem, show(detail["input"])
+        return "the list is too short: this item is missing", show(detail["input"])
     about = _description_at(detail["loc"], model) or ""
-    problem = "this key is required, and missing"
-    return problem, None, None, about.partition("; ")[0] or None
+    return "this key is required, and missing", None, None, about.partition("; ")[0]
 
 
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
     name = str(detail["loc"][-1])
     keys = _keys_at(detail["loc"][:-1], model)
     elsewhere = " or ".join(key_paths(name, model))
-    hint = (
-        f"This key belongs elsewhere: {elsewhere}"
-        if elsewhere
-        else _meant([name], keys)
-    )
-    return "unknown key", name, ", ".join(keys), hint
-
-
-def _meant(names: Iterable[object], keys: Sequence[str]) -> str | None:
-    near = next(filter(None, (nearest(str(name), keys) for name in names)), None)
-    return f"Did you mean {near!r}?" if near else None
+    hint = elsewhere and f"This key belongs elsewhere: {elsewhere}"
+    return "unknown key", name, ", ".join(keys), hint or suggest(name, keys)
 
 
 def _refusal(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     facts = detail["ctx"]
-    found = detail["input"] if facts["found"] is None else facts["found"]
-    shown = None if facts["absent"] else show(found)
+    shown = None if facts["found"] is None else show(facts["found"])
     return facts["problem"], shown, facts["allowed"] or None
 
 
 def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     facts = detail["ctx"]
     found = detail["input"]
-    known = facts["known"].split()
+    known = re.findall(r"\w+", facts["allowed"])
     hint = None
     if isinstance(found, Mapping) and not any(key in found for key in known):
-        hint = _meant(found, known)
+        hints = (suggest(str(name), known) for name in found)
+        hint = next(filter(None, hints), None)
     return facts["problem"], show(found), facts["allowed"], hint
 
 
@@ -253,18 +246,12 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     words = re.findall(r"'(\w+)'", facts.get("expected", ""))
     words += facts.get("words", "").split()
     given = detail["input"]
-    hint = _meant([given], words) if isinstance(given, str) else None
+    hint = suggest(given, words) if isinstance(given, str) else None
     allowed = form.format(**facts)
-    if problem == _OUT_OF_RANGE:
-        allowed += _write_unit(location)
+    unit = unit_of(".".join(_names_in(location)))
+    if problem == _OUT_OF_RANGE and unit:
+        allowed += f", in {unit}"
     return problem, found, allowed or None, hint
-
-
-def _write_unit(location: _Location) -> str:
-    """Return the unit of the numbers at a location, behind a comma."""
-    names = [part for part in location if isinstance(part, str) and not _is_tag(part)]
-    unit = unit_of(".".join(names))
-    return f", in {unit}" if unit else ""
 
 
 _MAPPING = "a mapping"

@@ -46,6 +46,7 @@ from brachis.task.segments import (
     CsvSegment,
     Segment,
     SegmentModel,
+    are_matrices,
 )
 from brachis.task.settings import (
     BoundarySettings,
@@ -125,10 +126,6 @@ _SCENE_FILE: Final[dict[str, Any]] = {
     "additionalProperties": False,
     "properties": {"file": {"type": "string"}},
 }
-
-
-def _is_matrix(row: object) -> bool:
-    return isinstance(row, list) and any(isinstance(each, list) for each in row)
 
 
 def _add_forms_of_paths(schema: dict[str, Any]) -> None:
@@ -268,7 +265,7 @@ class Task(Model):
             isinstance(row, SegmentModel | Mapping) for row in rows
         ):
             return path
-        if any(hasattr(row, "homogeneous") or _is_matrix(row) for row in rows):
+        if are_matrices(rows):
             raise refuse(
                 "poses are not segments",
                 found=rows,
@@ -347,21 +344,21 @@ class Task(Model):
         joints = self.task_space == "joints"
         no_choice = "a path of joints leaves no choice of postures"
         last = self.path[-1]
-        last_key = f"path[{len(self.path) - 1}]"
-        if last.blend is not None:
-            raise refuse(
+        last.check(
+            (
+                last.blend is not None,
+                "blend",
                 "the last segment has no corner to blend",
-                key=f"{last_key}.blend",
-                found=last.blend,
-                allowed="no blend on the last segment",
-            )
-        if last.stop:
-            raise refuse(
+                "no blend on the last segment",
+            ),
+            (
+                last.stop,
+                "dwell" if last.dwell else "stop",
                 "the last segment cannot stop: the path ends there, and the motion with it",
-                key=f"{last_key}.{'dwell' if last.dwell else 'stop'}",
-                found=last.dwell or True,
-                allowed="no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
-            )
+                "no stop and no dwell on the last segment; with boundary.end_speed: 0 the motion ends at rest",
+            ),
+            at=f"path[{len(self.path) - 1}].",
+        )
         return self.check(
             (
                 name is not None and name not in self.frames,
@@ -458,8 +455,13 @@ class Task(Model):
     @property
     def start_place(self) -> StartPlace:
         """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
-        place = self.path[0].start_place(of_poses=self.of_poses)
-        return place if isinstance(place, ToolPose) == self.of_poses else None
+        place, turn = self.path[0].start or (None, None)
+        if place is None or not self.of_poses:
+            return place
+        position = place[: len(POSITION)]
+        if turn is None or len(position) < len(POSITION):
+            return None
+        return ToolPose.model_validate({"position": position, **turn.model_dump()})
 
     @property
     def speed_unit(self) -> str:

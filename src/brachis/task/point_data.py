@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from math import degrees
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    Strict,
-    WithJsonSchema,
-)
+from pydantic import Field, Strict, WithJsonSchema
 
-from brachis.common.words import write_count
+from brachis.common.words import name_first, write_count
 from brachis.task.fields import (
     Count,
     Flag,
@@ -21,53 +15,15 @@ from brachis.task.fields import (
     Name,
     NonNegative,
     Number,
+    WithUnit,
     must,
-    refuse,
 )
 from brachis.task.points.units import ANGLES, CONVENTIONS, LENGTHS, choices
 
-_LISTED = 10
-_NUMBER_AND_UNIT = re.compile(
-    r"^\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z/]+)\s*$"
-)
-
-
-def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
-    """Read numbers with units; bare numbers are in SI units."""
-
-    def read(value: object) -> object:
-        """Read one number."""
-        if not isinstance(value, str):
-            return value
-        match = _NUMBER_AND_UNIT.match(value)
-        if match is None or match[2] not in units:
-            raise refuse(
-                "this is not a number with a unit",
-                found=value,
-                allowed=f"a number with a unit ({', '.join(units)}), as {example}",
-            )
-        return float(match[1]) * units[match[2]]
-
-    return BeforeValidator(read)
-
-
-_Quantity = Annotated[
-    float,
-    Strict(),
-    Field(ge=1e-7),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0},
-                {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"},
-            ]
-        }
-    ),
+Length = Annotated[
+    float, Strict(), Field(ge=1e-7, le=1.0), WithUnit(LENGTHS, "0.05 mm")
 ]
-Length = Annotated[_Quantity, Field(le=1.0), _quantity_of(LENGTHS, "0.05 mm")]
-Angle = Annotated[_Quantity, Field(le=0.5), _quantity_of(ANGLES, "0.1 deg")]
-
-
+Angle = Annotated[float, Strict(), Field(ge=1e-7, le=0.5), WithUnit(ANGLES, "0.1 deg")]
 OrientationWord = Annotated[
     Name,
     must(
@@ -146,6 +102,10 @@ class FoundCorner(Model):
     blend: NonNegative
     """What its blend takes from either side, m; 0 where the tool stops."""
 
+    def __str__(self) -> str:
+        """Say how sharp it is, and where."""
+        return f"{degrees(self.angle):.3g} deg at row {self.row}"
+
 
 class FitReport(Model):
     """Where a curve comes from, and how near it is to the points; written by brachis."""
@@ -177,17 +137,19 @@ class FitReport(Model):
     profile: tuple[tuple[Number, Number, Number], ...] = ()
     """Along the path, m: the largest distance, m, and angle, rad, of the points there."""
 
+    @property
+    def listed_corners(self) -> str:
+        """The first ten corners."""
+        return name_first([str(corner) for corner in self.corners], ", ", most=10)
+
     def __str__(self) -> str:
         """Say it in one line, lengths in mm."""
-        corners = [
-            f"row {corner.row} ({degrees(corner.angle):.3g} deg)"
-            for corner in self.corners[:_LISTED]
-        ]
-        if len(self.corners) > _LISTED:
-            corners.append("...")
-        count = write_count(len(self.corners), "corner")
-        is_blended = any(corner.blend for corner in self.corners)
-        what = "blended" if is_blended else "at which the tool stops"
+        corners = "no corners"
+        if self.corners:
+            is_blended = any(corner.blend for corner in self.corners)
+            what = "blended" if is_blended else "at which the tool stops"
+            count = write_count(len(self.corners), "corner")
+            corners = f"{count} {what}: {self.listed_corners}"
         allowed = 1e3 * self.position_tolerance
         rms = 1e3 * self.position_rms
         intervals = write_count(self.intervals, "knot interval")
@@ -200,10 +162,7 @@ class FitReport(Model):
                 f"orientation at most {degrees(self.orientation_error):.2g} deg off "
                 f"(allowed {degrees(self.orientation_tolerance):.3g} deg)"
             )
-        parts.append(
-            f"{count} {what}: {', '.join(corners)}" if corners else "no corners"
-        )
-        return "; ".join([*parts, *self.told])
+        return "; ".join([*parts, corners, *self.told])
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON, without the profile."""

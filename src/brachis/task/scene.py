@@ -1,12 +1,16 @@
-"""The scene of a task: bodies around the robot and on it, and how it keeps clear of them."""
+"""The scene of a task: bodies around the robot and on it, and how it keeps clear of them; or a file with the bodies."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from brachis.common.files import absolute_path, read_text
+from brachis.errors import TaskError
 from brachis.task.fields import (
     Flag,
     Model,
@@ -14,11 +18,13 @@ from brachis.task.fields import (
     NonNegative,
     Number,
     Positive,
-    must,
+    Version,
     refuse,
 )
-from brachis.task.orientation import Vector3
+from brachis.task.messages import show, validate
+from brachis.task.orientation import Direction, Vector3
 from brachis.task.settings import Placement
+from brachis.task.yaml_reader import read_yaml
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh", "urdf")
 """Keys of which a body has exactly one."""
@@ -36,14 +42,7 @@ class Round(Model):
 class HalfSpaceShape(Model):
     """All that is behind a plane."""
 
-    normal: Annotated[
-        Vector3,
-        must(
-            lambda normal: float(np.linalg.norm(normal)) > 1e-9,
-            "a normal of zero length has no direction",
-            "a direction, any length but zero",
-        ),
-    ]
+    normal: Direction
     """Direction out of the half-space."""
     offset: Number = 0.0
     """Distance of the plane from the origin along the normal, m."""
@@ -153,3 +152,58 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     if twice:
         raise refuse("two bodies have this name", found=twice[0], allowed="each once")
     return named
+
+
+class SceneFile(Model):
+    """What a scene file says."""
+
+    brachis_scene: Version
+    """Version of the format."""
+    bodies: tuple[SceneBody, ...]
+    """Bodies as in scene; files are relative to this file."""
+
+
+def with_scene_of_file(
+    content: Mapping[str, Any], source: str, folder: Path
+) -> Mapping[str, Any]:
+    """Return a task as it is written with the bodies of the file that its ``scene`` names.
+
+    Parameters
+    ----------
+    content : mapping
+        A task, not checked yet.
+    source : str
+        File name, or what else the task came from, for messages.
+    folder : Path
+        What the file's path is relative to.
+    """
+    scene = content.get("scene")
+    if not isinstance(scene, Mapping):
+        return content
+    if set(scene) != {"file"}:
+        raise TaskError(
+            "scene must be a list of bodies or a file",
+            where=f"{source}: scene",
+            found=show(scene),
+            allowed="[{box: [...], position: [...]}, ...] or {file: cell.yaml}",
+        )
+    name = str(scene["file"])
+    path = folder / name
+    where = f"{source}: scene.file"
+    text = read_text(path, where=where, folder=folder, found=name)
+    file = validate(SceneFile, read_yaml(text, str(path)), str(path))
+    return {**content, "scene": with_paths(file.bodies, path.absolute().parent)}
+
+
+def with_paths(bodies: tuple[SceneBody, ...], folder: Path) -> tuple[SceneBody, ...]:
+    """Return bodies with the paths of meshes and URDFs, relative to `folder`, made absolute."""
+    return tuple(
+        body.model_copy(
+            update={
+                key: absolute_path(file, folder)
+                for key in ("mesh", "urdf")
+                if (file := getattr(body, key)) is not None
+            }
+        )
+        for body in bodies
+    )

@@ -23,6 +23,7 @@ from pydantic import (
 )
 
 from brachis.task.fields import (
+    POSITION,
     ByKey,
     Count,
     Flag,
@@ -41,8 +42,6 @@ from brachis.task.orientation import (
     Attitude,
     Direction,
     OrientationMode,
-    StartPlace,
-    ToolPose,
     Turning,
     poses_of,
 )
@@ -79,7 +78,7 @@ class BSplineCurve(Model):
     """The points that the curve was fitted to; written by brachis."""
 
     @property
-    def has_quaternions(self) -> bool:
+    def has_orientations(self) -> bool:
         """Whether the control points say how the tool turns."""
         return len(self.control_points[0]) == 7
 
@@ -240,6 +239,11 @@ class SplineThrough(Model):
     """Origin of the waypoints; written by brachis."""
     joints: JointOrder = None
 
+    @property
+    def has_orientations(self) -> bool:
+        """Whether the waypoints say how the tool turns."""
+        return self.orientations is not None
+
     @model_validator(mode="before")
     @classmethod
     def _of_poses(cls, content: object) -> object:
@@ -247,7 +251,7 @@ class SplineThrough(Model):
             return content
         through = content.get("through")
         orientations = content.get("orientations")
-        if not (_are_matrices(through) or _are_matrices(orientations)):
+        if not (are_matrices(through) or are_matrices(orientations)):
             return content
         poses = poses_of(through, "spline.through", orientations)
         places, turns = zip(*poses, strict=True)
@@ -273,7 +277,7 @@ class SplineThrough(Model):
         )
 
 
-def _are_matrices(values: Any) -> bool:
+def are_matrices(values: Any) -> bool:
     """Tell transforms, rotations and their matrices from coordinates and from what a task file has."""
     first = values[0] if isinstance(values, list) and values else values
     return any(hasattr(first, name) for name in ("homogeneous", "as_matrix")) or (
@@ -285,7 +289,7 @@ LineForm = Annotated[
     LineTo | LineBy | LineHeading, ByKey("a line needs exactly one of its forms")
 ]
 ArcForm = Annotated[ArcCenter | ArcVia, ByKey("an arc needs exactly one of its forms")]
-_POSITIONS = 3
+_Start = tuple[tuple[float, ...], Attitude | None]
 
 
 class SegmentModel(Model):
@@ -349,11 +353,9 @@ class SegmentModel(Model):
         given = ", ".join(f"{name}={value!r}" for name, value in pairs)
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
-    def start_place(self, *, of_poses: bool) -> StartPlace:
-        """Where the segment says that it begins, as ``path_start`` of a task; None where it leaves that open.
-
-        Without relative waypoints and another word on it, that is the first waypoint.
-        """
+    @property
+    def start(self) -> _Start | None:
+        """Coordinates at which the segment says that it begins, and the tool's orientation; None where that is open."""
         return None
 
     @property
@@ -373,6 +375,18 @@ class MovingSegment(SegmentModel):
     orientation: OrientationMode = None
     """How the tool turns along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
     Null: the `orientations` of a spline, else fixed."""
+
+    @model_validator(mode="after")
+    def _one_word_on_orientation(self) -> Self:
+        has_own = getattr(self.shape, "has_orientations", False)
+        return self.check(
+            (
+                self.orientation is not None and has_own,
+                "orientation",
+                f"the {self.kind} already has orientations",
+                f"orientation or orientations in the {self.kind}, not both",
+            )
+        )
 
 
 class LineSegment(MovingSegment):
@@ -419,30 +433,16 @@ class SplineSegment(MovingSegment):
 
     spline: SplineThrough
 
-    def start_place(self, *, of_poses: bool) -> StartPlace:
-        """Return `starts_at`, or else the first waypoint; None where the waypoints are relative."""
+    @property
+    def start(self) -> _Start | None:
+        """`starts_at`, or else the first waypoint; None where the waypoints are relative."""
         spline = self.spline
         if spline.relative:
             return None
-        place = spline.starts_at
-        oriented = spline.starts_oriented
-        if place is None:
-            place = spline.through[0]
-            oriented = spline.orientations[0] if spline.orientations else None
-        if oriented is None or not of_poses or len(place) != _POSITIONS:
-            return place
-        return ToolPose.model_validate({"position": place, **oriented.model_dump()})
-
-    @model_validator(mode="after")
-    def _one_word_on_orientation(self) -> Self:
-        return self.check(
-            (
-                self.orientation is not None and self.spline.orientations is not None,
-                "orientation",
-                "the spline already has orientations",
-                "orientation or spline.orientations, not both",
-            )
-        )
+        if spline.starts_at is not None:
+            return spline.starts_at, spline.starts_oriented
+        turn = spline.orientations[0] if spline.orientations else None
+        return spline.through[0], turn
 
 
 class TurnSegment(SegmentModel):
@@ -456,29 +456,18 @@ class BSplineSegment(MovingSegment):
 
     bspline: BSplineCurve
 
-    def start_place(self, *, of_poses: bool) -> StartPlace:
-        """Return the first control point; None where the curve is relative."""
+    @property
+    def start(self) -> _Start | None:
+        """The first control point; None where the curve is relative."""
         if self.bspline.relative:
             return None
         first = self.bspline.control_points[0]
-        if not of_poses or not self.bspline.has_quaternions:
-            return first
-        position = first[:_POSITIONS]
-        quaternion = first[_POSITIONS:]
+        quaternion = first[len(POSITION) :]
+        if not self.bspline.has_orientations:
+            return first, None
         length = math.hypot(*quaternion) or 1.0
-        turn = [number / length for number in quaternion]
-        return ToolPose.model_validate({"position": position, "quaternion_wxyz": turn})
-
-    @model_validator(mode="after")
-    def _one_word_on_orientation(self) -> Self:
-        return self.check(
-            (
-                self.orientation is not None and self.bspline.has_quaternions,
-                "orientation",
-                "the curve already has orientations (quaternions)",
-                "orientation or control points with quaternions, not both",
-            )
-        )
+        turn = tuple(number / length for number in quaternion)
+        return first, Attitude.model_construct(quaternion_wxyz=turn)
 
 
 class CsvSegment(MovingSegment):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from brachis.task.fields import (
@@ -18,7 +18,6 @@ from brachis.task.fields import (
     Number,
     Positive,
     Share,
-    plain,
     refuse,
 )
 from brachis.task.limit_models import FROM_URDF, LimitSpec
@@ -37,19 +36,13 @@ class Placement(Model):
     @classmethod
     def _of_transform(cls, given: object) -> object:
         """Take a transform such as Pinocchio's SE3 too."""
-        matrix = getattr(given, "homogeneous", None)
-        if matrix is None:
+        if not hasattr(given, "homogeneous"):
             return given
-        m: Any = plain(matrix)
-        yaw = math.atan2(m[1][0], m[0][0])
-        pitch = math.atan2(-m[2][0], math.hypot(m[0][0], m[1][0]))
-        sine = math.sin(yaw)
-        cosine = math.cos(yaw)
-        roll = math.atan2(
-            sine * m[0][2] - cosine * m[1][2], cosine * m[1][1] - sine * m[0][1]
-        )
-        angles = [math.degrees(angle) for angle in (roll, pitch, yaw)]
-        return {"xyz": [row[3] for row in m[:3]], "rpy_deg": angles}
+        from pinocchio import rpy
+
+        matrix = np.array(given.homogeneous)
+        angles = np.degrees(rpy.matrixToRpy(matrix[:3, :3]))
+        return {"xyz": matrix[:3, 3].tolist(), "rpy_deg": angles.tolist()}
 
 
 class InertiaMatrix(Model):
@@ -223,18 +216,14 @@ class SplineSettings(Model):
     @model_validator(mode="after")
     def _keys_agree(self) -> Self:
         order = self.vanishing
-        last = ("", "speed", "acceleration", "jerk")[order]
-        lower = [
-            f"rest: {word}"
-            for word, level in _VANISHING.items()
-            if level < min(order, self.degree)
-        ]
+        most = min(order, self.degree)
+        lower = [word for word, level in _VANISHING.items() if level < most]
         return self.check(
             (
                 order > 1 and self.degree <= order,
                 "degree",
-                f"rest: {self.rest} needs a continuous {last}, zero at the ends: degree {self.degree} is too low",
-                f">= {order + 1}, or {' or '.join(lower)}",
+                f"rest: {self.rest} needs {order} continuous derivatives, zero at the ends: the degree is too low",
+                f">= {order + 1}, or rest: {' or '.join(lower)}",
             ),
             (
                 self.knots == "free" and self.intervals == "auto",

@@ -106,15 +106,15 @@ class PositionTolerance(Model):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         given = [axis for axis in POSITION if getattr(self, axis) is not None]
-        if self.axes == "world" and len(given) < len(POSITION):
-            raise refuse(
-                "a box along the world's axes needs all three lengths",
-                key="axes",
-                found=f"world, with {', '.join(given) or 'none'}",
-                allowed="x, y and z with it, or axes: tool",
-            )
         _check_within(self, "sphere", given)
-        return self
+        return self.check(
+            (
+                self.axes == "world" and len(given) < len(POSITION),
+                "axes",
+                "a box along the world's axes needs all three lengths",
+                "x, y and z with it, or axes: tool",
+            )
+        )
 
 
 class Tolerances(Model):
