@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import InputError, LimitError, TaskError, UnknownNameError
+from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import bind
 from brachis.task import (
     BoundarySettings,
@@ -178,7 +178,7 @@ def test_a_robot_with_other_limits_keeps_the_rest():
         robot.with_limits(torques=3.0)
     with pytest.raises(UnknownNameError, match="joint_1"):
         robot.with_limits(torque={"joint1": 3.0})
-    with pytest.raises(LimitError, match="positive"):
+    with pytest.raises(TaskError, match=r"limits.torque: out of range"):
         robot.with_limits(torque=-3.0)
 
 

@@ -200,15 +200,12 @@ def test_refusals():
             NotApplicableError, match="this family solves only the position: x, y and z"
         ):
             positioning.build(geometry, space, (0, 4, 5, 6))
-    with pytest.raises(
-        NotApplicableError, match="4 joints left to solve for, not three"
-    ):
+    with pytest.raises(NotApplicableError, match="4 joints left to solve for, not 3"):
         positioning.build(geometry, position, (0, 4, 5))
     with pytest.raises(NotApplicableError) as caught:
         positioning.build(geometry, position, (0, 1, 2, 3))
-    assert (
-        str(caught.value)
-        == "J_nr is singular everywhere: joint_6 does not move the tool"
+    assert str(caught.value) == (
+        "J_nr is singular everywhere: there is always a motion of the tool that needs rail, joint_1, joint_2, joint_3"
     )
 
 
@@ -216,25 +213,22 @@ def test_refusals_say_what_the_joints_cannot_do():
     with pytest.raises(NotApplicableError) as caught:
         bench(seven_joints(), (3, 4, 5, 6), 1)
     assert str(caught.value) == (
-        "J_nr is singular everywhere: j3 does not change the distance between the tool and the point where the axes of "
-        "j1 and j2 meet"
+        "J_nr is singular everywhere: there is always a motion of the tool that needs j4, j5, j6, j7"
     )
     rng = np.random.default_rng(8)
     general = [extra(rng, "R") for _ in range(3)]
     with pytest.raises(NotApplicableError) as caught:
         bench(screw_robot(general), (), 1)
-    apart = "are not parallel and do not meet in a fixed point of one of them"
     assert str(caught.value) == (
-        f"no closed form moves the tool by j1, j2, j3: the axes of j1 and j2 {apart}, and the axes of j2 and j3 {apart}"
+        "no closed form moves the tool by j1, j2, j3: no two neighbours among them move in one plane or have axes that "
+        "meet in a fixed point"
     )
     askew = [
         Axis("R", Z, np.zeros(3)),
         Axis("R", Y, X),
         Axis("P", unit(X + Y), np.zeros(3)),
     ]
-    with pytest.raises(
-        NotApplicableError, match="and j3 slides at an angle to the axis of j2"
-    ):
+    with pytest.raises(NotApplicableError, match="no closed form moves the tool by"):
         bench(screw_robot(askew), (), 1)
 
 

@@ -101,15 +101,13 @@ def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
             Bench(robot, (redundant,), postures=1)
         reason = str(caught.value)
         if redundant == 1:  # the rail and the links all move in one plane
-            assert reason.startswith(
-                "J_nr is singular everywhere: j1 does not move the point where the axes of j5, "
-            )
-            assert reason.endswith("out of the plane in which j3 and j4 do")
+            assert reason.startswith("J_nr is singular everywhere: ")
+            assert reason.endswith("a motion of the tool that needs j2")
         elif redundant < 4:
-            assert "j1 slides at an angle to the axis of j2" in reason
+            assert "no two neighbours among them move in one plane" in reason
         else:
-            assert "do not meet in a point (they miss it by 0." in reason
-            assert "j1 among j3, j2, j1 slides" in reason
+            assert "do not meet in a point (one slides, or they miss it by 0." in reason
+            assert "the axes of j3, j2, j1 do not meet in a point (one slides" in reason
 
 
 def test_labels_say_where_the_arm_is():
@@ -163,8 +161,7 @@ def test_elbow_of_spherical_shoulder_and_wrist_is_not_redundant():
     with pytest.raises(NotApplicableError) as caught:
         Bench(seven_joints(), (3,), postures=1)
     assert str(caught.value) == (
-        "J_nr is singular everywhere: j3 does not change the distance between the point where the axes of j5, j6, j7 "
-        "meet and the point where the axes of j1 and j2 meet"
+        "J_nr is singular everywhere: there is always a motion of the tool that needs j4"
     )
 
 
@@ -256,10 +253,7 @@ def test_refusals():
         "no closed form moves the point where the axes of j4, j5, j6 meet by j1, j2, j3"
         in str(caught.value)
     )
-    assert (
-        "the axes of j1 and j2 are not parallel and do not meet in a fixed point of one of them"
-        in str(caught.value)
-    )
+    assert "no two neighbours among them move in one plane" in str(caught.value)
     skew = [
         Axis("P", Z, np.zeros(3)),
         Axis("R", Z, np.zeros(3)),
@@ -267,14 +261,11 @@ def test_refusals():
     ]
     with pytest.raises(
         NotApplicableError,
-        match="j1 slides along the axis of j2, and the axes of j2 and j3 are not par",
+        match="no closed form moves the point",
     ):
         Bench(screw_robot([*skew, *wrist(rng)]), (), postures=1)
     coaxial = [Axis("R", Z, np.zeros(3)), Axis("R", Z, Z), Axis("R", X, Y)]
-    with pytest.raises(
-        NotApplicableError,
-        match=r"everywhere: j1 and j2 move the point .* along one line",
-    ):
+    with pytest.raises(NotApplicableError, match=r"^J_nr is singular everywhere"):
         Bench(screw_robot([*coaxial, *wrist(rng)]), (), postures=1)
     flat = [Axis("R", axis, np.array([0.3, 0.5, -0.2])) for axis in (X, Y, unit(X + Y))]
     with pytest.raises(NotApplicableError, match=r"^J_nr is singular everywhere"):
@@ -306,7 +297,7 @@ def test_it_is_found_by_geometry():
     assert match.family == "spherical_wrist"
     assert "point_recipes" in spherical_wrist.source
     with pytest.raises(
-        DecompositionError, match="j1 slides at an angle to the axis of j2"
+        DecompositionError, match="no two neighbours among them move in one plane"
     ) as caught:
         find(
             rail_arm(RAILS["at an angle to"]),

@@ -34,7 +34,7 @@ def jacobian_at(task_map, q):
 
 def bias_at(task_map, q, qdot):
     """Task acceleration at constant joint velocity, V_q qdot, (K, m)."""
-    slopes = task_map.velocity_slopes(task_map.twists(q), qdot)
+    slopes = task_map.derivatives(task_map.twists(q), qdot, 0.0 * qdot).velocity_q
     return np.einsum("kmn,kn->km", slopes, qdot)
 
 
@@ -77,9 +77,6 @@ def check_derivatives(task_map, q, qdot, qddot):
 
     exact = task_map.derivatives(task_map.twists(q), qdot, qddot)
     np.testing.assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
-    np.testing.assert_allclose(
-        task_map.velocity_slopes(task_map.twists(q), qdot), exact.velocity_q, atol=1e-14
-    )
     np.testing.assert_allclose(
         exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7
     )

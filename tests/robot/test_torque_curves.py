@@ -47,7 +47,7 @@ def test_a_curve_is_torque_limit_enough():
 @pytest.mark.parametrize(
     ("curve", "where", "said"),
     [
-        ([[0.0, 50.0]], "robot.limits.torque_speed.j1", "two or more points"),
+        ([[0.0, 50.0]], "robot: limits.torque_speed.j1", "at least 2"),
         ([[0.5, 50.0], [1.0, 20.0]], "robot.limits.torque_speed.j1", "begin at 0"),
         (
             [[0.0, 50.0], [2.0, 40.0], [1.0, 20.0]],
@@ -64,11 +64,20 @@ def test_a_curve_is_torque_limit_enough():
             "robot.limits.torque_speed.j1[2]",
             "stay or fall",
         ),
-        ([[0.0, 50.0], [1.0, -1.0]], "robot.limits.torque_speed.j1", "torques >= 0"),
+        (
+            [[0.0, 50.0], [1.0, -1.0]],
+            "robot: limits.torque_speed.j1[1][1]",
+            "out of range",
+        ),
         (
             [[0.0, 50.0], [1.0, "much"]],
+            "robot: limits.torque_speed.j1[1][1]",
+            "a number",
+        ),
+        (
+            [[0.0, 1e-9], [1.0, 0.0]],
             "robot.limits.torque_speed.j1",
-            "two or more points",
+            "the torque at speed 0 is too small",
         ),
     ],
 )
@@ -82,16 +91,16 @@ def test_a_curve_that_is_none_is_refused_with_its_key(curve, where, said):
 def test_other_mistakes_are_refused_with_their_key():
     with pytest.raises(UnknownNameError, match=r"torque_speed.*elbow"):
         robot(torque_speed={"elbow": CURVE})
-    with pytest.raises(
-        InputError, match=r"robot.limits.torque_speed: this is not a mapping"
-    ):
+    with pytest.raises(InputError, match=r"limits.torque_speed: .* a mapping"):
         robot(torque_speed=[CURVE])
     for wrong in (0.0, -3.0, "much"):
-        with pytest.raises(
-            InputError, match=r"robot.limits.total_power: the total power is not valid"
-        ):
+        with pytest.raises(InputError, match=r"robot: limits.total_power"):
             robot(total_power=wrong)
-    with pytest.raises(InputError, match="power limit"):
+    with pytest.raises(
+        InputError, match=r"robot.limits.total_power: the total power is too small"
+    ):
+        robot(total_power=1e-9)
+    with pytest.raises(InputError, match=r"limits.power: out of range"):
         robot(power=-1.0)
 
 

@@ -42,7 +42,7 @@ def joint_path(distance: float) -> np.ndarray:
 
 def test_bang_bang_with_a_torque_limit():
     robot = gantry(torque=20.0)
-    mass = dynamics.mass_matrices(robot, np.zeros((1, 2)))[0, 0, 0]
+    mass = robot.chain.mass_matrices(np.zeros((1, 2)))[0, 0, 0]
     assert least_time(robot, S, joint_path(0.4)) == pytest.approx(
         2.0 * np.sqrt(0.4 * mass / 20.0), rel=5e-3
     )
@@ -79,7 +79,7 @@ def test_mass_matrices_are_what_the_torque_multiplies():
     q, qddot = rng.normal(size=(2, 5, 3))
     expected = dynamics.torque(robot, q, np.zeros_like(q), qddot)
     np.testing.assert_allclose(
-        np.einsum("kij,kj->ki", dynamics.mass_matrices(robot, q), qddot),
+        np.einsum("kij,kj->ki", robot.chain.mass_matrices(q), qddot),
         expected,
         atol=1e-12,
     )
@@ -160,9 +160,7 @@ def with_stop(dwell: float) -> dict:
 
 
 def acceleration_of(force: float) -> float:
-    return (
-        force / dynamics.mass_matrices(gantry(torque=force), np.zeros((1, 2)))[0, 0, 0]
-    )
+    return force / gantry(torque=force).chain.mass_matrices(np.zeros((1, 2)))[0, 0, 0]
 
 
 def way_beside(distance: float, speed: float, acceleration: float) -> float:

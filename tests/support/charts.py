@@ -40,9 +40,12 @@ def jacobian(task_map: TaskMap, q: np.ndarray) -> np.ndarray:
     model = task_map.robot.model
     data = model.createData()
     tool = task_map.robot.frame_id
-    columns = [
-        pin.computeFrameJacobian(model, data, own, tool, task_map.frame) for own in q
-    ]
+    axes = (
+        pin.ReferenceFrame.LOCAL
+        if task_map.in_tool_axes
+        else pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    )
+    columns = [pin.computeFrameJacobian(model, data, own, tool, axes) for own in q]
     shape = (len(q), 6, model.nv)
     return task_map.jacobian(np.moveaxis(np.reshape(columns, shape), 1, 0))
 

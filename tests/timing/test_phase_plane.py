@@ -15,7 +15,6 @@ from brachis.limits.joint import (
     TorqueLimit,
     VelocityLimit,
 )
-from brachis.robot import dynamics
 from brachis.timing import JointPath, PhasePlane, divide_turns, is_left_out
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
@@ -43,7 +42,7 @@ def least_time(robot, path=None):
 
 
 def mass_of(robot):
-    return float(dynamics.mass_matrices(robot, np.zeros((1, 2)))[0, 0, 0])
+    return float(robot.chain.mass_matrices(np.zeros((1, 2)))[0, 0, 0])
 
 
 def test_trapezoid_to_five_digits():

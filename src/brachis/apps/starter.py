@@ -374,9 +374,7 @@ def starter_task(
         limb = default_chain(text, str(path))
         base_frame = base_frame or limb.base
         tool_frame = limb.tool
-    chain = read_chain(
-        text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints={}
-    )
+    chain = read_chain(text, str(path), tool_frame, base_frame)
     limits = placeholders(chain.joint_names, chain.limits)
     robot = Robot.from_urdf(
         path, tool_frame=tool_frame, base_frame=base_frame, limits=limits

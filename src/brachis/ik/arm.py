@@ -79,9 +79,8 @@ class RemainingJoints:
         """
         rest = complement(geometry.n, redundant)
         if len(rest) != count:
-            allowed = {3: "three", 6: "six"}[count]
             raise NotApplicableError(
-                f"{write_count(len(rest), 'joint')} left to solve for, not {allowed}"
+                f"{write_count(len(rest), 'joint')} left to solve for, not {count}"
             )
         q_r = np.random.default_rng(0).uniform(-np.pi, np.pi, (8, len(redundant)))
         screws = geometry.screws_with(redundant, q_r)
@@ -123,9 +122,7 @@ class RemainingJoints:
         Vectors are (3, ..., K), with so many axes of length one before the samples as there are `alternatives`.
         """
         picked = screws.pick(self.joints, alternatives)
-        if self.mirrored:
-            return tuple(screw.inverse for screw in picked)
-        return picked
+        return tuple(screw.inverse for screw in picked) if self.mirrored else picked
 
     def are_parallel(self, first: int, *others: int) -> bool:
         """Whether the directions of joints, of whatever kind, are always parallel."""

@@ -29,11 +29,10 @@ from brachis.ik.screws import ChainGeometry, PosedScrews, Poses, Screw
 from brachis.ik.vectors import nan_where_negative, wrap
 from brachis.robot.joints import complement
 
-SINGULAR = "J_nr is singular everywhere"
-"""The reason against a decomposition whose determinant is zero in all postures."""
 
-
-def largest_size(values: np.ndarray) -> float:
+def largest_size(
+    determinants: np.ndarray, geometry: ChainGeometry, redundant: Sequence[int]
+) -> float:
     """Return the largest size of det J_nr at random postures.
 
     Raises
@@ -41,9 +40,11 @@ def largest_size(values: np.ndarray) -> float:
     NotApplicableError
         J_nr is singular in all of them.
     """
-    size = float(np.abs(values).max())
+    size = float(np.abs(determinants).max())
     if size < tolerances.LENGTH:
-        raise NotApplicableError(SINGULAR)
+        names = ", ".join(geometry.joint_names[i] for i in redundant)
+        more = f": there is always a motion of the tool that needs {names}"
+        raise NotApplicableError(f"J_nr is singular everywhere{more if names else ''}")
     return size
 
 
@@ -75,7 +76,7 @@ class DeterminantSolver(FormulaMargins):
             rng = np.random.default_rng(0)
             postures = rng.uniform(-np.pi, np.pi, (64, chain.n))
         self._random = self._determinants(postures)
-        self._scale = largest_size(self._random)
+        self._scale = largest_size(self._random, chain, redundant)
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
         """Det J_nr, (K,), in postures (K, n)."""
@@ -98,8 +99,6 @@ class Factor:
     ----------
     value : callable
         The factor (...), from the screws at postures; analytic in complex postures.
-    vanishes : str
-        What it means if the factor is zero everywhere, with letters in braces for the joints, and a point's name.
     labels : tuple of str
         Parts of the labels of the branches with a positive and a negative factor.
     slides : tuple of int
@@ -107,7 +106,6 @@ class Factor:
     """
 
     value: Callable[[Arm], np.ndarray]
-    vanishes: str
     labels: tuple[str, str]
     slides: tuple[int, ...] = ()
 
@@ -130,17 +128,7 @@ class FactoredSolver(FormulaSolver):
         In the order in which they are solved for.
     factors : tuple of Factor
         Of the steps.
-
-    Attributes
-    ----------
-    letters : str
-        What the joints are called in `Factor.vanishes`, in their order.
-    point : str
-        What the point that a, b, c place is called.
     """
-
-    letters: str
-    point: str = ""
 
     def __init__(
         self,
@@ -245,50 +233,40 @@ class FactoredSolver(FormulaSolver):
         """Return the signs of these factors."""
         return np.array([self._choices[branch][slot] for slot in self._varying])
 
-    def reason_if_singular(self) -> str:
-        """Say which factor of det J_nr vanishes at all postures; empty if none does."""
-        for factor, size in zip(self._factors, self._scales, strict=True):
-            if size < tolerances.LENGTH:
-                names = dict(zip(self.letters, self._joints.names, strict=True))
-                return f": {factor.vanishes.format(**names, point=self.point)}"
-        return ""
-
 
 S = TypeVar("S", bound=FactoredSolver)
 
 
 def fit(
+    solver: Callable[..., S],
     geometry: ChainGeometry,
+    redundant: tuple[int, ...],
     joints: RemainingJoints,
-    orders: Sequence[Callable[[], S]],
+    *more: object,
 ) -> S:
-    """Return the first solver that fits.
+    """Make a solver of joints in their order or, where it does not fit, in the reverse order.
 
     Parameters
     ----------
+    solver : type
+        Made from the geometry, the redundant joints, the others in an order, and what else is given; raises
+        `NotApplicableError` if it does not fit.
     geometry : ChainGeometry
+    redundant : tuple of int
     joints : RemainingJoints
-    orders : sequence of callable
-        Each returns a solver, or raises `NotApplicableError`.
+        From the base to the tool.
 
     Raises
     ------
     NotApplicableError
-        J_nr is singular everywhere, or no solver fits; says why.
+        J_nr is singular everywhere, or the solver does not fit; says why.
     """
-    solver = None
+    determinants = geometry.random_screws.determinant(joints.joints)
+    largest_size(determinants, geometry, redundant)
     reasons = []
-    for order in orders:
+    for order in (joints, joints.reverse()):
         try:
-            solver = order()
-            break
+            return solver(geometry, redundant, order, *more)
         except NotApplicableError as reason:
             reasons.append(str(reason))
-    try:
-        largest_size(geometry.random_screws.determinant(joints.joints))
-    except NotApplicableError as singular:
-        more = solver.reason_if_singular() if solver else ""
-        raise NotApplicableError(f"{singular}{more}") from None
-    if solver is None:
-        raise NotApplicableError("; ".join(reasons))
-    return solver
+    raise NotApplicableError("; ".join(dict.fromkeys(reasons)))

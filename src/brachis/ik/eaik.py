@@ -179,10 +179,9 @@ class EaikSolver(DeterminantSolver):
             By how much right answers may miss their target, m or rad.
         """
         robots = self._robots_at(values)
-        poses = np.zeros((len(targets), 4, 4))
+        poses = np.tile(np.eye(4), (len(targets), 1, 1))
         poses[:, :3, :3] = targets[:, 3:].reshape(-1, 3, 3)
         poses[:, :3, 3] = targets[:, :3]
-        poses[:, 3, 3] = 1.0
         found = [
             _calculate(robot, pose)
             for (robot, _), pose in zip(robots, poses, strict=True)
@@ -362,12 +361,7 @@ def eaik(
         raise NotApplicableError(
             f"EAIK needs six revolute joints besides the redundant ones; prismatic: {', '.join(sliding)}"
         )
-    try:
-        largest_size(geometry.random_screws.determinant(rest))
-    except NotApplicableError as singular:
-        names = ", ".join(geometry.joint_names[i] for i in redundant)
-        more = f": there is always a motion of the tool that needs {names}"
-        raise NotApplicableError(f"{singular}{more if names else ''}") from None
+    largest_size(geometry.random_screws.determinant(rest), geometry, redundant)
     if not is_installed():
         raise NotApplicableError(NOT_INSTALLED)
     return EaikSolver(geometry, task_map, redundant)

@@ -40,6 +40,8 @@ without an order of the solutions; the cases with a rail are ours.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from brachis.common.arrays import cross
@@ -69,65 +71,45 @@ class ParallelAxesSolver(FactoredSolver):
     ----------
     geometry : ChainGeometry
     redundant : tuple of int
-    six : RemainingJoints
-        From the base to the tool.
+    joints : RemainingJoints
+        In the order in which they are solved for.
 
     Raises
     ------
     NotApplicableError
-        The joints have not this structure; says what is missing.
+        The joints have not this structure.
     """
 
     def __init__(
-        self, geometry: ChainGeometry, redundant: tuple[int, ...], six: RemainingJoints
+        self,
+        geometry: ChainGeometry,
+        redundant: tuple[int, ...],
+        joints: RemainingJoints,
     ) -> None:
-        triples = [i for i in range(4) if _are_parallel(six, i)]
-        if not triples:
-            raise NotApplicableError("no three successive joints have parallel axes")
-        choices = [
-            (joints, first)
-            for joints in (six, six.reverse())
-            for first in (1, 2)
-            if _fits(joints, first)
-        ]
+        choices = [first for first in (1, 2) if _fits(joints, first)]
         if not choices:
-            names = ", ".join(six.names[triples[0] : triples[0] + 3])
             raise NotApplicableError(
-                f"{names} are parallel, but the others are neither one joint before and two after whose axes meet, "
-                "nor a slide and a revolute joint before and one after, in this or the reverse order"
+                "no three successive joints have parallel axes, with either one joint before and two after whose axes "
+                "meet, or a slide and a revolute joint before and one after, in this or the reverse order"
             )
-        joints, self._first = choices[0]
+        self._first = choices[0]
         before = joints.revolute[: self._first].tolist()
-        self._turn = before.index(True) if True in before else None
+        self._turn = before.index(True) if True in before else 0
         self._slide = before.index(False) if False in before else None
         self._parallel = (self._first, self._first + 1, self._first + 2)
-        # x spans the wrist's factor with f, the last joint: it is e, or a if e is missing.
-        if self._first == 1:
-            self.letters = "abcdxf" if self._slide is None else "pbcdxf"
-        else:
-            self.letters = "xpbcdf" if self._slide else "pxbcdf"
-        self._beside = self.letters.index("x")
+        # The wrist's factor is spanned by f, the last joint, and by e, or a if e is missing.
+        self._beside = 4 if self._first == 1 else self._turn
         self._elbow = 0 if self._slide is not None else 1
         super().__init__(geometry, redundant, joints, self._factors_of_steps())
 
     def _factors_of_steps(self) -> tuple[Factor, ...]:
         """Return the factors of shoulder, elbow, wrist, or of elbow, wrist, rail."""
-        elbow = Factor(
-            self._elbow_factor,
-            "the axes of two of {b}, {c}, {d} coincide",
-            ("up", "down"),
-        )
-        wrist = Factor(
-            self._wrist_factor,
-            "the axes of {x}, {f}, {b} always are parallel to one plane",
-            ("noflip", "flip"),
-        )
+        elbow = Factor(self._elbow_factor, ("up", "down"))
+        wrist = Factor(self._wrist_factor, ("noflip", "flip"))
         if self._slide is None:
-            way = "{a} does not move the point where the axes of {x} and {f} meet along the parallel axes"
-            shoulder = Factor(self._shoulder_factor, way, ("front", "back"))
+            shoulder = Factor(self._shoulder_factor, ("front", "back"))
             return shoulder, elbow, wrist
-        way = "{p} never moves the arm along the parallel axes"
-        rail = Factor(self._rail_factor, way, ("left", "right"), (self._slide,))
+        rail = Factor(self._rail_factor, ("left", "right"), (self._slide,))
         return elbow, wrist, rail
 
     def _arm(self, screws: tuple[Screw, ...], _tool: np.ndarray | None = None) -> Arm:
@@ -140,7 +122,7 @@ class ParallelAxesSolver(FactoredSolver):
 
     def _shoulder_factor(self, arm: Arm) -> np.ndarray:
         """Velocity that a gives P along the parallel axes."""
-        velocity = arm.screws[self._turn or 0].velocity(arm.centre)
+        velocity = arm.screws[self._turn].velocity(arm.centre)
         return dot(arm.screws[self._first].axis, velocity)
 
     def _elbow_factor(self, arm: Arm) -> np.ndarray:
@@ -162,20 +144,18 @@ class ParallelAxesSolver(FactoredSolver):
         arm = self._arm(screws)
         place = motion.move(arm.centre)
         values, angle, image = self._solve_outer(arm, motion, place)
-        a, b, c, d = (screws[i] for i in (self._turn or 0, *self._parallel))
+        a, b, c, d = (screws[i] for i in (self._turn, *self._parallel))
         place = a.inverse.orbit(place).at(angle)
         n = b.axis
         following = screws[self._first + 3].axis
         theta = angle_about(n, following, rotate(a.axis, -angle, image))
         if self._slide is not None:
             s = screws[self._slide].axis
-            if self._slide < (self._turn or 0):  # a turns its direction as well
+            if self._slide < self._turn:  # a turns its direction as well
                 s = rotate(a.axis, -angle, s)
                 turned = list(screws)
-                turned[self._slide] = Screw(
-                    s, screws[self._slide].point, revolute=False
-                )
-                arm = Arm(tuple(turned), arm.centre, arm.meeting)
+                turned[self._slide] = replace(screws[self._slide], axis=s)
+                arm = replace(arm, screws=tuple(turned))
             values[self._slide] = dot(n, place - arm.centre) / dot(n, s)
             place = place - s * values[self._slide]
         end = place + rotate(n, theta, d.point - arm.centre)
@@ -192,16 +172,17 @@ class ParallelAxesSolver(FactoredSolver):
         """Solve for the turning joints beside the parallel ones; return them, the angle of a, and R_D R_post^T e."""
         n = arm.screws[self._first].axis
         wrist = self._elbow + 1
-        a = arm.screws[self._turn or 0]
+        a = arm.screws[self._turn]
         e, f = arm.screws[4:]
         angle = np.zeros(1)
         if self._first == 1:
-            if self._turn is not None:
+            if self._slide is None:
                 level = -dot(n, arm.centre)
                 angle = a.inverse.orbit(place).component(-n, level, _SHOULDER)
             y = apply_inverse(motion.rotation, rotate(a.axis, angle, n))
             last = Circle.of(f.axis, y).component(e.axis, dot(e.axis, n), wrist)
-            values = {4: angle_about(e.axis, rotate(f.axis, last, y), n), 5: last}
+            bend = angle_about(e.axis, rotate(f.axis, last, y), n)
+            values = {0: angle, 4: bend, 5: last}
             image = rotate(f.axis, -last, e.axis)
         else:
             direction = -apply_inverse(motion.rotation, a.axis)
@@ -209,22 +190,16 @@ class ParallelAxesSolver(FactoredSolver):
             last = orbit.component(direction, -dot(a.axis, n), wrist)
             y = apply(motion.rotation, rotate(f.axis, -last, n))
             angle = angle_about(a.axis, n, y)
-            values = {5: last}
+            values = {self._turn: angle, 5: last}
             image = f.axis
-        if self._turn is not None:
-            values[self._turn] = angle
         return values, angle, apply(motion.rotation, image)
-
-
-def _are_parallel(six: RemainingJoints, first: int) -> bool:
-    """Whether three successive joints are revolute and their axes parallel."""
-    places = (first, first + 1, first + 2)
-    return bool(six.revolute[[*places]].all()) and six.are_parallel(*places)
 
 
 def _fits(six: RemainingJoints, first: int) -> bool:
     """Whether three joints from the place `first` on are parallel, and the others around them as they should be."""
-    if not _are_parallel(six, first) or not six.revolute[first + 3 :].all():
+    if not six.revolute[first:].all():
+        return False
+    if not six.are_parallel(first, first + 1, first + 2):
         return False
     if first == 1:
         return six.meeting(4, 5) is not None and not six.are_parallel(4, 5)
@@ -240,4 +215,4 @@ def parallel_axes(
 ) -> ParallelAxesSolver:
     """Fit the family: a pose, six joints left over, and three parallel axes in succession among them."""
     six = RemainingJoints.of_pose(geometry, task_map, redundant)
-    return fit(geometry, six, [lambda: ParallelAxesSolver(geometry, redundant, six)])
+    return fit(ParallelAxesSolver, geometry, redundant, six)

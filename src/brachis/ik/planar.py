@@ -73,13 +73,12 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         self._normal = np.cross(*basis)
         self._rows = np.eye(3)[list(task_map.axes)]
         self._senses = np.where(revolute, np.sign(geometry.axes @ self._normal), 1.0)
-        letters = [
-            "R" if revolute[i] else "P" for i in complement(geometry.n, redundant)
-        ]
+        rest = complement(geometry.n, redundant)
+        kinds = "".join("R" if revolute[i] else "P" for i in rest)
         self._tool_axis = None
         if isinstance(task_map, RowsAndYaw):
             self._tool_axis = task_map.tool_axis
-            del letters[len(letters) - 1 - letters[::-1].index("R")]
+            kinds = "".join(kinds.rsplit("R", 1))
         # Heights above the plane are set to zero, and what that of the tool adds to the rows is taken off.
         height = self._normal @ geometry.tool_position
         self._offset = self._rows @ self._normal * height
@@ -91,7 +90,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             points=geometry.points @ flatten,
             tool_position=flatten @ geometry.tool_position,
         )
-        super().__init__(flat, redundant, _LABELS["".join(letters)])
+        super().__init__(flat, redundant, _LABELS[kinds])
 
     def _determinants(self, q: np.ndarray) -> np.ndarray:
         """Compute det J_nr from velocities in the plane, or along the row, and about the normal."""
@@ -175,13 +174,10 @@ def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
         geometry.joint_names, geometry.axes, geometry.revolute, strict=True
     ):
         cosine = abs(axis @ normal)
-        if revolute and cosine < 1.0 - tolerances.ANGLE:
+        is_across = not revolute and cosine <= tolerances.ANGLE
+        if cosine < 1.0 - tolerances.ANGLE and not is_across:
             raise NotApplicableError(
-                f"not planar: the axes of {geometry.joint_names[turning[0]]} and {name} are not parallel"
-            )
-        if not revolute and tolerances.ANGLE < cosine < 1.0 - tolerances.ANGLE:
-            raise NotApplicableError(
-                f"not planar: {name} slides at an angle to the plane"
+                f"not planar: {name} moves out of the plane in which {geometry.joint_names[turning[0]]} turns"
             )
     return normal
 
@@ -212,13 +208,9 @@ def planar(
     inert = ~geometry.revolute & (
         np.abs(geometry.axes @ normal) > 1.0 - tolerances.ANGLE
     )
-    if inert.any() and np.any(np.abs(rows @ normal) > tolerances.ANGLE):
-        raise NotApplicableError(
-            "a prismatic joint along the plane's normal changes the prescribed rows"
-        )
-    if len(rows) > 2 or np.linalg.matrix_rank(
-        rows @ basis.T, tol=tolerances.ANGLE
-    ) < len(rows):
+    leaves_plane = inert.any() and np.any(np.abs(rows @ normal) > tolerances.ANGLE)
+    rank = np.linalg.matrix_rank(rows @ basis.T, tol=tolerances.ANGLE)
+    if leaves_plane or rank < len(rows):
         raise NotApplicableError(
             "the prescribed rows do not fit the plane in which the joints move"
         )
@@ -267,13 +259,11 @@ class PrismaticSolver(DeterminantSolver, FormulaSolver):
 
     def margins(self, q: np.ndarray) -> np.ndarray:
         """Return the determinant of D; no margin where D is constant."""
-        margins = super().margins(q)
-        return margins if len(self.branches) == 2 else margins[:, :0]
+        return super().margins(q)[:, : len(self.branches) - 1]
 
     def margin_signs(self, branch: int) -> np.ndarray:
         """Return the sign of the determinant, where it is a margin."""
-        signs = super().margin_signs(branch)
-        return signs if len(self.branches) == 2 else signs[:0]
+        return super().margin_signs(branch)[: len(self.branches) - 1]
 
 
 @ik_family("prismatic", source="linear in the slides; the docstring of `planar`")
@@ -281,8 +271,8 @@ def prismatic(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> PrismaticSolver:
     """Fit the family: every non-redundant joint is prismatic and no angle is prescribed."""
-    if isinstance(task_map, Pose):
-        raise NotApplicableError("this family does not solve poses")
+    if isinstance(task_map, Pose | RowsAndYaw):
+        raise NotApplicableError("prismatic joints do not change orientations")
     turning = [
         geometry.joint_names[i]
         for i in complement(geometry.n, redundant)
@@ -292,6 +282,4 @@ def prismatic(
         raise NotApplicableError(
             f"all joints must be prismatic besides the redundant ones; revolute: {', '.join(turning)}"
         )
-    if isinstance(task_map, RowsAndYaw):
-        raise NotApplicableError("prismatic joints do not change yaw")
     return PrismaticSolver(geometry, task_map, redundant)

@@ -48,10 +48,9 @@ from functools import partial
 
 import numpy as np
 
-from brachis.common import tolerances
 from brachis.common.arrays import cross
 from brachis.ik.arm import Anchor, Arm, RemainingJoints
-from brachis.ik.branches import SINGULAR, Factor, FactoredSolver, Steps, fit
+from brachis.ik.branches import Factor, FactoredSolver, Steps, fit
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Screw
 from brachis.ik.vectors import across, angle_about, dot
@@ -205,17 +204,17 @@ class Recipe:
 
     Attributes
     ----------
-    fits : callable
-        Whether it applies to joints.
+    fits : callable or None
+        Whether it applies to joints; None where axes have to meet.
     meets : tuple of int
-        Two joints whose axes meet in `Arm.meeting`; empty where none have to.
+        Two joints whose axes have to meet, in `Arm.meeting`; empty where none have to.
     solve : callable
         Positions of a, b, c from the screws while the joints are at zero, and the target of their centre.
     factors : tuple of Factor
         Of the slots `FRONT` and `UP`.
     """
 
-    fits: Callable[[RemainingJoints], bool]
+    fits: Callable[[RemainingJoints], bool] | None
     meets: tuple[int, ...]
     solve: Callable[[Arm, np.ndarray], Values]
     factors: tuple[Factor, Factor]
@@ -230,11 +229,6 @@ def _are_coplanar(joints: RemainingJoints, i: int, j: int) -> bool:
     return not joints.are_parallel(i, j)
 
 
-def _do_meet(joints: RemainingJoints, i: int, j: int) -> bool:
-    """Whether the axes of two joints meet in a fixed point of one of them."""
-    return joints.meeting(i, j) is not None
-
-
 def _are_cylindrical(joints: RemainingJoints) -> bool:
     """Whether the first joint slides along the second's axis, and the third's is perpendicular to it."""
     return (
@@ -246,8 +240,6 @@ def _are_cylindrical(joints: RemainingJoints) -> bool:
 
 _FRONT = ("front", "back")
 _UP = ("up", "down")
-_OUT = "does not move {point} out of the plane in which"
-_AWAY = "does not change the distance between {point} and the point where the axes of"
 
 RECIPES = (
     Recipe(
@@ -255,18 +247,8 @@ RECIPES = (
         (),
         solve_plane_of_last,
         (
-            Factor(
-                partial(_across, joint=0, plane=(1, 2)),
-                f"{{a}} {_OUT} {{b}} and {{c}} do",
-                _FRONT,
-                (0,),
-            ),
-            Factor(
-                partial(_area, plane=(1, 2)),
-                "{b} and {c} move {point} along one line",
-                _UP,
-                (1, 2),
-            ),
+            Factor(partial(_across, joint=0, plane=(1, 2)), _FRONT, (0,)),
+            Factor(partial(_area, plane=(1, 2)), _UP, (1, 2)),
         ),
     ),
     Recipe(
@@ -274,87 +256,43 @@ RECIPES = (
         (),
         solve_plane_of_first,
         (
-            Factor(
-                partial(_area, plane=(0, 1)),
-                "{a} and {b} move {point} along one line",
-                _FRONT,
-                (0, 1),
-            ),
-            Factor(
-                partial(_across, joint=2, plane=(0, 1)),
-                f"{{c}} {_OUT} {{a}} and {{b}} do",
-                _UP,
-                (2,),
-            ),
+            Factor(partial(_area, plane=(0, 1)), _FRONT, (0, 1)),
+            Factor(partial(_across, joint=2, plane=(0, 1)), _UP, (2,)),
         ),
     ),
     Recipe(
-        partial(_do_meet, i=0, j=1),
+        None,
         (0, 1),
         solve_meeting_of_first,
         (
-            Factor(
-                partial(_along, joint=1, axis=0),
-                "{b} does not move {point} along the axis of {a}",
-                _FRONT,
-            ),
-            Factor(
-                partial(_approach, joint=2, sign=1.0),
-                f"{{c}} {_AWAY} {{a}} and {{b}} meet",
-                _UP,
-            ),
+            Factor(partial(_along, joint=1, axis=0), _FRONT),
+            Factor(partial(_approach, joint=2, sign=1.0), _UP),
         ),
     ),
     Recipe(
-        partial(_do_meet, i=1, j=2),
+        None,
         (1, 2),
         solve_meeting_of_last,
         (
-            Factor(
-                partial(_along, joint=2, axis=1),
-                "{c} does not move {point} along the axis of {b}",
-                _FRONT,
-            ),
-            Factor(
-                partial(_approach, joint=0, sign=-1.0),
-                f"{{a}} {_AWAY} {{b}} and {{c}} meet",
-                _UP,
-            ),
+            Factor(partial(_along, joint=2, axis=1), _FRONT),
+            Factor(partial(_approach, joint=0, sign=-1.0), _UP),
         ),
     ),
     Recipe(
         _are_cylindrical,
         (),
         solve_cylinder,
-        (
-            Factor(
-                _in_front,
-                "{a} and {b} do not move {point} along the axis of {c}",
-                _FRONT,
-            ),
-            Factor(_to_front, f"{{c}} {_OUT} {{a}} and {{b}} do", _UP),
-        ),
+        (Factor(_in_front, _FRONT), Factor(_to_front, _UP)),
     ),
 )
 """The first one that fits is taken."""
 
 
-def choose_recipe(
-    point: str, *orders: RemainingJoints
-) -> tuple[RemainingJoints, Recipe, Anchor | None]:
-    """Find the recipe by which the first three joints of some order place a point.
-
-    Parameters
-    ----------
-    point : str
-        What it is called in messages.
-    *orders : RemainingJoints
-        The same joints, or in the reverse order; the first one that a recipe fits is taken.
+def choose_recipe(point: str, joints: RemainingJoints) -> tuple[Recipe, Anchor | None]:
+    """Find the recipe by which the first three joints place a point, which is called so in messages.
 
     Returns
     -------
-    joints : RemainingJoints
-        This order.
     recipe : Recipe
     meeting : Anchor or None
         Where two of their axes meet, if it matters.
@@ -362,40 +300,17 @@ def choose_recipe(
     Raises
     ------
     NotApplicableError
-        No recipe fits; says how the three lie to each other in the first order.
+        No recipe fits.
     """
-    for joints in orders:
-        for recipe in RECIPES:
-            if recipe.fits(joints):
-                meeting = joints.meeting(*recipe.meets) if recipe.meets else None
-                return joints, recipe, meeting
-    joints = orders[0]
-    relations = f"{_relation(joints, 0, 1)}, and {_relation(joints, 1, 2)}"
-    names = ", ".join(joints.names[:3])
-    raise NotApplicableError(f"no closed form moves {point} by {names}: {relations}")
-
-
-def _relation(joints: RemainingJoints, i: int, j: int) -> str:
-    """Say how two neighbours lie to each other."""
-    first = joints.names[i]
-    second = joints.names[j]
-    parallel = joints.are_parallel(i, j)
-    if joints.revolute[i] and joints.revolute[j]:
-        relation = "are not parallel and do not meet in a fixed point of one of them"
-        if parallel:
-            relation = "are parallel"
-        elif joints.meeting(i, j):
-            relation = "meet"
-        return f"the axes of {first} and {second} {relation}"
-    manner = "at an angle to"
-    if parallel:
-        manner = "along"
-    elif joints.are_perpendicular(i, j):
-        manner = "across"
-    if joints.revolute[i]:
-        return f"{second} slides {manner} the axis of {first}"
-    kind = "axis" if joints.revolute[j] else "direction"
-    return f"{first} slides {manner} the {kind} of {second}"
+    for recipe in RECIPES:
+        meeting = joints.meeting(*recipe.meets) if recipe.meets else None
+        if meeting or (recipe.fits and recipe.fits(joints)):
+            return recipe, meeting
+    names = ", ".join(sorted(joints.names[:3]))
+    raise NotApplicableError(
+        f"no closed form moves {point} by {names}: no two neighbours among them move in one plane or have axes that "
+        "meet in a fixed point"
+    )
 
 
 class PositioningSolver(FactoredSolver):
@@ -405,8 +320,8 @@ class PositioningSolver(FactoredSolver):
     ----------
     geometry : ChainGeometry
     redundant : tuple of int
-    three : RemainingJoints
-        From the base to the tool.
+    joints : RemainingJoints
+        In the order in which they are solved for.
     rows : sequence of int
         World axes (0, 1, 2) of the target's coordinates.
 
@@ -416,19 +331,14 @@ class PositioningSolver(FactoredSolver):
         No recipe fits.
     """
 
-    letters = "abc"
-    point = "the tool"
-
     def __init__(
         self,
         geometry: ChainGeometry,
         redundant: tuple[int, ...],
-        three: RemainingJoints,
+        joints: RemainingJoints,
         rows: Sequence[int],
     ) -> None:
-        joints, self.recipe, self._meeting = choose_recipe(
-            self.point, three, three.reverse()
-        )
+        self.recipe, self._meeting = choose_recipe("the tool", joints)
         self._order = np.argsort(rows)
         super().__init__(geometry, redundant, joints, self.recipe.factors)
 
@@ -455,13 +365,4 @@ def positioning(
     if isinstance(task_map, Pose) or len(task_map.axes) != 3:
         raise NotApplicableError("this family solves only the position: x, y and z")
     three = RemainingJoints.of(geometry, redundant, 3)
-    columns = geometry.random_screws.jacobian_columns(three.joints)
-    speeds = np.abs(columns[:3]).max(axis=(0, 2))
-    for name, speed in zip(three.names, speeds, strict=True):
-        if speed < tolerances.LENGTH:
-            raise NotApplicableError(f"{SINGULAR}: {name} does not move the tool")
-    return fit(
-        geometry,
-        three,
-        [lambda: PositioningSolver(geometry, redundant, three, task_map.axes)],
-    )
+    return fit(PositioningSolver, geometry, redundant, three, task_map.axes)

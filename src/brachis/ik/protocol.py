@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -178,9 +178,4 @@ def ik_family(name: str, *, source: str) -> Callable[[Build], Family]:
 
     The result is handed to `brachis.ik.find`, or published by another package in the entry-point group ``brachis.ik``.
     """
-
-    def declare(build: Build) -> Family:
-        """Return the family that builds its solvers by the function."""
-        return Family(name, build, source)
-
-    return declare
+    return partial(Family, name, source=source)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import importlib.metadata
 import itertools
 import pickle
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 
@@ -21,7 +21,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arguments import check_list
 from brachis.common.words import write_count
-from brachis.errors import DecompositionError, InputError, UnknownNameError
+from brachis.errors import DecompositionError, InputError, check_names
 from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar, prismatic
@@ -49,6 +49,7 @@ BUILTIN: tuple[Family, ...] = (
 )
 """In the order in which they are tried."""
 _FAILED = "its code failed"
+_NAMELESS = "every family needs a name, and one of its own"
 NO_CLOSED_FORM = (
     "no choice of redundant joints has a closed form: "
     "motions are planned from differential inverse kinematics"
@@ -112,19 +113,10 @@ def check_families(families: Sequence[Family]) -> None:
             )
         if family in BUILTIN:  # to be tried first
             continue
-        problem = _find_name_problem(family, taken)
-        if problem:
-            raise InputError(problem, where=f"{where}.name", found=repr(family.name))
+        if family.name in taken or not str(family.name or "").strip():
+            found = repr(family.name)
+            raise InputError(_NAMELESS, where=f"{where}.name", found=found)
         taken.add(family.name)
-
-
-def _find_name_problem(family: Family, taken: Collection[str]) -> str:
-    """Say what is wrong with the name of a family; empty if nothing is."""
-    if not isinstance(family.name, str) or not family.name.strip():
-        return "a family needs a name"
-    if family.name in taken:
-        return "this name exists already; every family needs a name of its own"
-    return ""
 
 
 @cache
@@ -143,11 +135,10 @@ def _load(entry: importlib.metadata.EntryPoint) -> Family:
     else:
         if not isinstance(family, Family):
             reason = f"the plug-in's entry point must be a Family, not {type(family).__name__}"
+        elif family.name in {own.name for own in BUILTIN}:
+            reason = _NAMELESS
         else:
-            names = [own.name for own in BUILTIN]
-            reason = _find_name_problem(family, names)
-            if not reason:
-                return family
+            return family
 
     def refuse(*_arguments: object) -> IKSolver:
         """Say why the family cannot be used."""
@@ -209,11 +200,7 @@ def _check_names(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> Non
     ------
     UnknownNameError, DecompositionError
     """
-    for name in names:
-        if name not in robot.joint_names:
-            raise UnknownNameError(
-                "joint", name, robot.joint_names, where="redundant_joints"
-            )
+    check_names("joint", names, robot.joint_names, "redundant_joints")
     r = robot.n - task_map.m
     if r < 0:
         by = ", ".join(["0.5"] * robot.n)

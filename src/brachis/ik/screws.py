@@ -267,7 +267,7 @@ class ChainGeometry(Chain):
         q : (K, n) ndarray
             Real, or complex for complex-step derivatives.
         """
-        return self._move(q.T, np.ones(self.n, dtype=bool))
+        return self.screws_with(range(self.n), q)
 
     def screws_with(self, joints: Sequence[int], positions: np.ndarray) -> PosedScrews:
         """Screw axes and tool placement where some joints are held at given positions and all others are zero.
@@ -279,34 +279,28 @@ class ChainGeometry(Chain):
         positions : (K, h) ndarray
             Of these, rad or m.
         """
-        moving = np.zeros(self.n, dtype=bool)
-        moving[list(joints)] = True
-        q = np.zeros((self.n, len(positions)), dtype=positions.dtype)
-        q[moving] = positions.T
-        return self._move(q, moving)
-
-    def _move(self, q: np.ndarray, moving: np.ndarray) -> PosedScrews:
-        """Move joints one after the other; q is (n, K), and `moving` says which of them move at all."""
-        count = q.shape[1]
-        axes = np.empty((3, self.n, count), dtype=q.dtype)
+        count = len(positions)
+        moving = dict(zip(joints, positions.T, strict=True))
+        axes = np.empty((3, self.n, count), dtype=positions.dtype)
         points = np.empty_like(axes)
         rotation = np.eye(3)[:, :, None]
         offset = np.zeros((3, 1))
         for i in range(self.n):
             axes[:, i] = self.axes[i] @ rotation
             points[:, i] = self.points[i] @ rotation + offset
-            if not moving[i]:
+            if i not in moving:
                 continue
+            q = moving[i]
             if self.revolute[i]:
                 first, second = self._generators[i]
                 rotation = (
                     rotation
-                    + (first @ rotation) * formula.sin(q[i])
-                    + (second @ rotation) * (1.0 - formula.cos(q[i]))
+                    + (first @ rotation) * formula.sin(q)
+                    + (second @ rotation) * (1.0 - formula.cos(q))
                 )
                 offset = points[:, i] - self.points[i] @ rotation
             else:
-                offset = offset + axes[:, i] * q[i]
+                offset = offset + axes[:, i] * q
         position = self.tool_position @ rotation + offset
         tool = self.tool_rotation.T @ rotation
         return PosedScrews(

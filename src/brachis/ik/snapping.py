@@ -52,11 +52,7 @@ class SnappedChain:
     @property
     def miss(self) -> str:
         """How far the axes of the given chain are from the ideal ones, for messages."""
-        sizes = ((self.turned, "rad"), (self.shifted, "m"))
-        least = 1e-3 * max(self.turned, self.shifted)
-        return " and ".join(
-            f"{size:.1e} {unit}" for size, unit in sizes if size > least
-        )
+        return f"{self.turned:.1e} rad and {self.shifted:.1e} m"
 
 
 def snap_axes(
@@ -221,6 +217,11 @@ class PolishedSolver(IKSolver):
         The given chain.
     task_map : TaskMap
     redundant : tuple of int
+
+    Attributes
+    ----------
+    ideal : IKSolver
+        The closed form of the ideal chain.
     """
 
     def __init__(
@@ -232,25 +233,20 @@ class PolishedSolver(IKSolver):
     ) -> None:
         self.branches = solver.branches
         self.alternatives = solver.alternatives
-        self._solver = solver
+        self.ideal = solver
         self._newton = Newton(task_map, geometry)
         self._redundant = list(redundant)
         self._rest = complement(geometry.n, redundant)
 
-    @property
-    def ideal(self) -> IKSolver:
-        """Closed form of the ideal chain."""
-        return self._solver
-
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Polish the answers of the ideal chain."""
-        return self._polish(self._solver.solve(targets, q_r), targets, q_r)
+        return self._polish(self.ideal.solve(targets, q_r), targets, q_r)
 
     def solve_branch(
         self, targets: np.ndarray, q_r: np.ndarray, branch: int
     ) -> np.ndarray:
         """Polish the answers of one branch."""
-        answers = self._solver.solve_branch(targets, q_r, branch)
+        answers = self.ideal.solve_branch(targets, q_r, branch)
         return self._polish(answers, targets, q_r)
 
     def _polish(
@@ -269,8 +265,8 @@ class PolishedSolver(IKSolver):
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return the margins of the ideal chain."""
-        return self._solver.branch_margins(q, branch)
+        return self.ideal.branch_margins(q, branch)
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return the slopes of the margins of the ideal chain."""
-        return self._solver.margin_gradient(q, branch)
+        return self.ideal.margin_gradient(q, branch)

@@ -122,26 +122,24 @@ def _check_slopes(solver: IKSolver, q: np.ndarray) -> None:
     for branch, label in enumerate(solver.branches):
         margins = _compute_margins(solver, q, branch)
         inside = q[margins.min(axis=1, initial=np.inf) > 1e-2][:_SLOPES]
-        count = len(inside)
-        if not count:
+        if not len(inside):
             continue
         slopes = solver.margin_gradient(inside, branch)
-        expected = (count, margins.shape[1], n)
+        expected = (len(inside), margins.shape[1], n)
         if np.shape(slopes) != expected:
             raise NotApplicableError(
                 f"its margin_gradient has the shape {np.shape(slopes)}, not {expected}"
             )
-        moves = step * np.eye(n)
-        ahead = (inside[:, None] + moves).reshape(-1, n)
-        behind = (inside[:, None] - moves).reshape(-1, n)
-        rise = _compute_margins(solver, ahead, branch) - _compute_margins(
-            solver, behind, branch
-        )
-        found = np.moveaxis(rise.reshape(count, n, -1), 1, 2) / (2.0 * step)
+        rises = [
+            _compute_margins(solver, inside + move, branch)
+            - _compute_margins(solver, inside - move, branch)
+            for move in step * np.eye(n)
+        ]
+        found = np.stack(rises, axis=2) / (2.0 * step)
         largest = np.abs(found).max(axis=(1, 2), initial=0.0)
         miss = np.abs(slopes - found).max(axis=(1, 2), initial=0.0)
         is_wrong = ~(miss <= 1e-3 * largest + 1e-6)
-        if 2 * is_wrong.sum() > count:
+        if 2 * is_wrong.sum() > len(inside):
             raise NotApplicableError(
                 f"its margin_gradient contradicts differences of its branch_margins in branch {label}, by up to "
                 f"{miss.max():.1e}; margins have to be analytic, without abs or comparisons"

@@ -24,7 +24,6 @@ three joints see `point_recipes`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -47,11 +46,7 @@ def _wrist_factor(arm: Arm) -> np.ndarray:
     return dot(u.axis, cross(w.axis, v.axis))
 
 
-_WRIST = Factor(
-    _wrist_factor,
-    "the axes of {u}, {v}, {w} always are parallel to one plane",
-    ("noflip", "flip"),
-)
+_WRIST = Factor(_wrist_factor, ("noflip", "flip"))
 
 
 class SphericalWristSolver(FactoredSolver):
@@ -70,23 +65,18 @@ class SphericalWristSolver(FactoredSolver):
         The last three axes do not meet, or no recipe fits.
     """
 
-    letters = "abcuvw"
-
     def __init__(
         self, geometry: ChainGeometry, redundant: tuple[int, ...], six: RemainingJoints
     ) -> None:
         names = ", ".join(six.names[3:])
         centre = six.meeting(3, 4, 5)
         if centre is None:
-            sliding = [six.names[i] for i in (3, 4, 5) if not six.revolute[i]]
             raise NotApplicableError(
-                f"{' and '.join(sliding)} among {names} slides"
-                if sliding
-                else f"the axes of {names} do not meet in a point (they miss it by {six.miss(3, 4, 5):.2g} m)"
+                f"the axes of {names} do not meet in a point (one slides, or they miss it by {six.miss(3, 4, 5):.2g} m)"
             )
         self._centre = centre
-        self.point = f"the point where the axes of {names} meet"
-        _, self.recipe, self._meeting = choose_recipe(self.point, six)
+        point = f"the point where the axes of {names} meet"
+        self.recipe, self._meeting = choose_recipe(point, six)
         super().__init__(geometry, redundant, six, (*self.recipe.factors, _WRIST))
 
     def _arm(self, screws: tuple[Screw, ...], _tool: np.ndarray | None = None) -> Arm:
@@ -135,5 +125,4 @@ def spherical_wrist(
 ) -> SphericalWristSolver:
     """Fit the family: a pose, and six joints left over of which the last or the first three axes meet in a point."""
     six = RemainingJoints.of_pose(geometry, task_map, redundant)
-    build = partial(SphericalWristSolver, geometry, redundant)
-    return fit(geometry, six, [lambda: build(six), lambda: build(six.reverse())])
+    return fit(SphericalWristSolver, geometry, redundant, six)

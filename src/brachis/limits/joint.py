@@ -247,7 +247,7 @@ class TorqueLimit(_TorqueLimit, HasLatticeWeights):
     refusal = "cannot hold the arm against gravity"
 
     def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
-        return self._scale_rows(dynamics.mass_matrices(self._robot, q)), None
+        return self._scale_rows(self._robot.chain.mass_matrices(q)), None
 
 
 class TorqueRateLimit(_DynamicLimit):

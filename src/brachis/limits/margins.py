@@ -53,7 +53,8 @@ class SingularityLimit(Limit):
         last = sizes.shape[1] - 1
         moving = np.zeros_like(motion.q)
         moving[:, : self._count] = right[:, last]
-        slopes = self._task_map.velocity_slopes(twists, moving)
+        still = np.zeros_like(moving)
+        slopes = self._task_map.derivatives(twists, moving, still).velocity_q
         by_q = np.einsum("ki,kij->kj", left[:, :, last], slopes)
         return Partials(q=by_q[:, None] / self._figure)
 

@@ -8,7 +8,7 @@ object with ``bind(robot)``, which gives the limit for a robot (see `brachis.lim
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -19,7 +19,6 @@ from brachis.errors import BrachisError, InputError, UnknownNameError, suggest
 from brachis.robot.robot import Robot
 from brachis.task import Task
 
-GROUP = "brachis.limits"
 _SECTION = "custom_limits"
 
 
@@ -60,9 +59,8 @@ def _make_plugins(task: Task) -> dict[str, LimitModel]:
     """Make the limits that a task names under ``custom_limits``."""
     if not task.custom_limits:
         return {}  # looking through the installed packages takes milliseconds
-    installed = {
-        entry.name: entry for entry in importlib.metadata.entry_points(group=GROUP)
-    }
+    entries = importlib.metadata.entry_points(group="brachis.limits")
+    installed = {entry.name: entry for entry in entries}
     made = {}
     for kind, parameters in task.custom_limits.items():
         where = f"{_SECTION}.{kind}"
@@ -75,26 +73,16 @@ def _make_plugins(task: Task) -> dict[str, LimitModel]:
                 hint=suggest(kind, installed)
                 or "Install the package that provides this kind (entry point brachis.limits)",
             )
-        try:
-            factory = installed[kind].load()
-        except Exception as error:
-            problem = f"the plug-in {installed[kind].value} cannot be loaded: {type(error).__name__}: {error}"
-            raise InputError(problem, where=where) from error
         with name_failures(where, installed[kind].value):
-            made[where] = _make(factory, parameters, where)
-    return made
-
-
-def _make(factory: Any, parameters: Mapping[str, object], where: str) -> LimitModel:
-    """Make the limit of a plug-in, which may refuse its parameters."""
-    try:
-        made: LimitModel = factory(**parameters)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"the plug-in refuses its parameters: {error}",
-            where=where,
-            found=parameters,
-        ) from error
+            factory = installed[kind].load()
+            try:
+                made[where] = factory(**parameters)
+            except (TypeError, ValueError) as error:
+                raise InputError(
+                    f"the plug-in refuses its parameters: {error}",
+                    where=where,
+                    found=parameters,
+                ) from error
     return made
 
 

@@ -84,11 +84,6 @@ def torque(
     return robot.chain.torques(q, qdot, qddot)
 
 
-def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Mass matrices with armature, (K, n, n), of K postures (K, n)."""
-    return robot.chain.mass_matrices(q)
-
-
 def torque_derivatives(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> TorqueDerivatives:

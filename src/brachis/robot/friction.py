@@ -91,11 +91,23 @@ class Friction(Summary):
                     )
         rotors = terms.pop("rotor_inertia")
         ratios = terms.pop("gear_ratio")
-        _check_rotors(names, rotors, ratios, terms["armature"])
+        for i in np.flatnonzero((rotors > 0.0) & (ratios == 0.0)):
+            raise InputError(
+                f"the rotor of joint {names[i]!r} has no gear ratio",
+                where=f"robot.friction.gear_ratio.{names[i]}",
+                allowed=f"turns of the rotor per turn of the joint, > 0, at most {LARGEST:g}; 1 for a direct drive",
+            )
+        for i in np.flatnonzero((rotors > 0.0) & (terms["armature"] > 0.0)):
+            raise InputError(
+                f"joint {names[i]!r} has both armature and rotor_inertia",
+                where=f"robot.friction.rotor_inertia.{names[i]}",
+                found=f"armature {terms['armature'][i]:g}, rotor inertia {rotors[i]:g}",
+                allowed="either armature, or rotor_inertia with gear_ratio",
+            )
         terms["armature"] += rotors * ratios**2
         v_eps = terms.pop("coulomb_velocity")
         least = 1e-9  # rad/s or m/s: steeper steps have slopes that overflow in squares
-        if not v_eps.min() >= least:
+        if v_eps.min() < least:
             raise InputError(
                 "the speed at which Coulomb friction reaches 76 % of its value is too small",
                 where="robot.friction.coulomb_velocity",
@@ -112,19 +124,17 @@ class Friction(Summary):
         InputError
         """
         names = list(model.names)[1:]
-        for name, coulomb, limit in zip(names, self.coulomb, limits, strict=True):
-            if coulomb < limit:
-                continue
-            hint = f"Lower the friction, or raise robot.limits.torque.{name}"
-            if name != names[0]:
-                joint = model.frames[model.getFrameId(name, pin.FrameType.JOINT)]
+        for i in np.flatnonzero(self.coulomb >= limits):
+            hint = f"Lower the friction, or raise robot.limits.torque.{names[i]}"
+            if i > 0:
+                joint = model.frames[model.getFrameId(names[i], pin.FrameType.JOINT)]
                 carrier = model.frames[joint.parentFrame].name
                 hint += f". To leave the joint out, end the chain at {carrier} by robot.tool_frame or --tool-frame"
             raise InputError(
-                f"the Coulomb friction of joint {name!r} is not below its torque limit",
+                f"the Coulomb friction of joint {names[i]!r} is not below its torque limit",
                 where="robot.friction.coulomb",
-                found=f"{coulomb:g} Nm (N for a prismatic joint)",
-                allowed=f"less than the limit, {limit:g}",
+                found=f"{self.coulomb[i]:g} Nm (N for a prismatic joint)",
+                allowed=f"less than the limit, {limits[i]:g}",
                 hint=hint,
             )
 
@@ -132,24 +142,3 @@ class Friction(Summary):
     def table(self) -> np.ndarray:
         """All terms, (n, 4), in the order of the attributes."""
         return np.column_stack([self.armature, self.viscous, self.coulomb, self.v_eps])
-
-
-def _check_rotors(
-    names: Sequence[str], rotors: np.ndarray, ratios: np.ndarray, armatures: np.ndarray
-) -> None:
-    """Refuse a rotor without a gear ratio, and one whose inertia the armature states too."""
-    rows = zip(names, rotors, ratios, armatures, strict=True)
-    for name, rotor, ratio, armature in rows:
-        if rotor > 0.0 and ratio == 0.0:
-            raise InputError(
-                f"the rotor of joint {name!r} has no gear ratio",
-                where=f"robot.friction.gear_ratio.{name}",
-                allowed=f"turns of the rotor per turn of the joint, > 0, at most {LARGEST:g}; 1 for a direct drive",
-            )
-        if rotor > 0.0 and armature > 0.0:
-            raise InputError(
-                f"joint {name!r} has both armature and rotor_inertia",
-                where=f"robot.friction.rotor_inertia.{name}",
-                found=f"armature {armature:g}, rotor inertia {rotor:g} at a gear ratio of {ratio:g}",
-                allowed="either armature, or rotor_inertia with gear_ratio",
-            )

@@ -173,23 +173,18 @@ def _combine(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotS
         {key: part[key] for key in _FRAMES if key in part} for part in (own, written)
     )
     frames = _merge("robot", own_frames, asked_frames, ())
-    names = robot.urdf_joints
-    limits = written.get("limits", {})
-    limited = [each for each in limits.values() if isinstance(each, Mapping)]
-    locked: Mapping[str, float] = {}
-    if frames != own_frames or not set().union(*limited) <= set(names):
-        chosen: dict[str, Any] = {
-            "tool_frame": None,
-            "base_frame": None,
-            "locked_joints": {},
-        }
-        chain = read_chain(robot.urdf, robot.source, **{**chosen, **frames})
-        names = chain.joint_names
-        locked = chain.locked
-    if limits:
-        moving = without_joints(asked.limits, locked)
-        written["limits"] = without_defaults(moving) | {"scale": limits["scale"]}
-    return check_robot_settings(_merge("robot", own, written, names))
+    chain = read_chain(
+        robot.urdf,
+        robot.source,
+        frames.get("tool_frame"),
+        frames.get("base_frame"),
+        tuple(frames.get("locked_joints", {}).items()),
+    )
+    if "limits" in written:
+        moving = without_joints(asked.limits, chain.locked)
+        scale = written["limits"]["scale"]
+        written["limits"] = without_defaults(moving) | {"scale": scale}
+    return check_robot_settings(_merge("robot", own, written, chain.joint_names))
 
 
 def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
@@ -202,11 +197,10 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
     """
     if asked == given:
         return given
-    sides = [given, asked]
+    own, other = given, asked
     if key in _PER_JOINT:
         absent = _PER_JOINT[key]
-        sides = [map_by_joint(key, side, names, absent) for side in sides]
-    own, other = sides
+        own, other = (map_by_joint(key, side, names, absent) for side in (own, other))
     if not (isinstance(own, Mapping) and isinstance(other, Mapping)):
         raise TaskError(
             "the task and the robot given with it contradict each other",
@@ -214,12 +208,9 @@ def _merge(key: str, given: Any, asked: Any, names: Sequence[str]) -> Any:
             found=f"{asked} in the task, {given} in the robot",
             allowed="the same in both, or set in one of them",
         )
-    merged = {
-        **own,
-        **{
-            name: _merge(f"{key}.{name}", own.get(name, value), value, names)
-            for name, value in other.items()
-        },
+    merged = dict(own) | {
+        name: _merge(f"{key}.{name}", own.get(name, value), value, names)
+        for name, value in other.items()
     }
     return given if merged == own else merged
 
@@ -285,14 +276,14 @@ def _without_acceleration_limit(robot: Robot, qddot: np.ndarray | None) -> str:
     text = f"none{of_some} (robot.limits.acceleration)"
     if qddot is None:
         return text
-    largest = np.where(is_free, np.abs(qddot[:, : len(names)]).max(axis=0), -1.0)
+    largest = np.abs(qddot[:, : len(names)]).max(axis=0)
+    units = np.array(robot.position_units[: len(names)])
     found = []
     for unit, shown in UNITS["acceleration"].items():
-        has_unit = np.equal(robot.position_units[: len(names)], unit)
-        own = np.where(has_unit, largest, -1.0)
-        joint = int(np.argmax(own))
-        if own[joint] >= 0.0:
-            found.append(f"{own[joint]:.4g} {shown}, of {names[joint]}")
+        joints = np.flatnonzero(is_free & (units == unit))
+        if len(joints):
+            joint = joints[np.argmax(largest[joints])]
+            found.append(f"{largest[joint]:.4g} {shown}, of {names[joint]}")
     return f"{text}; the largest is {', and '.join(found)}"
 
 

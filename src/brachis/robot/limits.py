@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, make_dataclass, replace
-from typing import Any, TypeGuard
+from dataclasses import dataclass, fields, make_dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from brachis.common import tolerances
 from brachis.common.arrays import freeze
 from brachis.common.summary import Summary
-from brachis.errors import InputError, LimitError, check_names
+from brachis.errors import InputError, LimitError
 from brachis.robot.tool_joints import ToolJoint
-from brachis.task import FROM_URDF, LIMIT_KINDS, LimitScale, LimitSpec
+from brachis.task import FROM_URDF, LIMIT_KINDS, LimitSpec, check_robot_settings
 from brachis.task.fields import LARGEST, LEAST
-from brachis.task.limit_models import per_joint_values
+from brachis.task.limit_models import map_by_joint, per_joint_values
 
 Curve = tuple[tuple[float, float], ...]
 """Points (speed, torque), rad/s or m/s and Nm or N, from speed 0 on; empty without a curve."""
@@ -119,10 +119,10 @@ def _arrays_of(kind: str, pairs: np.ndarray) -> dict[str, np.ndarray]:
 class UrdfLimit:
     """One joint's limits as the URDF states them; None where it states nothing."""
 
-    lower: float | None
-    upper: float | None
-    velocity: float | None
-    effort: float | None
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    effort: float | None = None
     needs_range: bool = False
     """True where a revolute or prismatic joint states no range, so that the task has to."""
 
@@ -130,6 +130,25 @@ class UrdfLimit:
         """Return the limit of one of `MAGNITUDES`; None without one."""
         value: float | None = getattr(self, LIMIT_KINDS[kind].urdf, None)
         return value
+
+
+def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
+    """Check a user's limits, and state them joint by joint, so that others can be added.
+
+    Raises
+    ------
+    TaskError, InputError, UnknownNameError
+        A limit has a wrong form or length, or names a joint that is not of the chain.
+    """
+    by_joint: dict[str, Any] = {}
+    for each in fields(spec):
+        kind = each.name
+        value = getattr(spec, kind)
+        is_list = kind in LIMIT_KINDS and isinstance(value, tuple)
+        if is_list or isinstance(value, Mapping):
+            stated = map_by_joint(f"robot.limits.{kind}", value, names, FROM_URDF)
+            by_joint[kind] = stated or each.default
+    return check_robot_settings({"limits": replace(spec, **by_joint)}).limits
 
 
 def resolve_limits(
@@ -143,7 +162,7 @@ def resolve_limits(
     Parameters
     ----------
     spec : LimitSpec
-        The user's limits.
+        The user's limits, after `check_limits`.
     joint_names : sequence of str
         The chain's joints.
     urdf : sequence of UrdfLimit
@@ -158,24 +177,27 @@ def resolve_limits(
     Raises
     ------
     LimitError
-        A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
-        nor an acceleration limit; a range is empty or ends more than 1e6 rad or m away from zero.
+        A scaled limit is outside [`LEAST`, `LARGEST`]; a joint has neither a torque nor an acceleration limit; a range
+        is missing, empty or ends more than 1e6 rad or m away from zero.
     InputError
         A speed override has no velocity limit to scale; the total power is outside [`LEAST`, `LARGEST`]; a torque
         curve is not valid or rises.
-    UnknownNameError
-        A limit names a joint that is not of the chain.
     """
     names = list(joint_names)
-    _check_scale(spec.scale)
     pairs = {
-        kind: _spread_magnitudes(kind, getattr(spec, kind), names, urdf)
-        for kind in MAGNITUDES
+        kind: _spread_limits(kind, getattr(spec, kind), names, urdf)
+        for kind in LIMIT_KINDS
     }
-    factor = spec.scale.torque
-    curves = _resolve_curves(spec.torque_speed, names, factor)
+    _check_ranges(pairs["position"], names)
+    for kind in MAGNITUDES:
+        pairs[kind] = _scale_limits(kind, pairs[kind], getattr(spec.scale, kind), names)
+    listed = per_joint_values("torque_speed", spec.torque_speed, names, None)
+    curves = tuple(
+        _resolve_curve(points, name, spec.scale.torque)
+        for name, points in zip(names, listed, strict=True)
+    )
     # A torque that falls with speed is at its largest at rest, which is a plain limit.
-    at_rest = np.array([curve[0][1] / factor if curve else np.inf for curve in curves])
+    at_rest = np.array([curve[0][1] if curve else np.inf for curve in curves])
     pairs["torque"] = np.clip(pairs["torque"], -at_rest, at_rest)
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
     for i in np.flatnonzero(is_free):
@@ -184,9 +206,6 @@ def resolve_limits(
             joint=names[i],
             key=f"robot.limits.torque.{names[i]} or robot.limits.acceleration.{names[i]}",
         )
-    pairs["position"] = _spread_ranges(spec.position, names, urdf)
-    for kind in MAGNITUDES:
-        pairs[kind] = _scale_limits(kind, pairs[kind], spec.scale, names)
     if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
         raise InputError(
             "the speed override has no velocity limit to scale",
@@ -215,17 +234,12 @@ def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
     """State limits joint by joint; joints beyond `names` are left out."""
     spec: dict[str, Any] = {}
     for kind, row in LIMIT_KINDS.items():
-        values = limits.both_ways(kind).T[: len(names)]
-        pairs = [
-            [end if np.isfinite(end) else None for end in pair]
-            for pair in values.tolist()
-        ]
-        spec[kind] = {
-            name: pair[1]
-            if row.form != "range" and (pair[0] is None or -pair[0] == pair[1])
-            else tuple(pair)
-            for name, pair in zip(names, pairs, strict=True)
-        }
+        entries: list[Any] = []
+        for lower, upper in limits.both_ways(kind).T[: len(names)].tolist():
+            pair = tuple(end if np.isfinite(end) else None for end in (lower, upper))
+            is_pair = row.form == "range" or lower != -upper
+            entries.append(pair if is_pair else pair[1])
+        spec[kind] = dict(zip(names, entries, strict=True))
     curves = zip(names, limits.torque_speed, strict=False)
     spec["torque_speed"] = {name: curve for name, curve in curves if curve} or None
     if np.isfinite(limits.total_power):
@@ -233,187 +247,89 @@ def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
     return LimitSpec(**spec)
 
 
-def _check_scale(scale: LimitScale) -> None:
-    factors = vars(scale)
-    where = "robot.limits.scale"
-    check_names("limit that can be scaled", factors, MAGNITUDES, where)
-    for kind, factor in factors.items():
-        if not (_is_number(factor) and 0.0 < factor < np.inf):
-            raise InputError(
-                "the factor is not valid",
-                where=f"{where}.{kind}",
-                found=factor,
-                allowed="a finite number > 0",
+def _spread_limits(
+    kind: str, value: object, names: Sequence[str], urdf: Sequence[UrdfLimit]
+) -> np.ndarray:
+    """Spread one kind of limit over the joints: lower and upper ones, (2, n); infinite where not limited."""
+    key = f"robot.limits.{kind}"
+    limits = np.tile([[-np.inf], [np.inf]], len(names))
+    listed = per_joint_values(key, value, names, FROM_URDF)
+    for i, (given, known) in enumerate(zip(listed, urdf, strict=True)):
+        ends: Any = given
+        if given == FROM_URDF and kind == "position":
+            if known.needs_range:
+                raise LimitError(
+                    "the joint has no position range in the URDF",
+                    joint=names[i],
+                    key=f"{key}.{names[i]}",
+                    allowed='<limit lower="..." upper="..." .../>, type="continuous", or a range in the task',
+                )
+            ends = (known.lower, known.upper)
+        elif given == FROM_URDF:
+            ends = known.of_kind(kind)
+        if isinstance(ends, float):
+            ends = (-ends, ends)
+        if ends is not None:
+            pair = np.array(ends, dtype=float)  # None becomes NaN
+            limits[:, i] = np.where(np.isnan(pair), limits[:, i], pair)
+    return limits
+
+
+def _check_ranges(ranges: np.ndarray, names: Sequence[str]) -> None:
+    """Refuse position ranges, (2, n), that are empty or too far from zero."""
+    for name, (lower, upper) in zip(names, ranges.T, strict=True):
+        is_far = any(FARTHEST < abs(end) < np.inf for end in (lower, upper))
+        if is_far or not upper - lower >= 1e-9:
+            raise LimitError(
+                "position range is empty or too far from zero",
+                joint=name,
+                key=f"robot.limits.position.{name}",
+                found=f"[{lower:g}, {upper:g}]",
+                allowed=f"ends 1e-09 rad or m apart, within {FARTHEST:g} rad or m of zero; null for an open end",
             )
 
 
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float)
-
-
 def _scale_limits(
-    kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[str]
+    kind: str, limits: np.ndarray, factor: float, names: Sequence[str]
 ) -> np.ndarray:
-    """Multiply limits, (2, n), by their factor."""
+    """Scale limits, (2, n), and refuse figures whose products and squares would not be accurate."""
     with np.errstate(over="ignore"):
-        scaled = np.asarray(limits * getattr(scale, kind))
-    for i, name in enumerate(names):
-        figures = scaled[np.isfinite(limits[:, i]), i]
-        _check_sizes(f"scaled {kind}", figures, name, f"robot.limits.scale.{kind}")
+        scaled = np.asarray(limits * factor)
+    sizes = scaled * [[-1.0], [1.0]]
+    is_wrong = np.isfinite(limits) & ~((sizes >= LEAST) & (sizes <= LARGEST))
+    for end, i in np.argwhere(is_wrong):
+        raise LimitError(
+            f"{kind} limit is too small or too large",
+            joint=names[i],
+            key=f"robot.limits.{kind}.{names[i]}",
+            found=f"{sizes[end, i]:g}",
+            allowed=f"{LEAST:g} to {LARGEST:g} in SI units, also after robot.limits.scale, or null for no limit",
+        )
     return scaled
 
 
 def _resolve_total_power(spec: LimitSpec) -> float:
     """Return the limit of the sum of the joints' powers, W; infinite without one."""
-    given = spec.total_power
-    if given is None:
+    if spec.total_power is None:
         return np.inf
-    factor = spec.scale.power
-    if not (_is_number(given) and LEAST <= given * factor <= LARGEST):
+    scaled = spec.total_power * spec.scale.power
+    if not LEAST <= scaled <= LARGEST:
         raise InputError(
-            "the total power is not valid",
+            "the total power is too small or too large",
             where="robot.limits.total_power",
-            found=given,
+            found=spec.total_power,
             allowed=f"{LEAST:g} W to {LARGEST:g} W after scaling, or null for no limit",
         )
-    return float(given) * factor
+    return float(scaled)
 
 
-def _check_sizes(what: str, figures: np.ndarray, joint: str, key: str) -> None:
-    """Refuse figures of limits whose products and squares would not be accurate."""
-    for limit in np.abs(figures):
-        if not LEAST <= limit <= LARGEST:
-            raise LimitError(
-                f"{what} limit is too small or too large",
-                joint=joint,
-                key=key,
-                found=f"{limit:g}",
-                allowed=f"{LEAST:g} to {LARGEST:g} in SI units, or null for no limit",
-            )
-
-
-def _spread_magnitudes(
-    kind: str, value: object, names: list[str], urdf: Sequence[UrdfLimit]
-) -> np.ndarray:
-    """Spread one kind of limit over the joints: lower and upper ones, (2, n); infinite where not limited."""
-    key = f"robot.limits.{kind}"
-    is_pair = LIMIT_KINDS[kind].form == "pair"
-    limits = np.tile([[-np.inf], [np.inf]], len(names))
-    listed = per_joint_values(key, value, names, FROM_URDF)
-    for i, (name, entry) in enumerate(zip(names, listed, strict=True)):
-        from_urdf = entry == FROM_URDF
-        given = urdf[i].of_kind(kind) if from_urdf else entry
-        if given is None:
-            continue
-        ends: list[Any] = [-given if _is_number(given) else given, given]
-        problem = "is not positive"
-        if is_pair and isinstance(given, Sequence) and not isinstance(given, str):
-            ends = list(given)
-            problem = "is not a pair around zero"
-        elif not _is_number(given):
-            problem = "is not a number"
-        numbers = len(ends) == 2 and all(_is_number(end) for end in ends)
-        if not (numbers and ends[0] < 0.0 < ends[1]):
-            pair = "[lower, upper] with lower < 0 < upper, " if is_pair else ""
-            raise LimitError(
-                f"{kind} limit in {'the URDF' if from_urdf else 'the task'} {problem}",
-                joint=name,
-                key=f"{key}.{name}",
-                found=f"{given:g}" if _is_number(given) else repr(given),
-                allowed=f"a number > 0, {pair}or null for no limit",
-            )
-        limits[:, i] = ends
-        figures = limits[np.isfinite(limits[:, i]), i]
-        _check_sizes(kind, figures, name, f"{key}.{name}")
-    return limits
-
-
-def _spread_ranges(
-    value: object, names: list[str], urdf: Sequence[UrdfLimit]
-) -> np.ndarray:
-    """Spread the position ranges over the joints, (2, n); infinite where not limited."""
-    ranges = np.tile([[-np.inf], [np.inf]], len(names))
-    listed = per_joint_values("robot.limits.position", value, names, FROM_URDF)
-    for i, (name, entry, known) in enumerate(zip(names, listed, urdf, strict=True)):
-        key = f"robot.limits.position.{name}"
-        given = (known.lower, known.upper) if entry == FROM_URDF else entry
-        if entry == FROM_URDF and known.needs_range:
-            raise LimitError(
-                "the joint has no position range in the URDF",
-                joint=name,
-                key=key,
-                allowed='<limit lower="..." upper="..." .../>, type="continuous", or a range in the task',
-            )
-        if given is None:
-            continue
-        ends = list(given) if isinstance(given, Sequence) else []
-        if len(ends) != 2 or not all(end is None or _is_number(end) for end in ends):
-            raise LimitError(
-                "position range is not a pair",
-                joint=name,
-                key=key,
-                found=ends or given,
-                allowed="[lower, upper]",
-            )
-        lower = -np.inf if ends[0] is None else float(ends[0])
-        upper = np.inf if ends[1] is None else float(ends[1])
-        problem = allowed = ""
-        if not upper - lower >= 1e-9:
-            problem = "is empty"
-            allowed = "[lower, upper] with lower < upper, 1e-09 rad or m apart at least"
-        elif any(FARTHEST < abs(end) < np.inf for end in (lower, upper)):
-            problem = "is too far from zero"
-            allowed = f"ends within {FARTHEST:g} rad or m of zero, null for an open end"
-        if problem:
-            raise LimitError(
-                f"position range {problem}",
-                joint=name,
-                key=key,
-                found=f"[{lower:g}, {upper:g}]",
-                allowed=allowed,
-            )
-        ranges[:, i] = lower, upper
-    return ranges
-
-
-def _resolve_curves(
-    stated: object, names: Sequence[str], factor: float
-) -> tuple[Curve, ...]:
-    """Check the curves of a chain's joints, and multiply their torques by a factor."""
-    where = "robot.limits.torque_speed"
-    if not isinstance(stated, Mapping | None):
-        raise InputError(
-            "this is not a mapping of joint names",
-            where=where,
-            found=stated,
-            allowed="{joint: [[speed, torque], ...]}",
-        )
-    listed = per_joint_values(where, stated, names, None)
-    return tuple(
-        _resolve_curve(points, name, factor)
-        for name, points in zip(names, listed, strict=True)
-    )
-
-
-def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
-    """Check a joint's curve, and scale its torques."""
+def _resolve_curve(points: Any, joint: str, factor: float) -> Curve:
+    """Check the points (speed, torque) of a joint's curve, and scale its torques."""
     if points is None:
         return ()
     key = f"robot.limits.torque_speed.{joint}"
-    try:
-        table = np.array(points, dtype=float)
-    except (TypeError, ValueError):
-        table = np.empty(0)
-    is_table = table.ndim == 2 and len(table) >= 2 and table.shape[1] == 2
-    if not (is_table and np.isfinite(table).all()):
-        raise InputError(
-            "this is not a torque curve",
-            where=key,
-            found=points,
-            allowed="two or more points [speed, torque]",
-        )
-    speed, torque = table.T
-    found = ", ".join(f"[{v:g}, {tau:g}]" for v, tau in table)
+    speed, torque = np.transpose(points)
+    found = ", ".join(f"[{v:g}, {tau:g}]" for v, tau in points)
     ascends = speed[0] == 0.0 and np.all(np.diff(speed) > 0.0)
     if not (ascends and speed[-1] <= LARGEST):
         raise InputError(
@@ -422,12 +338,12 @@ def _resolve_curve(points: object, joint: str, factor: float) -> Curve:
             found=found,
             allowed=f"speeds that begin at 0 and ascend, at most {LARGEST:g}",
         )
-    if not (LEAST <= torque[0] * factor <= LARGEST and np.all(torque >= 0.0)):
+    if not LEAST <= torque[0] * factor <= LARGEST:
         raise InputError(
-            "torques are negative, too small or too large",
+            "the torque at speed 0 is too small or too large",
             where=key,
             found=found,
-            allowed=f"torques >= 0; that at speed 0 from {LEAST:g} to {LARGEST:g} N m (N), also after scaling",
+            allowed=f"{LEAST:g} to {LARGEST:g} N m (N), also after scaling",
         )
     # The same torque may have been rounded to different figures.
     rising = np.flatnonzero(np.diff(torque) > tolerances.ROUNDING * torque[0])

@@ -30,7 +30,7 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
     Raises
     ------
     UrdfError
-        Pinocchio cannot build the model, or the chain is not serial.
+        Pinocchio cannot build the model.
     InputError
         No rigid body has the payload's inertia.
     """
@@ -50,14 +50,6 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
     for frame in model.frames:
         if frame.type == pin.FrameType.BODY:
             frame.name = frame.name.removeprefix(LINK)
-    names = tuple(str(name) for name in list(model.names)[1:])
-    if names != chain.joint_names or model.nq != model.nv:
-        raise UrdfError(
-            "the chain is not serial",
-            where=where,
-            found=list(names),
-            allowed=list(chain.joint_names),
-        )
     model.gravity.linear = np.array(settings.gravity)
     model.armature = np.zeros(model.nv)
     mounting = _se3(settings.mounting)

@@ -191,18 +191,11 @@ def link_lengths(robot: Robot) -> list[float]:
 
 def reach(robot: Robot) -> float:
     """How far the tool frame can be from the first joint at most, m, in the ranges of slides that the URDF states."""
-    limits = robot.limits
-    columns = zip(
-        limits.position_lower,
-        limits.position_upper,
-        robot.urdf_limits,
-        robot.position_units,
-        strict=True,
-    )
+    farthest = np.abs(robot.limits.both_ways("position")).max(axis=0)
     slides = [
-        max(abs(lower), abs(upper), abs(urdf.lower or 0.0), abs(urdf.upper or 0.0))
-        for lower, upper, urdf, unit in columns
-        if unit == "m"
+        max(farthest[i], abs(urdf.lower or 0.0), abs(urdf.upper or 0.0))
+        for i, urdf in enumerate(robot.urdf_limits)
+        if robot.position_units[i] == "m"
     ]
     return sum(link_lengths(robot)) + sum(slides)
 

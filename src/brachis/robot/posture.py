@@ -43,7 +43,13 @@ def read_posture(
     if isinstance(joints, Mapping):
         joints = {**defaults, **joints}
     else:
-        joints = _read_list(joints, where)
+        try:
+            joints = list(joints)
+        except TypeError:
+            found = repr(joints)
+            raise InputError(
+                "wrong type", where=where, found=found, allowed=_ALLOWED
+            ) from None
         is_short = len(joints) == len(names) - len(defaults)
         joints = [*joints, *defaults.values()] if is_short else joints
     values = per_joint_values(where, joints, names, None)
@@ -67,15 +73,3 @@ def read_posture(
             allowed=f"finite numbers, within {FARTHEST:g} rad or m of zero",
         )
     return q
-
-
-def _read_list(joints: Any, where: str) -> list[Any]:
-    """Return a list or a one-dimensional array as a list."""
-    try:
-        dimensions = np.ndim(joints)
-    except ValueError:  # lists of different lengths
-        dimensions = 2
-    if dimensions != 1:
-        found = repr(joints)
-        raise InputError("wrong type", where=where, found=found, allowed=_ALLOWED)
-    return list(joints)

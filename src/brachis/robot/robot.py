@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self, TypedDict, Unpack
+from typing import Self, TypedDict, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +23,7 @@ from brachis.robot.joints import UNITS
 from brachis.robot.limits import (
     Limits,
     UrdfLimit,
+    check_limits,
     resolve_limits,
     to_spec,
     without_joints,
@@ -34,7 +35,6 @@ from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import UrdfDynamics, placement_matrix
 from brachis.robot.urdf_elements import read_tree
 from brachis.task import (
-    FROM_URDF,
     LimitKeywords,
     LimitSpec,
     Payload,
@@ -42,7 +42,7 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
-from brachis.task.limit_models import map_by_joint
+from brachis.task.fields import merge
 
 
 class RobotKeywords(TypedDict, total=False):
@@ -217,12 +217,12 @@ class Robot(Summary):
         chain = read_chain(
             text,
             source,
-            tool_frame=settings.tool_frame,
-            base_frame=settings.base_frame,
-            locked_joints=settings.locked_joints,
+            settings.tool_frame,
+            settings.base_frame,
+            tuple(settings.locked_joints.items()),
         )
         names = chain.joint_names
-        spec = without_joints(settings.limits, chain.locked)
+        spec = check_limits(without_joints(settings.limits, chain.locked), names)
         limits = resolve_limits(spec, names, chain.limits, settings.speed_override)
         model = build_model(chain, settings, source)
         friction = Friction.of(names, chain.dynamics.friction, settings.friction)
@@ -236,7 +236,7 @@ class Robot(Summary):
             urdf_limits=chain.limits,
             urdf_dynamics=chain.dynamics,
             friction=friction,
-            settings=_without_defaults(settings, spec, names),
+            settings=_without_defaults(settings.model_copy(update={"limits": spec})),
             source=source,
             urdf=text,
         )
@@ -263,15 +263,9 @@ class Robot(Summary):
         ([20.0, 10.0, 10.0], [2.0, 2.0, 2.0])
         """
         names = self.urdf_joints
-        changes: dict[str, Any] = vars(to_spec(self.limits, names)).copy()
-        check_names("limit", limits, changes, "with_limits")
-        for kind, value in limits.items():
-            stated = changes[kind]
-            if isinstance(value, Mapping) and isinstance(stated, Mapping):
-                changes[kind] = {**stated, **value}
-            else:
-                changes[kind] = value
-        spec = LimitSpec(**changes)
+        stated = vars(to_spec(self.limits, names))
+        check_names("limit", limits, stated, "with_limits")
+        spec = check_limits(LimitSpec(**merge(stated, limits)), names)
         resolved = resolve_limits(spec, names, self.urdf_limits[: len(names)])
         resolved = resolved.with_tool_joints(self.tool_joints)
         self.friction.check_against(self.model, resolved.torque)
@@ -465,19 +459,9 @@ class Robot(Summary):
         return (self.tool_placements(q)[0] - floor) @ up
 
 
-def _without_defaults(
-    settings: RobotSettings, limits: LimitSpec, names: Sequence[str]
-) -> RobotSettings:
-    """Leave out settings that have their default, and state limits joint by joint, so that others can be added."""
-    by_name: dict[str, Any] = {}
-    for each in fields(limits):
-        value = getattr(limits, each.name)
-        if isinstance(value, tuple | dict):
-            stated = map_by_joint("limits", value, names, FROM_URDF)
-            by_name[each.name] = stated or each.default
-    used = settings.model_copy(update={"limits": replace(limits, **by_name)})
+def _without_defaults(settings: RobotSettings) -> RobotSettings:
+    """Leave out settings that have their default, so that others can be added."""
     default = RobotSettings()
-    checked = check_robot_settings(dict(used))
     return RobotSettings(
-        **{key: value for key, value in checked if value != getattr(default, key)}
+        **{key: value for key, value in settings if value != getattr(default, key)}
     )

@@ -120,8 +120,8 @@ def _lengths(given: PositionTolerance) -> dict[str, _Range]:
         for way, (*_, key) in ranges.items():
             ranges[way] = _within(None, reach, key)
     if given.sphere is not None:
+        key = "tolerances.position.sphere"
         for way in box:
-            key = "tolerances.position.sphere"
             ranges[way] = _within(ranges.get(way), given.sphere, key)
     return ranges
 

@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -157,15 +158,15 @@ class UrdfChain:
     dynamics: UrdfDynamics
 
 
+@lru_cache(maxsize=16)
 def read_chain(
     text: str,
     where: str,
-    *,
-    tool_frame: str | None,
-    base_frame: str | None,
-    locked_joints: Mapping[str, float],
+    tool_frame: str | None = None,
+    base_frame: str | None = None,
+    locked_joints: tuple[tuple[str, float], ...] = (),
 ) -> UrdfChain:
-    """Read a URDF and find the chain from `base_frame` to `tool_frame`.
+    """Read a URDF and find the chain from `base_frame` to `tool_frame`; plans of the same robot follow each other.
 
     Parameters
     ----------
@@ -173,11 +174,11 @@ def read_chain(
         The URDF.
     where : str
         Name of the file, for messages.
-    tool_frame : str or None
+    tool_frame : str, optional
         Link at the chain's end; None takes the URDF's only leaf link.
-    base_frame : str or None
+    base_frame : str, optional
         Link at the chain's beginning; None takes the root link.
-    locked_joints : mapping of str to float
+    locked_joints : tuple of (str, float), optional
         Joints held at a position, rad or m.
 
     Raises
@@ -187,41 +188,34 @@ def read_chain(
     UnknownNameError
         A frame or joint does not exist.
     """
-    locked = tuple(locked_joints.items())
-    return _read_chain(text, where, tool_frame, base_frame, locked)
-
-
-@lru_cache(maxsize=16)
-def _read_chain(
-    text: str,
-    where: str,
-    tool_frame: str | None,
-    base_frame: str | None,
-    held: tuple[tuple[str, float], ...],
-) -> UrdfChain:
-    """Read a URDF as `read_chain` does; plans of the same robot follow each other."""
-    locked_joints = dict(held)
+    given = dict(locked_joints)
     tree = read_tree(text, where)
     for key, frame in (("tool_frame", tool_frame), ("base_frame", base_frame)):
         if frame is not None:
             check_names("frame", [frame], tree.links, f"{where}: {key}")
-    tool = _only_leaf(tree, where) if tool_frame is None else tool_frame
+    leaves = _leaves(tree)
+    if tool_frame is None and len(leaves) != 1:
+        raise UrdfError(
+            "the tool frame is ambiguous",
+            where=where,
+            found=f"{len(leaves)} links without children: {', '.join(leaves)}",
+            hint="Set robot.tool_frame to one of the robot's links",
+        )
+    tool = leaves[0] if tool_frame is None else tool_frame
     base = tree.root if base_frame is None else base_frame
     path = _joints_between(tree, base, tool, where)
     movable = _movable(tree)
-    check_names("moving joint", locked_joints, movable, f"{where}: locked_joints")
-    for name, position in locked_joints.items():
+    check_names("moving joint", given, movable, f"{where}: locked_joints")
+    for name, position in given.items():
         _check_locked_position(tree.joints[name], name, position)
-    chain = tuple(
-        name for name in path if name in movable and name not in locked_joints
-    )
+    chain = tuple(name for name in path if name in movable and name not in given)
     _check_joints(tree, chain, where)
     if not chain:
         raise UrdfError(
             "no joint moves the tool", where=where, found=f"chain {base} -> {tool}"
         )
     still = [name for name in movable if name not in chain]
-    locked = _lock(tree, still, locked_joints, where)
+    locked = _lock(tree, still, given, where)
     dynamics = read_dynamics(tree, chain, locked, tool)
     check_inertias(tree, dynamics.bodies, where)
     limits = tuple(_read_limit(tree.joints[name]) for name in chain)
@@ -230,15 +224,8 @@ def _read_chain(
 
 def _check_locked_position(joint: Element, name: str, position: float) -> None:
     """Refuse a position, rad or m, that a locked joint cannot have."""
-    if not abs(position) <= FARTHEST:
-        raise UrdfError(
-            "the position of a locked joint is too large",
-            where=f"robot.locked_joints.{name}",
-            found=position,
-            allowed=f"finite, within {FARTHEST:g} rad or m of zero",
-        )
-    if abs(_clip_to_range(joint, position) - position) > tolerances.ANGLE:
-        lowest, highest = (_clip_to_range(joint, end) for end in (-FARTHEST, FARTHEST))
+    lowest, highest = (_clip_to_range(joint, end) for end in (-FARTHEST, FARTHEST))
+    if not lowest - tolerances.ANGLE <= position <= highest + tolerances.ANGLE:
         unit = _unit_of(joint)
         raise UrdfError(
             "the position of a locked joint is out of its range",
@@ -251,12 +238,12 @@ def _check_locked_position(joint: Element, name: str, position: float) -> None:
 def _lock(
     tree: UrdfTree, names: Sequence[str], given: Mapping[str, float], where: str
 ) -> dict[str, float]:
-    """Find the positions, rad or m, of joints that do not move: those given, else what they mimic, else rest.
+    """Find the positions, rad or m, of joints that do not move: those given, else what they mimic, else nearest to 0.
 
     What a joint mimics may put it beyond its own range, as the file says.
     """
     locked = {
-        name: float(given.get(name, _rest_position(tree.joints[name])))
+        name: float(given.get(name, _clip_to_range(tree.joints[name], 0.0)))
         for name in names
     }
     leaders = {name: _leader_of(tree.joints[name]) for name in names}
@@ -321,19 +308,6 @@ def read_file(path: Path) -> str:
     )
 
 
-def _only_leaf(tree: UrdfTree, where: str) -> str:
-    """Return the only link without children."""
-    leaves = _leaves(tree)
-    if len(leaves) != 1:
-        raise UrdfError(
-            "the tool frame is ambiguous",
-            where=where,
-            found=f"{len(leaves)} links without children: {', '.join(leaves)}",
-            hint="Set robot.tool_frame to one of the robot's links",
-        )
-    return leaves[0]
-
-
 def _leaves(tree: UrdfTree) -> tuple[str, ...]:
     """List the links without children."""
     inner = {end_of(joint, "parent") for joint in tree.joints.values()}
@@ -354,11 +328,6 @@ def _joints_between(tree: UrdfTree, base: str, tool: str, where: str) -> list[st
         joints.append(tree.above[link])
         link = end_of(tree.joints[joints[-1]], "parent")
     return joints[::-1]
-
-
-def _rest_position(joint: Element) -> float:
-    """Position at which a joint off the chain is held: zero, or the nearest end of its range."""
-    return _clip_to_range(joint, 0.0)
 
 
 def _clip_to_range(joint: Element, position: float) -> float:
@@ -474,9 +443,6 @@ def default_chain(text: str, where: str) -> DefaultChain:
 
 def _common_beginning(chains: Collection[Sequence[str]]) -> list[str]:
     """List the joints with which all chains from the same root begin."""
-    shared = []
-    for joints in zip(*chains, strict=False):
-        if len(set(joints)) > 1:
-            break
-        shared.append(joints[0])
-    return shared
+    rows = zip(*chains, strict=False)
+    shared = takewhile(lambda joints: len(set(joints)) == 1, rows)
+    return [joints[0] for joints in shared]

@@ -155,10 +155,7 @@ def _read_body(
 
 def placement_matrix(placement: Placement) -> np.ndarray:
     """Return a placement as a (4, 4) matrix."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = _turn_by_rpy(np.radians(placement.rpy_deg))
-    matrix[:3, 3] = placement.xyz
-    return matrix
+    return _place(placement.xyz, np.radians(placement.rpy_deg))
 
 
 def _axis(joint: Element) -> np.ndarray:
@@ -206,11 +203,19 @@ def _spread(lever: np.ndarray) -> np.ndarray:
 
 
 def origin_of(owner: Element, path: str) -> np.ndarray:
-    """Return the placement, (4, 4), that an origin describes: roll, pitch and yaw about fixed axes."""
+    """Return the placement, (4, 4), that an origin describes."""
+    zeros = "0 0 0"
+    return _place(
+        numbers_of(owner, path, "xyz", zeros), numbers_of(owner, path, "rpy", zeros)
+    )
+
+
+def _place(xyz: Sequence[float], rpy: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the placement, (4, 4), with roll, pitch and yaw, rad, about the fixed x, then y, then z axis."""
     placed = np.eye(4)
-    angles = numbers_of(owner, path, "rpy", "0 0 0")
-    placed[:3, :3] = _turn_by_rpy(angles)
-    placed[:3, 3] = numbers_of(owner, path, "xyz", "0 0 0")
+    roll, pitch, yaw = map(_turn_about, np.eye(3), rpy)
+    placed[:3, :3] = yaw @ pitch @ roll
+    placed[:3, 3] = xyz
     return placed
 
 
@@ -226,12 +231,5 @@ def _displacement(joint: Element, position: float) -> np.ndarray:
 
 def _turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
     """Return the rotation, (3, 3), about a unit axis by an angle, rad (Rodrigues' formula)."""
-    x, y, z = axis
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    across = np.cross(np.eye(3), axis)
     return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
-
-
-def _turn_by_rpy(angles: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the rotation, (3, 3), by roll, pitch and yaw, rad, about the fixed x, then y, then z axis."""
-    roll, pitch, yaw = map(_turn_about, np.eye(3), angles)
-    return np.asarray(yaw @ pitch @ roll)

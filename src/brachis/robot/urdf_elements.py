@@ -5,14 +5,15 @@ Every number that is used is checked to be finite: other parsers drop an inertia
 
 from __future__ import annotations
 
-import math
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from lxml import etree
 
+from brachis.common.words import write_count
 from brachis.errors import UrdfError, suggest
 from brachis.task.fields import LARGEST
 
@@ -105,14 +106,6 @@ def end_of(joint: Element, end: str) -> str:
 
 def _robot_element(text: str, where: str) -> Element:
     """Parse the text, and refuse anything but an expanded URDF."""
-    if not text.lstrip("\ufeff\t\r\n ").startswith("<"):
-        raise UrdfError(
-            "the file is not a URDF",
-            where=where,
-            found=f"{text[:20]!r} at its beginning",
-            allowed="XML, with the root element <robot>",
-            hint="Name a URDF, or a robot that comes with brachis: brachis robots lists them",
-        )
     parser = etree.XMLParser(
         remove_blank_text=True, resolve_entities=False, encoding="utf-8"
     )
@@ -120,10 +113,13 @@ def _robot_element(text: str, where: str) -> Element:
         robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
     except etree.XMLSyntaxError as error:
         raise UrdfError(
-            "the URDF file is not well-formed XML",
+            "the file is not a URDF, or not well-formed XML",
             where=where,
-            found=str(error),
-            hint=_EXPAND if "xacro" in str(error) else None,
+            found=f"{text[:20]!r} at its beginning: {error}",
+            allowed="XML, with the root element <robot>",
+            hint=_EXPAND
+            if "xacro" in str(error)
+            else "Name a URDF, or a robot that comes with brachis: brachis robots lists them",
         ) from error
     if robot.tag != "robot":
         raise UrdfError(
@@ -134,18 +130,13 @@ def _robot_element(text: str, where: str) -> Element:
             hint="Convert it to a URDF",
         )
     for element in robot.iter(etree.Element):
-        name = etree.QName(element)
-        expressions = [
-            f" {key}={value!r}" for key, value in element.items() if "${" in value
-        ]
-        prefix = f"{element.prefix}:" if element.prefix else ""
-        tag = f"{prefix}{name.localname}"
-        is_macro = "xacro" in (name.namespace or "") or tag.startswith("xacro:")
-        if is_macro or expressions:
+        name = re.split("[:}]", element.tag)[-1]
+        expressions = [value for value in element.values() if "${" in value]
+        if "xacro" in element.tag or expressions:
             raise UrdfError(
                 "the URDF has xacro macros",
                 where=_place_of(element, where),
-                found=f"<{tag}{''.join(expressions[:1])}>",
+                found=expressions[0] if expressions else f"<xacro:{name}>",
                 allowed="a plain URDF",
                 hint=_EXPAND,
             )
@@ -262,10 +253,10 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
         Entry("origin", "xyz", "m", 3),
         Entry("origin", "rpy", "rad", 3),
         Entry("axis", "xyz", "a direction", 3),
-        Entry("limit", "lower", "rad or m", largest=math.inf),
-        Entry("limit", "upper", "rad or m", largest=math.inf),
-        Entry("limit", "velocity", "rad/s or m/s", largest=math.inf),
-        Entry("limit", "effort", "Nm or N", largest=math.inf),
+        Entry("limit", "lower", "rad or m", largest=sys.float_info.max),
+        Entry("limit", "upper", "rad or m", largest=sys.float_info.max),
+        Entry("limit", "velocity", "rad/s or m/s", largest=sys.float_info.max),
+        Entry("limit", "effort", "Nm or N", largest=sys.float_info.max),
         Entry("mimic", "multiplier", "a factor"),
         Entry("mimic", "offset", "rad or m"),
         Entry("dynamics", "damping", "Nm s/rad or N s/m"),
@@ -309,39 +300,17 @@ def _check_entry(owner: Element, entry: Entry, where: str) -> None:
                 allowed="not more than one",
             )
     text = elements[0].get(entry.attribute)
-    if _are_numbers((text or "").split(), entry) or (
-        text is None and not entry.required
+    if text is None and not entry.required:
+        return
+    words = (text or "").split()
+    if len(words) == entry.count and all(
+        _NUMBER.fullmatch(word) and abs(float(word)) <= entry.largest for word in words
     ):
         return
-    numbers = f"{entry.count} finite numbers separated by spaces"
-    finite = numbers if entry.count > 1 else "a finite number"
-    largest = f", at most {entry.largest:g} in size" if entry.largest < math.inf else ""
     raise UrdfError(
         f"<{tag} {entry.attribute}> is {'missing' if text is None else 'wrong'}",
         where=_place_of(elements[0], where),
         found=None if text is None else f'{entry.attribute}="{text}"',
-        allowed=f"{finite}, {entry.unit}{largest}",
-        hint=_suggest_numbers(text or "", entry),
+        allowed=f"{write_count(entry.count, 'finite number')}, {entry.unit}, at most {entry.largest:g} in size",
+        hint="Write numbers with decimal points, spaces between them, and no units",
     )
-
-
-def _are_numbers(words: list[str], entry: Entry) -> bool:
-    return len(words) == entry.count and all(
-        _NUMBER.fullmatch(word)
-        and math.isfinite(float(word))
-        and abs(float(word)) <= entry.largest
-        for word in words
-    )
-
-
-def _suggest_numbers(text: str, entry: Entry) -> str | None:
-    """Return what to write instead: spaces for separating commas, points for decimal ones, no units."""
-    spaced = text.replace(",", " ").replace(";", " ").split()
-    pointed = text.replace(",", ".").split()
-    for words in (spaced, pointed):
-        if _are_numbers(words, entry):
-            return f'Write {entry.attribute}="{" ".join(words)}"'
-    bare = [match.group() for match in _NUMBER.finditer(text)]
-    if len(bare) == entry.count:
-        return f'Write only numbers, in {entry.unit}, such as {entry.attribute}="{" ".join(bare)}"'
-    return None

@@ -174,7 +174,9 @@ def test_no_closed_form(run, task, write, tmp_path):
     outcome = run("plan", write(task))
     assert outcome.code == 2
     assert "no closed form for redundant joints [j3]" in outcome.err
-    assert "planar: not planar: the axes of j1 and j2 are not parallel" in outcome.err
+    assert (
+        "planar: not planar: j2 moves out of the plane in which j1 turns" in outcome.err
+    )
     assert (
         "prismatic: all joints must be prismatic besides the redundant ones; revolute: j1, j2"
         in outcome.err
@@ -307,7 +309,7 @@ def test_suggestions_come_from_the_valid_names():
         ),
         (
             ("inspect", "p.csv"),
-            "p.csv: the file is not a URDF; found 't,j1\\n0,1\\n' at its beginning",
+            "p.csv: the file is not a URDF, or not well-formed XML; found 't,j1\\n0,1\\n' at its beginning",
         ),
         (("sweep", "task.yaml"), "found a task file; allowed: a sweep file"),
         (

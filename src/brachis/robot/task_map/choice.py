@@ -8,7 +8,7 @@ the closed forms for poses serve both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -39,14 +39,6 @@ class JointSpace(TaskMap):
 
     Whole turns count in differences, since the path says in which turn a joint is.
     """
-
-    frame = pin.ReferenceFrame.LOCAL
-
-    rows: tuple[str, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Name the rows after the joints."""
-        object.__setattr__(self, "rows", joint_rows(self.robot.joint_names))
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -87,7 +79,7 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     6
     """
     if rows == JOINTS:
-        return JointSpace(robot)
+        return JointSpace(robot, joint_rows(robot.joint_names))
     if (
         rows == FREE_ROLL
         and tool_joints_of(FREE_ROLL, None)[0] not in robot.tool_joints
@@ -100,24 +92,17 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
         )
     if rows in ("pose", FREE_ROLL):
         return Pose(robot)
-    if isinstance(rows, str) and rows != "position":
+    is_word = isinstance(rows, str) and rows != "position"
+    names = AXES if rows == "position" else tuple(rows)
+    if names == POSE_ROWS:
+        return Pose(robot)
+    is_repeated = len(set(names)) < len(names)
+    if is_word or is_repeated or not {*names} <= {*ROWS} or not position_rows(names):
         raise InputError(
             "this task space does not exist",
             where="task_space",
             found=rows,
-            allowed=f"rows out of {', '.join(ROWS)}, or one of position, pose, {FREE_ROLL}, {JOINTS}",
-        )
-    names = AXES if rows == "position" else tuple(rows)
-    positions = position_rows(names)
-    if names == POSE_ROWS:
-        return Pose(robot)
-    if not set(names) <= set(ROWS) or len(set(names)) < len(names) or not positions:
-        only_yaw = set(names) <= {YAW}
-        raise InputError(
-            "no row of the position" if only_yaw else "unknown or repeated rows",
-            where="task_space",
-            found=list(names),
-            allowed=f"{', '.join(ROWS)}, each once",
+            allowed=f"{', '.join(ROWS)}, each once and not yaw alone; or one of position, pose, {FREE_ROLL}, {JOINTS}",
         )
     return _rows_and_yaw(robot, names) if YAW in names else WorldRows(robot, names)
 
@@ -224,6 +209,6 @@ def with_tool_joints(robot: Robot, joints: Sequence[ToolJoint]) -> Robot:
         joint_names=(*robot.joint_names, *(joint.name for joint in joints)),
         tool_frame=name,
         limits=robot.limits.with_tool_joints(joints),
-        urdf_limits=(*robot.urdf_limits, *(UrdfLimit(None, None, None, None),) * count),
+        urdf_limits=(*robot.urdf_limits, *(UrdfLimit(),) * count),
         friction=Friction(*friction.T),
     )

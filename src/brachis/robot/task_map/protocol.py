@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
-import pinocchio as pin
 
 from brachis.common.summary import Summary
 from brachis.errors import InputError
@@ -81,8 +80,8 @@ class TaskMap(Summary, ABC):
     (2, ('x', 'y'))
     """
 
-    frame: ClassVar[pin.ReferenceFrame]
-    """The axes in which twists are."""
+    in_tool_axes: ClassVar[bool] = True
+    """Whether twists are in the axes of the tool frame; else they are in those of the world."""
 
     robot: Robot
     rows: tuple[str, ...]
@@ -153,8 +152,7 @@ class TaskMap(Summary, ABC):
         self, chain: Chain, q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Place the tool of a chain at K postures, and find its `twists`; see `Chain.tool`."""
-        in_tool_axes = self.frame is pin.ReferenceFrame.LOCAL
-        return chain.tool(q, in_tool_axes=in_tool_axes)
+        return chain.tool(q, in_tool_axes=self.in_tool_axes)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """Rows (m, ...) of the task velocity that twists (6, ...) of the tool make; a space of joints has none."""
@@ -164,14 +162,9 @@ class TaskMap(Summary, ABC):
         """Task Jacobian J (K, m, n) from the `twists` at K postures."""
         return np.moveaxis(self.rates(twists), 0, 1)
 
-    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """V_q, (K, m, n), of K states from the `twists` at their postures."""
-        return self.derivatives(twists, qdot, np.zeros_like(qdot)).velocity_q
-
     def derivatives(
         self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
     ) -> TaskDerivatives:
         """V_q, A_q and A_v of K states from the `twists` at their postures; see `twists`."""
-        in_tool_axes = self.frame is pin.ReferenceFrame.LOCAL
-        slopes = tool_derivatives(twists, qdot, qddot, in_tool_axes=in_tool_axes)
+        slopes = tool_derivatives(twists, qdot, qddot, in_tool_axes=self.in_tool_axes)
         return TaskDerivatives(*map(self.jacobian, slopes))

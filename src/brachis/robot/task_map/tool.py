@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-import pinocchio as pin
 
 from brachis.errors import InputError
 from brachis.kernel import Prescribed, rotation_vectors
@@ -26,8 +25,6 @@ class Pose(TaskMap):
     frame. Its rows are those of the body twist: displacement (m) and rotation (rad) along and about the tool frame's
     own axes, as the formulas of `twists` give them.
     """
-
-    frame: ClassVar[pin.ReferenceFrame] = pin.ReferenceFrame.LOCAL
 
     rows: tuple[str, ...] = POSE_ROWS
 
@@ -73,7 +70,7 @@ class Pose(TaskMap):
 class WorldRows(TaskMap):
     """Rows of the tool frame's position in the world frame; task coordinates are the rows themselves."""
 
-    frame: ClassVar[pin.ReferenceFrame] = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    in_tool_axes: ClassVar[bool] = False
 
     @cached_property
     def prescribed(self) -> Prescribed:
