@@ -237,7 +237,7 @@ def _search(
         search.candidates.append(exact)
         search.best = exact
     if search.best is None:
-        raise search.explain().error()
+        raise search.explain()
     return search
 
 

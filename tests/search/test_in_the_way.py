@@ -53,11 +53,11 @@ def guess(*posts):
 def test_the_nearest_of_joint_paths_that_all_hit_something_is_explained():
     failure = explain_postures([guess(0.8, 0.95), guess(0.8)])
     first, last = failure.s_interval
-    assert "post 0" in failure.cause
+    assert "post 0" in failure.problem
     assert 0.3 < first < 0.5 < last < 0.7
     assert " m at s = 0." in failure.found
     with pytest.raises(PathError, match="post 0"):
-        raise failure.error()
+        raise failure
 
 
 def test_nothing_is_explained_where_one_joint_path_is_free():

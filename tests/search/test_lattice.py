@@ -212,10 +212,9 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     }
     given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
     dead_ends = {"panda_joint4": DeadEnd(0.4, "the branch ends")}
-    failure = explain_no_motion(
+    reason = explain_no_motion(
         given, decompositions_of(given), [], dead_ends, Deadline.after(10.0)
     )
-    reason = failure.error()
     assert isinstance(reason, PathError)
     assert "EAIK is not installed" in str(reason)
     assert "[panda_joint5], [panda_joint6]" in str(reason)

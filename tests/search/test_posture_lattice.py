@@ -16,7 +16,7 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
-from brachis.search.joint_path import DeadEnd
+from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.posture_lattice import PostureLattice
 from brachis.task import task_with
 from support.chains import planar_robot
@@ -420,7 +420,8 @@ def test_the_same_seed_gives_the_same_joint_paths():
 
 
 def test_no_layer_is_begun_after_the_deadline():
-    assert lengthened(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0)) == []
+    found = lengthened(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0))
+    assert found.cause == NO_TIME
 
 
 @pytest.mark.parametrize(

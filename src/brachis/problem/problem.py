@@ -150,7 +150,17 @@ class Problem(Summary):
     def given_time(self) -> float:
         """Time that passes at given speeds and in dwells, s."""
         moving = sum(law.duration for law in self.time_laws if law is not None)
-        return moving + sum(leg.dwell for leg in self.legs)
+        return moving + self.dwell_time
+
+    @property
+    def dwell_time(self) -> float:
+        """Time for which the tool stands still between legs, s."""
+        return sum(leg.dwell for leg in self.legs)
+
+    @property
+    def r(self) -> int:
+        """Degree of redundancy: by how many the joints outnumber the rows of the task space."""
+        return self.robot.n - self.task_map.m
 
     def _law_rate(self, leg: int, end: int) -> float:
         """Return ds/dt at an end (0 or -1) of a leg, 1/s; 0 where its speed is free."""

@@ -1,6 +1,6 @@
 """What is done with an initial guess: it is solved, and, if it is worth it, refined and verified.
 
-1. `solve_candidate` solves over the path where its timing may be the plan (`timed`), else over time at the first
+1. `solve_candidate` solves over the path where its timing may be the plan (`over_path`), else over time at the first
    collocation points.
 2. `finish_candidate` improves the joint path and lays splines along its timing, or adapts the mesh and refines. Then it
    verifies.
@@ -48,23 +48,20 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import (
     FINE,
+    begin_with_timing,
     improve_joint_paths,
     is_timing_all,
     least_time,
 )
-from brachis.optimise.transcription import (
-    maps_by_leg,
-    program_of,
-    program_over,
-)
+from brachis.optimise.transcription import maps_by_leg, program_of, program_over
 from brachis.problem.problem import Problem
 from brachis.search.continuation import (
     solve_by_margin_continuation,
     solve_within_branch,
     solve_without_third_order_limits,
 )
+from brachis.search.over_path import plan_timing, solve_over_path
 from brachis.search.phase_plane import FEW_VARIABLES, initial_breaks, initial_guess
-from brachis.search.timed import begin_with_timing, plan_timing, solve_over_path
 
 _LIGHT = 3_000_000
 """Variables times rows up to which a solve over all knots takes a second or two from the timing of a joint path."""
@@ -72,6 +69,8 @@ _FOR_KNOTS = 0.5
 """Part of the time left after which the knots are not refined further."""
 _PULL = 0.001
 """Weight of the pull towards the motion that is refined, with several redundant joints; see `Pulled`."""
+NOT_TRIED = "not tried: the search ended"
+"""Status of a candidate for which there was no time."""
 SLOW = "not refined: no faster than another over all knots"
 """Status of a candidate that does not beat the best one before refinement."""
 SELECTABLE = 0.05
@@ -81,7 +80,7 @@ SELECTABLE = 0.05
 def solve_candidate(
     start: InitialGuess, deadline: Deadline, listener: Listener
 ) -> Candidate:
-    """Solve from a guess, at the first collocation points.
+    """Solve from a guess, at the first collocation points, unless the time is up.
 
     Parameters
     ----------
@@ -93,6 +92,8 @@ def solve_candidate(
     -------
     Candidate
     """
+    if deadline.passed:
+        return Candidate.of(start, NOT_TRIED)
     problem = start.problem
     try:
         target = program_of(problem, start.maps_by_leg(), initial_breaks(start))
@@ -114,8 +115,17 @@ def _solve_over_time(
         phase.restrict_to(curves)
         for phase, curves in zip(target.phases, start.legs, strict=True)
     )
-    begun = begin_with_timing(start, target)
-    if begun is None:
+    task = start.problem.task
+    begun = None
+    is_open = task.spline.intervals == "auto" and not task.boundary.periodic
+    if is_open and not any(start.problem.time_laws):
+        # Over few knots, close together where the fastest timing of the joint path needs them.
+        points = task.spline.points_per_interval
+        begun = begin_with_timing(target, start.legs, points)
+    if begun is not None:
+        program, x = begun
+        target = program
+    else:
         # From the timing of a joint path a solve takes few iterations over any number of knots; else many take seconds.
         is_light = target.variables * len(target.lower) <= _LIGHT
         is_near = is_light and start.joint_map.r <= 1 and is_timing_all(target)
@@ -128,9 +138,6 @@ def _solve_over_time(
                 "the splines through the joint path leave the branch, or the chart",
             )
         x = first
-    else:
-        program, x = begun
-        target = program
     x, before = solve_without_third_order_limits(program, x, session, MARGINS[0])
     solved = solve_within_branch(program, x, session)
     solved = keep_feasible(solved, x)
@@ -168,20 +175,14 @@ def finish_candidate(
     -------
     Candidate
     """
-    start = candidate.start
-    program = candidate.program
-    assert start is not None and program is not None
-    task = start.problem.task
-    settings = task.refinement
-    soon = deadline.part(_FOR_KNOTS)
+    assert candidate.start is not None
+    session = _open_session(candidate.start, deadline.part(_FOR_KNOTS), listener)
+    settings = candidate.start.problem.task.refinement
     options = RefinementOptions(
-        settings.tolerance, settings.density, settings.max_rounds, soon
+        settings.tolerance, settings.density, settings.max_rounds, deadline
     )
-    session = _open_session(start, soon, listener)
-    latest = dataclasses.replace(options, deadline=deadline)
-    if candidate.is_over_path:
-        return _finish_over_path(candidate, session, latest)
-    return _finish_over_time(candidate, session, latest)
+    finish = _finish_over_path if candidate.is_over_path else _finish_over_time
+    return finish(candidate, session, options)
 
 
 def _finish_over_path(
@@ -233,8 +234,9 @@ def _finish_over_time(
     assert start is not None and program is not None
     solved = SolvedProgram(program, candidate.reports)
     target = candidate.target
-    is_over = session.deadline.passed
-    if candidate.keeps_knots and _is_free_chart(start) and not is_over:
+    # The chart around a given motion is kept.
+    is_free = start.in_chart and start.durations is None
+    if candidate.keeps_knots and is_free and not session.deadline.passed:
         solved = best_of_joints(start.problem, solved, session)
         target = solved.program
     spline = start.problem.task.spline
@@ -282,11 +284,6 @@ def _refine_if_fast(
             break
     assert done is not None
     return done
-
-
-def _is_free_chart(start: InitialGuess) -> bool:
-    """Tell whether the chart may still be changed: that around a motion is kept."""
-    return start.in_chart and start.durations is None
 
 
 def _open_session(

@@ -82,7 +82,7 @@ class Cells:
 
     def positions(self, cells: np.ndarray) -> np.ndarray:
         """Redundant joints, (K, r), rad or m, at the middle of cells (K, r)."""
-        return np.asarray(self.origin + cells * self.size)
+        return self.origin + cells * self.size
 
     def near(self, positions: np.ndarray) -> np.ndarray:
         """Cells, (..., r), in which positions, (..., r), are."""
@@ -128,9 +128,7 @@ def _near_start(problem: Problem, joint: int) -> float:
     axes = list(problem.task_map.axes)
     q = np.zeros((2, problem.robot.n))
     q[1, joint] = 1.0
-    there, beyond = (
-        np.array(problem.robot.tool_placement(each).translation)[axes] for each in q
-    )
+    there, beyond = problem.robot.tool_placements(q)[0][:, axes]
     axis = beyond - there
     wanted = problem.path.sample(np.zeros(1)).target[0, : len(axes)]
     return float(axis @ (wanted - there) / max(axis @ axis, 1e-12))
@@ -177,14 +175,13 @@ class ClosedFormLattice(Lattice):
             margins = self._solver.branch_margins(
                 self._origin[None], self._given_branch
             )
-            self._clear = min(0.02, 0.5 * float(margins.min(initial=np.inf)))
+            self._clear = min(0.02, 0.5 * margins.min(initial=np.inf))
 
     def _at_end(self, last: Layer) -> np.ndarray:
         """Tell which nodes, (K,) bool, are in the end's cell: the plan goes on to the end."""
-        assert self.problem.end is not None
         allowed = np.full(self._robot.n, LARGEST_STEP)
         allowed[self._redundant] = self._cells.size
-        return np.asarray(np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1))
+        return np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1)
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
         """Make nodes all over the ranges of the redundant joints."""

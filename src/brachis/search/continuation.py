@@ -85,7 +85,7 @@ def solve_by_margin_continuation(
         if not kept.reports:
             return smaller, x
         report = kept.report
-        is_free = kept.usable and not _is_held_back(kept)
+        is_free = kept.usable and kept.program.safeguard_slack(report.x) > HELD_BACK
         is_far = _FAR < report.violation < np.inf
         if is_free or is_far or report.status is SolveStatus.TIME_LIMIT:
             return None
@@ -103,11 +103,6 @@ def solve_by_margin_continuation(
         least_gain=tolerances.GAIN,
         go_on_above=tolerances.GAIN,
     )
-
-
-def _is_held_back(solved: SolvedProgram) -> bool:
-    """Tell whether a branch margin is so near to its bound that it holds the motion back."""
-    return solved.program.safeguard_slack(solved.report.x) <= HELD_BACK
 
 
 def solve_without_third_order_limits(

@@ -126,7 +126,7 @@ def _follow(
         if correction == 0:
             wish = _wish(joint_map, strategy, q, previous)
             free = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
-            size = max(float(np.abs(free).max()), 1e-9)
+            size = max(np.abs(free).max(), 1e-9)
             # No joint moves by more than 0.2 rad or m; unfolding, one does by 0.06.
             factor = 0.06 / size if step_s is None else min(step_s, 0.2 / size)
             previous = free * factor

@@ -1,4 +1,4 @@
-"""Why a plan failed: the `Failure` that every explanation makes, and explanations of paths that cannot be followed.
+"""Why a plan failed: explanations of paths that cannot be followed, as the errors that say so.
 
 What a decomposition reaches of a path is found by random postures at stations along it: is a station out of reach,
 beyond the joint ranges, on another branch, or too heavy to hold?
@@ -7,8 +7,7 @@ beyond the joint ranges, on another branch, or too heavy to hold?
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,68 +15,24 @@ from brachis import ik
 from brachis.common import tolerances
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import BrachisError, PathError, PlanningError, Remedy
-from brachis.limits import Limit, Moments, Role
+from brachis.limits import Limit, Role
 from brachis.optimise.candidate import Candidate
-from brachis.problem.feasibility import in_figures, load_remedies
+from brachis.problem.feasibility import load_remedies
 from brachis.problem.plausibility import of_places, say_how_far
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot import Robot
 from brachis.robot.joints import in_turn_of
 from brachis.search.closed_form_lattice import solve_all
-from brachis.search.joint_path import ALL_POSTURES, DeadEnd, sampling_box
+from brachis.search.hopeless import speeds_of
+from brachis.search.joint_path import ALL_POSTURES, DeadEnd, least_excess, sampling_box
 from brachis.task import SolverSettings, Task
 
 _NO_TIME = "The reason was not found in time: raise search.time_limit"
 
 
-@dataclass(frozen=True)
-class Failure:
-    """Why a plan failed.
-
-    Attributes
-    ----------
-    cause : str
-        What is wrong, in words.
-    phase : {"path", "motion"}
-        Whether the path itself cannot be followed (`PathError`), or no motion along it was found (`PlanningError`).
-    s_interval : tuple of float or None
-        Where on the path.
-    where, found, needed : str or None
-        Key of the task, or name of the limit; what was found there, and what would be accepted.
-    hint : str
-        What to try.
-    remedies : sequence of Remedy
-        Numbers of the task to change.
-    """
-
-    cause: str
-    phase: str = "motion"
-    s_interval: tuple[float, float] | None = None
-    where: str | None = None
-    found: str | None = None
-    needed: str | None = None
-    hint: str = ""
-    remedies: Sequence[Remedy] = ()
-
-    def error(self) -> BrachisError:
-        """Make the error that says so."""
-        facts = {
-            "where": self.where,
-            "found": self.found,
-            "allowed": self.needed,
-            "hint": self.hint,
-        }
-        error = (
-            PathError(self.cause, s_interval=self.s_interval, **facts)
-            if self.phase == "path"
-            else PlanningError(self.cause, **facts)
-        )
-        return error.with_remedies(*self.remedies)
-
-
 def explain_reach(
     decomposition: Decomposition, deadline: Deadline = NEVER
-) -> Failure | str:
+) -> PathError | str:
     """Tell why a decomposition has no joint path.
 
     Parameters
@@ -88,13 +43,14 @@ def explain_reach(
 
     Returns
     -------
-    Failure or str
+    PathError or str
         Advice where every station is within reach.
     """
     problem = decomposition.problem
+    robot = problem.robot
     given = "end" if problem.start is None else "start"
     posture = problem.end if problem.start is None else problem.start
-    near = np.zeros(problem.robot.n) if posture is None else posture
+    near = np.zeros(robot.n) if posture is None else posture
     branch = decomposition.branches[0]
     s = np.linspace(0.0, 1.0, 101)
     found = _sample_postures(decomposition, s, near, deadline)
@@ -109,53 +65,46 @@ def explain_reach(
         anywhere = np.concatenate([found, wider], axis=1)
     own = found if posture is None else found[:, :, [branch]]
 
-    def fail(
-        possible: np.ndarray, cause: str, hint: str, remedies: Sequence[Remedy] = ()
-    ) -> Failure | None:
-        """Say where along the path something is not possible, (S,) bool; None if it is everywhere."""
-        if possible.all():
-            return None
-        first, last = (float(end) for end in s[np.flatnonzero(~possible)[[0, -1]]])
-        return Failure(
-            cause.format(
-                first=first, far=say_how_far(problem.task_map, problem.path, first)
-            ),
-            phase="path",
-            s_interval=(first, last),
-            hint=hint,
-            remedies=remedies,
-        )
-
-    robot = problem.robot
-    label = decomposition.match.solver.branches[branch]
-    within = _has_any(_are_within(robot, found))
-    failure = (
-        fail(
+    def check() -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
+        """Yield where along the path something is possible, (S,) bool, and, if it is not: cause, hint and remedies."""
+        yield (
             _has_any(_exist(anywhere)),
             "the path is out of reach from s = {first:.3g} on{far} (no posture was found)",
             _unit_hint(problem)
             or "Shorten or move the path, or choose another start posture",
+            (),
         )
-        or fail(
+        within = _has_any(_are_within(robot, found))
+        yield (
             within,
             "no posture within the joint ranges was found from s = {first:.3g} on"
             + _describe_nearest(robot, anywhere[np.argmin(within)]),
             "Shorten or move the path, or widen the joint ranges",
+            (),
         )
-        or fail(
+        label = decomposition.match.solver.branches[branch]
+        yield (
             _has_any(_are_within(robot, own)),
             f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
             f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
+            (),
         )
-    )
-    for limit in problem.limits:
-        is_load = limit.at_rest == "posture" and limit.role is not Role.SCENE
-        if failure is None and is_load:
-            allowed, nearest, remedies = _check_at_rest(robot, limit, own)
-            cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
-            failure = fail(allowed, cause, "Move the path", remedies)
+        for limit in problem.limits:
+            if limit.at_rest == "posture" and limit.role is not Role.SCENE:
+                allowed, nearest, remedies = _check_at_rest(robot, limit, own)
+                cause = f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}"
+                yield allowed, cause, "Move the path", remedies
+
+    for possible, cause, hint, remedies in check():
+        if not possible.all():
+            first, last = (float(end) for end in s[~possible][[0, -1]])
+            far = say_how_far(problem.task_map, problem.path, first)
+            what = cause.format(first=first, far=far)
+            error = PathError(what, s_interval=(first, last), hint=hint)
+            return error.with_remedies(*remedies)
+
     others = "other redundant joints, " if decomposition.redundant else ""
-    return failure or (
+    return (
         "Every point of the path is within reach of this branch, but no joint path through them was found; "
         f"try {others}another {given} posture"
     )
@@ -173,18 +122,16 @@ def _unit_hint(problem: Problem) -> str | None:
 
 def _exist(q: np.ndarray) -> np.ndarray:
     """Tell which postures, (..., n), exist, (...,) bool; the others are NaN."""
-    return np.asarray(np.isfinite(q).all(axis=-1))
+    return np.isfinite(q).all(axis=-1)
 
 
 def _are_within(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Tell which postures, (..., n), are within the joint ranges, (...,) bool."""
-    return np.asarray(
-        _exist(q) & (_excess(robot, q) <= tolerances.COORDINATE).all(axis=-1)
-    )
+    """Tell which postures, (..., n), exist and are within the joint ranges, (...,) bool."""
+    return np.all(_excess(robot, q) <= tolerances.COORDINATE, axis=-1)
 
 
 def _excess(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """How far joints are beyond their ranges, (..., n), rad or m; negative within."""
+    """How far joints are beyond their ranges, (..., n), rad or m; negative within, NaN where there is no posture."""
     limits = robot.limits
     return np.maximum(limits.position_lower - q, q - limits.position_upper)
 
@@ -236,7 +183,7 @@ def _describe_nearest(robot: Robot, q: np.ndarray) -> str:
         return ""
     excess = np.maximum(_excess(robot, q), 0.0)
     nearest = excess[np.argmin(excess.max(axis=1))]
-    joint = int(np.argmax(nearest))
+    joint = np.argmax(nearest)
     unit = robot.position_units[joint]
     low = robot.limits.position_lower[joint]
     high = robot.limits.position_upper[joint]
@@ -256,23 +203,18 @@ def _check_at_rest(
     allowed = np.zeros(len(q), dtype=bool)
     worst = 0.0
     lack = ""
-    remedies: list[Remedy] = []
+    remedies = []
     for station, postures in enumerate(q):
         # A few dozen postures tell enough.
         within = postures[_are_within(robot, postures)][:60]
-        values = limit.values(Moments.at_rest(within))
-        beyond = limit.violation(values)
-        if not len(beyond):
+        if not len(within):
             continue
-        best = int(np.argmin(beyond.max(axis=1)))
-        column = int(np.argmax(beyond[best]))
-        allowed[station] = beyond[best, column] <= 0.0
-        if beyond[best, column] > worst:
-            worst = float(beyond[best, column])
-            label = limit.labels[column]
+        beyond, column, text = least_excess(limit, within[:, None])
+        allowed[station] = beyond <= 0.0
+        if beyond > worst:
+            worst = beyond
             remedies = load_remedies(robot, limit, column, 1.0 + worst)
-            needed, bound = in_figures(limit, column, float(values[best, column]))
-            lack = f" ({label.subject}: {needed}{label.after} at best, allowed: {bound}{label.after})"
+            lack = f" ({limit.labels[column].subject}: {text})"
     return allowed, lack, remedies
 
 
@@ -280,7 +222,7 @@ def explain_first_failures(
     decompositions: Sequence[Decomposition],
     candidates: Sequence[Candidate],
     deadline: Deadline,
-) -> Failure | None:
+) -> PathError | None:
     """Tell whether the path is out of reach, so that further candidates would be in vain.
 
     Where no lattice has a joint path, any part of the path counts; where no lattice was looked at, a tenth of it.
@@ -298,7 +240,7 @@ def explain_first_failures(
     failures = []
     for decomposition in decompositions[:2]:
         reason = explain_reach(decomposition, deadline)
-        if not isinstance(reason, Failure) or reason.s_interval is None:
+        if isinstance(reason, str) or reason.s_interval is None:
             return None
         failures.append((reason.s_interval, reason))
     is_clear = all(end - begin > 0.1 for (begin, end), _ in failures)
@@ -313,7 +255,8 @@ def explain_no_motion(
     candidates: Sequence[Candidate],
     dead_ends: Mapping[str, DeadEnd],
     deadline: Deadline,
-) -> Failure:
+    not_completed: Sequence[str] = (),
+) -> BrachisError:
     """Tell why no motion was found.
 
     Parameters
@@ -325,13 +268,24 @@ def explain_no_motion(
         Where the lattices end, by the names of the redundant joints.
     deadline : Deadline
         When the search for the reason ends.
+    not_completed : sequence of str, optional
+        What the time did not suffice for: then that is the reason, where the lattices do not tell more.
     """
     has_joint_path = _has_joint_path(candidates)
-    reason: Failure | str = _advise(problem.task, candidates)
+    if not_completed:
+        limit = f"within the time limit of {problem.task.search.time_limit:g} s"
+        left = "; ".join(not_completed)
+        if dead_ends and not has_joint_path:
+            more = f". Not all was done {limit}: {left}: raise search.time_limit"
+            return _explain_dead_ends(problem.task, dead_ends, more)
+        return PlanningError(
+            f"no motion was found {limit}: {left}", hint="Raise search.time_limit"
+        )
+    advice: PathError | str = _advise(problem.task, candidates)
     if decompositions and not has_joint_path:
-        reason = explain_reach(decompositions[0], deadline)
-    if isinstance(reason, Failure):
-        return reason
+        advice = explain_reach(decompositions[0], deadline)
+    if isinstance(advice, PathError):
+        return advice
     missing = ""
     if problem.task.redundant_joints == "auto":
         missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
@@ -343,29 +297,17 @@ def explain_no_motion(
         status if n == 1 else f"{status} ({n} times)" for status, n in counts.items()
     )
     along = " along any joint path" if has_joint_path else ""
-    boundary = problem.task.boundary
-    speeds = [
-        ("boundary.start_speed", boundary.start_speed, problem.task.speed_unit),
-        ("boundary.end_speed", boundary.end_speed, problem.task.speed_unit),
-    ]
-    speeds += [
-        (f"tool_limits.process_speed[{number}].speed", part.speed, "m/s")
-        for number, part in enumerate(problem.task.tool_limits.process_speed)
-    ]
-    return Failure(
+    error = PlanningError(
         f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
-        hint=reason + more,
-        remedies=[
-            Remedy(key, speed, 0.7 * speed, unit)
-            for key, speed, unit in speeds
-            if speed
-        ],
+        hint=advice + more,
     )
+    remedies = [speed.lower_to(0.7 * speed.figure) for speed in speeds_of(problem)]
+    return error.with_remedies(*remedies)
 
 
 def _explain_dead_ends(
     task: Task, dead_ends: Mapping[str, DeadEnd], more: str
-) -> Failure:
+) -> PathError:
     """Say where the lattice ends that reached farthest."""
     name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
     own = name if name == ALL_POSTURES else f"redundant joints {name}"
@@ -373,28 +315,10 @@ def _explain_dead_ends(
     start = "" if task.start == "free" else "start in another posture, "
     scene = ", move bodies of the scene" if task.scene else ""
     hint = f"{start}shorten or move the path{scene}, or widen the joint ranges"
-    return Failure(
+    return PathError(
         f"no joint path was found: {dead_ends[name]}{others if len(dead_ends) > 1 else ''}",
-        phase="path",
         s_interval=dead_ends[name].interval,
         hint=hint.capitalize() + more,
-    )
-
-
-def explain_time_limit(
-    task: Task,
-    not_completed: Sequence[str],
-    candidates: Sequence[Candidate],
-    dead_ends: Mapping[str, DeadEnd],
-) -> Failure:
-    """Say that the time was up, and what was not completed; where lattices ended, if none has a joint path."""
-    if dead_ends and not _has_joint_path(candidates):
-        limit = f"within the time limit of {task.search.time_limit:g} s"
-        more = f". Not all was done {limit}: {'; '.join(not_completed)}: raise search.time_limit"
-        return _explain_dead_ends(task, dead_ends, more)
-    return Failure(
-        f"no motion was found within the time limit of {task.search.time_limit:g} s: {'; '.join(not_completed)}",
-        hint="Raise search.time_limit",
     )
 
 

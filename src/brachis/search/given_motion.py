@@ -44,8 +44,8 @@ def given_guess(
     problem: Problem,
     decompositions: Sequence[Decomposition],
     motion: Trajectory,
-    origin: str = GIVEN,
-) -> InitialGuess | str:
+    origin: str,
+) -> InitialGuess:
     """Make an initial guess of a known motion.
 
     Parameters
@@ -54,17 +54,24 @@ def given_guess(
     decompositions : sequence of Decomposition
     motion : Trajectory
         Its tool may have other tolerances, or none.
-    origin : str, optional
+    origin : str
 
     Returns
     -------
-    InitialGuess or str
-        For the solver that is tried first; or why the motion cannot be used, in plain words.
+    InitialGuess
+        For the solver that is tried first.
+
+    Raises
+    ------
+    UnreachableError
+        The motion cannot be used; the text says why, in plain words.
     """
     joints = problem.robot.urdf_joints
     others = motion.robot.urdf_joints
     if others != joints:
-        return f"its joints are {', '.join(others)}, the robot's {', '.join(joints)}"
+        raise UnreachableError(
+            f"its joints are {', '.join(others)}, the robot's {', '.join(joints)}"
+        )
     # The postures over s, and on every leg the time law.
     splits = [leg.end for leg in problem.legs[:-1]]
     t = np.linspace(0.0, motion.t_end, 4001)
@@ -78,14 +85,11 @@ def given_guess(
         parts.append(s)
     t = np.concatenate(times)
     s = np.concatenate(parts)
-    try:
-        joint_map, curves, family = _in_coordinates(
-            problem, decompositions, motion, s, _positions(problem, motion, t)
-        )
-        if not np.isfinite(joint_map.postures(curves)).all():
-            return "its postures cannot be brought onto the path"
-    except UnreachableError as error:
-        return str(error)
+    joint_map, curves, family = _in_coordinates(
+        problem, decompositions, motion, s, _positions(problem, motion, t)
+    )
+    if not np.isfinite(joint_map.postures(curves)).all():
+        raise UnreachableError("its postures cannot be brought onto the path")
     return InitialGuess(
         problem,
         joint_map,
@@ -152,20 +156,14 @@ def _in_coordinates(
     first = q[0] if problem.start is None else problem.start
     last = q[-1] if problem.end is None else problem.end
     q = q + np.outer(1.0 - s, first - q[0]) + np.outer(s, last - q[-1])
-    is_reachable = problem.robot.n >= problem.task_map.m
-    newton = Newton(problem.task_map) if is_reachable else None
+    newton = Newton(problem.task_map) if problem.r >= 0 else None
     q = bring_onto_path(problem, newton, s, q)
     if has_charts(problem, decompositions):
         chart = _lay_chart(problem, motion, s, q)
         return chart, chart.curves(s, q), CHART
-    chosen = next(
-        (
-            each
-            for each in decompositions
-            if each.match.redundant_joints == motion.redundant_joints
-        ),
-        decompositions[0],
-    )
+    joints = motion.redundant_joints
+    same = [each for each in decompositions if each.match.redundant_joints == joints]
+    chosen = (same or decompositions)[0]
     labels = chosen.match.solver.branches
     branches = [each for each in chosen.branches if labels[each] == motion.branch]
     branch = (branches or chosen.branches)[0]
@@ -176,24 +174,17 @@ def _in_coordinates(
 def _lay_chart(
     problem: Problem, motion: Trajectory, s: np.ndarray, q: np.ndarray
 ) -> ChartMap:
-    """Lay a chart around postures, with the motion's own rows if they are transversal along them."""
-    rows = _rows_of(problem, motion)
-    if rows is not None:
-        newton = Newton(problem.task_map)
-        scaled = rows.at(s)[0] * newton.scales
-        scaled /= np.linalg.norm(scaled, axis=2, keepdims=True)
-        if transversality(scaled, newton.self_motions(q)).min() < SELECTABLE:
-            rows = None
-    return chart_around(problem.task_map, problem.path, s, q, rows)
-
-
-def _rows_of(problem: Problem, motion: Trajectory) -> ChartRows | None:
-    """Rows of a motion in the problem's joints; None where it has none."""
-    robot = problem.robot
-    r = robot.n - problem.task_map.m
+    """Lay a chart around postures, with the motion's own rows if these are in the same joints, and transversal."""
     joints = [motion.joint_names.index(name) for name in motion.redundant_joints]
     rows = ChartRows.constant(np.eye(motion.robot.n)[joints])
     if len(motion.chart_rows):
         rows = ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
-    is_same = motion.joint_names == robot.joint_names
-    return rows if is_same and rows.r == r else None
+    task_map = problem.task_map
+    newton = Newton(task_map)
+    is_same = motion.joint_names == problem.robot.joint_names
+    if is_same and rows.r == problem.r:
+        scaled = rows.at(s)[0] * newton.scales
+        scaled /= np.linalg.norm(scaled, axis=2, keepdims=True)
+        if transversality(scaled, newton.self_motions(q)).min() >= SELECTABLE:
+            return chart_around(task_map, problem.path, s, q, rows)
+    return chart_around(task_map, problem.path, s, q)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
-from brachis.errors import Remedy
+from brachis.errors import PathError, PlanningError, Remedy
 from brachis.limits import Label, Limit, Moments
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
-from brachis.search.failure import Failure
 from brachis.search.phase_plane import postures_along
 
 _HEAVY = 0.95
@@ -26,17 +26,10 @@ _S = np.linspace(0.0, 1.0, 101)
 """Path coordinates at which the arm is held at rest."""
 
 
-class Beyond(NamedTuple):
-    """A limit that the arm exceeds at rest along a joint path: the largest violation, and what to say of it."""
-
-    violation: float
-    failure: Failure
-
-
 def explain_beyond(
     problem: Problem, limit: Limit, s: np.ndarray, q: np.ndarray
-) -> Beyond | None:
-    """Tell where, and by how much, the arm at rest is beyond a limit along a joint path; None: nowhere.
+) -> tuple[float, PathError] | None:
+    """Tell by how much, and where, the arm at rest is beyond a limit along a joint path; None: nowhere.
 
     Parameters
     ----------
@@ -48,29 +41,28 @@ def explain_beyond(
         Postures there, rad or m.
     """
     values, beyond = beyond_at_rest(limit, q, problem.task.refinement.tolerance)
-    station, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    station, column = np.unravel_index(np.argmax(beyond), beyond.shape)
     worst = float(beyond[station, column])
     if worst <= 0.0:
         return None
     where = s[beyond[:, column] > 0.0]
     label = limit.labels[column]
     found, allowed = in_figures(limit, int(column), float(values[station, column]))
-    failure = Failure(
+    error = PathError(
         f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
-        phase="path",
         s_interval=(float(where[0]), float(where[-1])),
         where="path",
         found=f"{found}{label.after} at s = {s[station]:.3g}",
-        needed=f"{allowed}{label.after}",
+        allowed=f"{allowed}{label.after}",
         hint="Move the path",
-        remedies=load_remedies(problem.robot, limit, int(column), 1.0 + worst),
     )
-    return Beyond(worst, failure)
+    remedies = load_remedies(problem.robot, limit, int(column), 1.0 + worst)
+    return worst, error.with_remedies(*remedies)
 
 
-def explain_postures(starts: Sequence[InitialGuess]) -> Failure | None:
+def explain_postures(starts: Sequence[InitialGuess]) -> PathError | None:
     """Tell which limit on postures stands in the way, if all joint paths exceed one: along the nearest of them."""
-    nearest: list[Beyond] = []
+    nearest = []
     for start in starts:
         q = postures_along(start, _S)
         if q is None:
@@ -80,10 +72,8 @@ def explain_postures(starts: Sequence[InitialGuess]) -> Failure | None:
         exceeded = [each for each in found if each is not None]
         if not exceeded:
             return None
-        nearest.append(max(exceeded, key=lambda each: each.violation))
-    if not nearest:
-        return None
-    return min(nearest, key=lambda each: each.violation).failure
+        nearest.append(max(exceeded, key=itemgetter(0)))
+    return min(nearest, key=itemgetter(0))[1] if nearest else None
 
 
 class _Load(NamedTuple):
@@ -91,25 +81,15 @@ class _Load(NamedTuple):
 
     limit: Limit
     column: int
+    label: Label
     least: float
     largest: float
     mean: float
 
-    @property
-    def label(self) -> Label:
-        """What the column is."""
-        return self.limit.labels[self.column]
-
-    @property
-    def figure(self) -> float:
-        """The figure that the user gave."""
-        bounds = self.limit.bounds
-        return next(bound.figure for bound in bounds if bound.column == self.column)
-
 
 def explain_holding(
     starts: Sequence[InitialGuess], *, everywhere: bool = False
-) -> Failure | None:
+) -> PlanningError | None:
     """Tell which limits of a mean leave too little for holding the arm along all joint paths; None: none does.
 
     Parameters
@@ -145,10 +125,11 @@ def explain_holding(
 
 def _explain_loads(
     robot: Robot, worst: _Load, others: Sequence[_Load], where: str
-) -> Failure:
+) -> PlanningError:
     """Say what holding the arm takes of the limit that leaves least, and which others leave too little."""
     label = worst.label
-    figure = worst.figure
+    bounds = worst.limit.bounds
+    figure = next(bound.figure for bound in bounds if bound.column == worst.column)
     low, high = (f"{figure * ratio:.4g}" for ratio in (worst.least, worst.largest))
     taken = f"{low} to {high}" if low != high else low
     mean = f"{worst.mean * figure:.4g}"
@@ -160,20 +141,17 @@ def _explain_loads(
     for own in (worst, *others):
         for remedy in load_remedies(robot, own.limit, own.column, own.mean):
             known = remedies.get(remedy.key, remedy)
-            remedies[remedy.key] = max(known, remedy, key=_change)
-    return Failure(
+            remedies[remedy.key] = max(
+                known, remedy, key=lambda own: abs(own.guess - own.asked)
+            )
+    error = PlanningError(
         cause,
         where=label.key or worst.limit.name,
         found=f"{taken} {label.unit} to hold the arm, {mean} {label.unit} on average (root mean square)",
-        needed=f"{figure:.4g} {label.unit}",
+        allowed=f"{figure:.4g} {label.unit}",
         hint="Move the path so that its postures need less, or change the mounting of the robot",
-        remedies=tuple(remedies.values()),
     )
-
-
-def _change(remedy: Remedy) -> float:
-    """By how much a number changes."""
-    return abs(remedy.guess - remedy.asked)
+    return error.with_remedies(*remedies.values())
 
 
 def _loads_along(start: InitialGuess) -> list[_Load] | None:
@@ -181,20 +159,14 @@ def _loads_along(start: InitialGuess) -> list[_Load] | None:
     q = postures_along(start, _S)
     if q is None:
         return None
-    return [
-        load
-        for limit in start.problem.limits
-        if limit.guarantee.is_mean
-        for load in _loads_at_rest(limit, q)
-    ]
-
-
-def _loads_at_rest(limit: Limit, q: np.ndarray) -> list[_Load]:
-    """List what postures (S, n) at rest take of each column of a limit of a mean."""
-    values = limit.values(Moments.at_rest(q))
-    ratios = np.abs(limit.ratio(values))
-    means = np.abs(limit.ratio(values.mean(axis=0, keepdims=True)))[0]
-    return [
-        _Load(limit, column, float(own.min()), float(own.max()), float(mean))
-        for column, (own, mean) in enumerate(zip(ratios.T, means, strict=True))
-    ]
+    loads = []
+    for limit in start.problem.limits:
+        if limit.guarantee.is_mean:
+            values = limit.values(Moments.at_rest(q))
+            ratios = np.abs(limit.ratio(values))
+            means = np.abs(limit.ratio(values.mean(axis=0, keepdims=True)))
+            figures = (ratios.min(axis=0), ratios.max(axis=0), means[0])
+            for column, label in enumerate(limit.labels):
+                own = (float(figure[column]) for figure in figures)
+                loads.append(_Load(limit, column, label, *own))
+    return loads

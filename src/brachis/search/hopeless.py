@@ -16,22 +16,21 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
-from brachis.errors import Remedy
+from brachis.errors import PlanningError, Remedy
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Problem
-from brachis.search.failure import Failure
 from brachis.search.holding import explain_holding
 from brachis.search.phase_plane import (
     follow_law,
+    phase_plane_on,
     postures_along,
     spread_stations,
-    stations_on,
 )
-from brachis.timing import JointPath, PhasePlane
+from brachis.timing import Timing
 
 _EXACT = 0.97
 """Share of a speed below which it is impossible according to the phase plane, where that is exact."""
@@ -57,16 +56,16 @@ def refuse_hopeless(starts: Sequence[InitialGuess]) -> None:
     if not _has_friction(problem).any() and not any(problem.end_rates):
         failure = explain_holding(starts, everywhere=True)
         if failure is not None:
-            raise failure.error()
+            raise failure
     failure = explain_speeds(starts)
     if failure is not None:
-        raise failure.error()
+        raise failure
 
 
 def _has_friction(problem: Problem) -> np.ndarray:
     """Tell which joints have friction, (n,) bool."""
     friction = problem.robot.friction
-    return np.asarray(friction.viscous + friction.coulomb > 0.0)
+    return friction.viscous + friction.coulomb > 0.0
 
 
 @dataclass(frozen=True)
@@ -97,6 +96,10 @@ class _Speed:
         """Return the speed with its unit."""
         return f"{self.figure:g} {self.unit}"
 
+    def lower_to(self, figure: float, *, is_known: bool = False) -> Remedy:
+        """Return what may help: a lower speed."""
+        return Remedy(self.key, self.figure, figure, self.unit, is_known)
+
 
 def speeds_of(problem: Problem) -> list[_Speed]:
     """List the process speeds of a task, and its speeds at ends that are not at a process speed."""
@@ -106,17 +109,13 @@ def speeds_of(problem: Problem) -> list[_Speed]:
     for number, (part, leg) in enumerate(zip(parts, given, strict=True)):
         key = f"tool_limits.process_speed[{number}].speed"
         speeds.append(_Speed(key, "process speed", part.speed, "m/s", leg))
-    boundary = problem.task.boundary
     last = len(problem.legs) - 1
-    ends = (
-        ("start_speed", boundary.start_speed, 0, 0),
-        ("end_speed", boundary.end_speed, last, -1),
-    )
-    for key, figure, leg, side in ends:
+    unit = problem.task.speed_unit
+    for name, leg, side in (("start", 0, 0), ("end", last, -1)):
+        key = f"boundary.{name}_speed"
+        figure = getattr(problem.task.boundary, f"{name}_speed")
         if figure and leg not in given:
-            name = key.replace("_", " ")
-            unit = problem.task.speed_unit
-            speeds.append(_Speed(f"boundary.{key}", name, figure, unit, leg, side))
+            speeds.append(_Speed(key, f"{name} speed", figure, unit, leg, side))
     return speeds
 
 
@@ -144,17 +143,15 @@ class _SpeedCheck:
         self.problem = start.problem
         self.speeds = speeds
         self.is_redundant = start.joint_map.r > 0
-        limits = self.problem.limits
-        self._planes = [
-            PhasePlane(limits, JointPath.through(*stations_on(leg, s, q)))
-            for leg in self.problem.legs
+        self.planes = [
+            phase_plane_on(self.problem, leg, s, q) for leg in self.problem.legs
         ]
         self.caps = [self._find_cap(speed) for speed in speeds]
-        self._known: dict[tuple[int, float, float], np.ndarray | None] = {}
+        self._solve = [cache(plane.solve) for plane in self.planes]
 
     def _find_cap(self, speed: _Speed) -> tuple[float, float, str]:
         """Largest share of a speed by itself; the path coordinate and the label of the limit that allow no more."""
-        plane = self._planes[speed.leg]
+        plane = self.planes[speed.leg]
         law = self.problem.time_laws[speed.leg]
         if law is not None:
             _, rate, acceleration = follow_law(law, plane.path.s)
@@ -187,25 +184,14 @@ class _SpeedCheck:
             return [leg for leg in free if leg not in (0, len(self.problem.legs) - 1)]
         return free
 
-    def pass_leg(self, leg: int, shares: np.ndarray) -> np.ndarray | None:
-        """Pass a leg whose speed is free with shares of the speeds, (k,): ds/dt, (P,), 1/s; None: it is too short."""
+    def pass_leg(self, leg: int, shares: np.ndarray) -> Timing | None:
+        """Pass a leg whose speed is free with shares of the speeds, (k,); None: it is too short."""
         rates = []
         for side in (0, -1):
             number = self.speed_at(leg, side)
             share = 0.0 if number is None else float(shares[number])
             rates.append(share * self.problem.leg_rates[leg][side])
-        first, last = rates
-        key = (leg, first, last)
-        if key not in self._known:
-            timing = self._planes[leg].solve((first, last))
-            self._known[key] = None if timing is None else timing.rate
-        return self._known[key]
-
-    def limit_on(self, leg: int, shares: np.ndarray) -> str:
-        """Name the limit that is active for most of a leg that can be passed."""
-        rate = self.pass_leg(leg, shares)
-        assert rate is not None
-        return self._planes[leg].active_limit(rate)
+        return self._solve[leg](tuple(rates))
 
     def lower_one(self, number: int, least: float) -> float | None:
         """Find the largest share of a speed, above `least`, that is possible beside the others; None without any."""
@@ -239,24 +225,25 @@ def _largest_share(
 
 def explain_speeds(
     starts: Sequence[InitialGuess], *, are_tried: bool = False
-) -> Failure | None:
+) -> PlanningError | None:
     """Tell which speeds of the task are out of reach along the joint paths of all guesses; None if they may not be.
 
     Parameters
     ----------
     starts : sequence of InitialGuess
-        At least one.
     are_tried : bool, optional
         Whether plans from these failed, so that too high a speed is the most likely reason; otherwise it has to be far
         out of reach.
     """
+    if not starts:
+        return None
     problem = starts[0].problem
     speeds = speeds_of(problem)
     if not speeds:
         return None
     s = spread_stations(problem)
     driven = np.isfinite(problem.robot.limits.torque_upper)
-    has_friction = bool((_has_friction(problem) & driven).any())
+    has_friction = (_has_friction(problem) & driven).any()
     best = None
     share = _LEAST
     for start in starts:
@@ -276,20 +263,19 @@ def explain_speeds(
     return _explain(best, share)
 
 
-def _explain(check: _SpeedCheck, share: float) -> Failure:
+def _explain(check: _SpeedCheck, share: float) -> PlanningError:
     """Tell which speeds are too high, if this share of all at once is possible."""
-    numbers = range(len(check.speeds))
     every = np.ones(len(check.speeds))
-    shares = {number: check.caps[number][0] for number in numbers}
-    number = min(numbers, key=lambda number: shares[number])
+    shares = {number: cap[0] for number, cap in enumerate(check.caps)}
+    number = min(shares, key=lambda number: shares[number])
     _, place, label = check.caps[number]
     why = f"for the {label} limit at s = {place:.3g}"
     short = [leg for leg in check.free_legs if check.pass_leg(leg, every) is None]
     if short and shares[number] > share + 0.01:
         # One speed alone may be to blame.
-        alone = ((each, check.lower_one(each, 0.9 * share)) for each in numbers)
-        shares = {each: _REACHED * own for each, own in alone if own is not None}
-        shares = shares or dict.fromkeys(numbers, _REACHED * share)
+        alone = ((each, check.lower_one(each, 0.9 * share)) for each in shares)
+        lower = {each: _REACHED * own for each, own in alone if own is not None}
+        shares = lower or dict.fromkeys(shares, _REACHED * share)
         leg = min(
             short,
             key=lambda leg: _largest_share(
@@ -302,8 +288,11 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
             "rest" if end is None else str(check.speeds[end]) for end in ends
         )
         part = check.problem.legs[leg]
+        timing = check.pass_leg(leg, share * every)
+        assert timing is not None
+        active = check.planes[leg].active_limit(timing.rate)
         why = (
-            f"for the {check.limit_on(leg, share * every)} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
+            f"for the {active} limit: the path from s = {part.begin:.3g} to {part.end:.3g} "
             f"is too short to get from {first} to {last}"
         )
     possible = {
@@ -311,22 +300,22 @@ def _explain(check: _SpeedCheck, share: float) -> Failure:
         for each, own in shares.items()
         if own < _EXACT or each == number
     }
-    remedies = []
-    for each, figure in possible.items():
-        own = check.speeds[each]
-        remedies.append(Remedy(own.key, own.figure, figure, own.unit, is_known=True))
+    remedies = [
+        check.speeds[each].lower_to(figure, is_known=True)
+        for each, figure in possible.items()
+    ]
     speed = check.speeds[number]
     most = f"{possible[number]:g} {speed.unit}"
-    return Failure(
+    error = PlanningError(
         f"the {speed.name} is too high {why}",
         where=speed.key,
         found=str(speed),
-        needed=f"about {most} along the best joint path that was found (estimate)"
+        allowed=f"about {most} along the best joint path that was found (estimate)"
         if check.is_redundant
         else f"no more than {most} (estimate)",
         hint="Raise the limits that hold the motion back",
-        remedies=remedies,
     )
+    return error.with_remedies(*remedies)
 
 
 def _round_down(value: float) -> float:

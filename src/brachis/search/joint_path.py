@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.limits import Limit
+from brachis.limits import Limit, Moments
 from brachis.limits.joint import reciprocals_near
+from brachis.problem.feasibility import in_figures
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
 
@@ -18,6 +19,7 @@ NO_ANSWER = "it is out of reach"
 OTHER_BRANCH = "the branch ends"
 NO_CHART = "the arm stays too close to a singularity"
 JUMPS = "no neighbouring posture continues the joint path"
+NO_TIME = "the time was up"
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.nda
 
 
 def sampling_box(
-    robot: Robot, near: np.ndarray | None = None, opened: Sequence[int] = ()
+    robot: Robot, near: np.ndarray | float = 0.0, opened: Sequence[int] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
     """Box, (n,) and (n,), from which postures are drawn: the ranges, or a turn, or 10 m around a posture `near`.
 
@@ -139,17 +141,31 @@ def sampling_box(
     lower = np.where(is_open, -np.inf, limits.position_lower)
     upper = np.where(is_open, np.inf, limits.position_upper)
     reach = np.where(robot.revolute, np.pi, 10.0)
-    middle = np.zeros(robot.n)
-    if near is not None:
-        slides = np.clip(near, limits.position_lower, limits.position_upper)
-        middle = np.where(robot.revolute, 0.0, slides)
+    slides = np.clip(near, limits.position_lower, limits.position_upper)
+    middle = np.where(robot.revolute, 0.0, slides)
     highest = np.where(np.isfinite(upper), upper, middle + reach)
     low = np.where(np.isfinite(lower), lower, highest - 2.0 * reach)
     high = np.where(np.isfinite(upper), upper, low + 2.0 * reach)
     return low, high
 
 
+def least_excess(limit: Limit, q: np.ndarray) -> tuple[float, int, str]:
+    """Find how far a limit is exceeded at rest, at least, on ways through postures, (K, L, n).
+
+    Of the best way the largest violation, its column, and what is found there and allowed, in words.
+    """
+    values = limit.values(Moments.at_rest(q.reshape(-1, q.shape[-1])))
+    values = values.reshape(*q.shape[:2], -1)
+    beyond = limit.violation(values)
+    best = np.argmin(beyond.max(axis=(1, 2)))
+    place, column = np.unravel_index(np.argmax(beyond[best]), beyond.shape[1:])
+    found, allowed = in_figures(limit, int(column), float(values[best, place, column]))
+    unit = limit.labels[column].after
+    text = f"{found}{unit} at best, allowed: {allowed}{unit}"
+    return float(beyond[best, place, column]), int(column), text
+
+
 def leaving_range(robot: Robot, inside: np.ndarray) -> str:
     """Name the joint that most often leaves its range in K postures; `inside` is (K, n) bool."""
-    joint = robot.joint_names[int(np.argmin(inside.sum(axis=0)))]
+    joint = robot.joint_names[np.argmin(inside.sum(axis=0))]
     return f"the range of joint {joint!r} ends"

@@ -25,25 +25,26 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import TypedDict, Unpack
+from typing import TypedDict
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
 from brachis.kernel import largest_parts
-from brachis.limits import HasLatticeWeights, Moments
+from brachis.limits import HasLatticeWeights
 from brachis.path import Path
-from brachis.problem.feasibility import in_figures
 from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
 from brachis.robot.joints import TURN
 from brachis.search.joint_path import (
     JUMPS,
     NO_ANSWER,
+    NO_TIME,
     OTHER_BRANCH,
     DeadEnd,
     JointPath,
     distinct,
+    least_excess,
     leaving_range,
     weights_near,
 )
@@ -98,7 +99,7 @@ class Layer:
 def farthest(points: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
     """Choose points, (K, n), each the farthest from all that are kept, (H, n)."""
     distance = np.abs(points[:, None] - kept[None]).max(axis=2).min(axis=1)
-    chosen: list[int] = []
+    chosen = []
     for _ in range(count):
         chosen.append(int(np.argmax(distance)))
         distance = np.minimum(distance, np.abs(points - points[chosen[-1]]).max(axis=1))
@@ -109,7 +110,7 @@ def shortest(length: np.ndarray, keys: np.ndarray) -> np.ndarray:
     """Return where each different row of `keys`, (E, k), has its least `length`, (E,)."""
     order = np.lexsort((length, *keys.T[::-1]))
     rows = keys[order]
-    return np.asarray(order[np.append(True, np.any(rows[1:] != rows[:-1], axis=1))])
+    return order[np.append(True, np.any(rows[1:] != rows[:-1], axis=1))]
 
 
 @dataclass(frozen=True)
@@ -191,14 +192,21 @@ class Lattice(ABC):
     """
 
     def __init__(
-        self, problem: Problem, turning: np.ndarray, **options: Unpack[Options]
+        self,
+        problem: Problem,
+        turning: np.ndarray,
+        *,
+        cells_per_turn: int = 72,
+        density: float = 1.0,
+        nodes: int = 120,
+        deadline: Deadline = NEVER,
     ) -> None:
         self.problem = problem
-        self.s = stations(problem.path, problem.task_map, options.get("density", 1.0))
+        self.s = stations(problem.path, problem.task_map, density)
         self._robot = problem.robot
-        self._cells_per_turn = options.get("cells_per_turn", 72)
-        self._nodes = options.get("nodes", 120)
-        self._deadline = options.get("deadline", NEVER)
+        self._cells_per_turn = cells_per_turn
+        self._nodes = nodes
+        self._deadline = deadline
         self._backwards = problem.start is None and problem.end is not None
         self._origin = problem.end if self._backwards else problem.start
         self._targets = problem.path.sample(self.s).target
@@ -248,20 +256,20 @@ class Lattice(ABC):
         Returns
         -------
         list of JointPath or DeadEnd
-            Distinct ones, the shortest first, or where the lattice ends; an empty list if the time was up.
+            Distinct ones, the shortest first, or where the lattice ends.
         """
         rng = np.random.default_rng(self.problem.task.search.seed)
         layers: list[Layer] = []
         numbers = range(len(self.s))
         for station in numbers[:: -1 if self._backwards else 1]:
+            layer: Layer | str
             if self._deadline.passed:
-                return []
-            layer = (
-                self._next(layers[-1], station, rng)
-                if layers
-                else self._first_layer(rng)
-            )
-            if not isinstance(layer, Layer):
+                layer = NO_TIME
+            elif layers:
+                layer = self._next(layers[-1], station, rng)
+            else:
+                layer = self._first_layer(rng)
+            if isinstance(layer, str):
                 return DeadEnd(float(self.s[station]), layer, backwards=self._backwards)
             layers.append(layer)
         length = layers[-1].length
@@ -279,8 +287,8 @@ class Lattice(ABC):
         in_order = np.array(traced if self._backwards else traced[::-1])
         q = in_order.swapaxes(0, 1) + TURN * self._turn_of(last)[:, None]
         found = [
-            JointPath(self.problem, self.s, own, float(last.length[i]), int(branch))
-            for i, (own, branch) in enumerate(zip(q, last.branch, strict=True))
+            JointPath(self.problem, self.s, own, float(length), int(branch))
+            for own, length, branch in zip(q, last.length, last.branch, strict=True)
         ]
         return self._choose(found, last, most)
 
@@ -304,8 +312,6 @@ class Lattice(ABC):
         """Join the nodes of a layer to the next station, or tell why none can be."""
         edges = self._edges(before, station, rng)
         parent = edges.parent
-        if not len(parent):
-            return NO_ANSWER
         q = before.q[parent] + edges.step
         low = np.minimum(before.low[parent], q)
         high = np.maximum(before.high[parent], q)
@@ -384,26 +390,16 @@ class Lattice(ABC):
         """Say which limit is exceeded most in the best posture, or on the best way, (K, L, n), and by how much."""
         if not len(q):
             return ""
-        still = Moments.at_rest(q.reshape(-1, q.shape[-1]))
-        worst = 0.0
+        worst = _SLACK
         cause = ""
         for limit in self.problem.limits:
-            if limit.at_rest != "posture" or limit.holds_at_rest(still.q, _SLACK).all():
+            if limit.at_rest != "posture":
                 continue
-            shape = (*q.shape[:2], len(limit.labels))
-            values = limit.values(still).reshape(shape)
-            beyond = limit.violation(values)
-            best = int(np.argmin(beyond.max(axis=(1, 2))))
-            place, column = np.unravel_index(np.argmax(beyond[best]), shape[1:])
-            if beyond[best, place, column] > worst:
-                worst = beyond[best, place, column]
-                label = limit.labels[column]
-                value = float(values[best, place, column])
-                found, allowed = in_figures(limit, int(column), value)
-                cause = (
-                    f"the {limit.name} limit of {label.subject} {limit.refusal} "
-                    f"({found}{label.after} at best, allowed: {allowed}{label.after})"
-                )
+            beyond, column, text = least_excess(limit, q)
+            if beyond > worst:
+                worst = beyond
+                subject = limit.labels[column].subject
+                cause = f"the {limit.name} limit of {subject} {limit.refusal} ({text})"
         return cause
 
     def _choose_some(self, layer: Layer, most: int) -> np.ndarray:
@@ -458,7 +454,7 @@ class Lattice(ABC):
     def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Which joints of joint paths, (E, n), can be brought into their ranges."""
         first, last = self._turns_within(low, high)
-        return np.asarray(first <= last)
+        return first <= last
 
     def _lengths(
         self, q: np.ndarray, step: np.ndarray, origin: np.ndarray
@@ -471,4 +467,4 @@ class Lattice(ABC):
             for length, rows in zip(lengths, limit.lattice_weights(q), strict=True):
                 if rows is not None:
                     np.maximum(length, largest_parts(rows, step, origin), out=length)
-        return np.asarray(lengths[0] + 0.5 * lengths[1])  # T = 0.5 s
+        return lengths[0] + 0.5 * lengths[1]  # T = 0.5 s

@@ -8,29 +8,43 @@ this one, and the search goes on in it.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import UnreachableError
-from brachis.kinematics import (
-    ChartMap,
-    Newton,
-    chart_around,
-    transversality,
-)
-from brachis.optimise.candidate import InitialGuess
-from brachis.optimise.improve import SolverSession
+from brachis.kinematics import ChartMap, Newton, chart_around, transversality
+from brachis.optimise.backends import SolverReport, solvers_for
+from brachis.optimise.candidate import Candidate, InitialGuess, verify
+from brachis.optimise.improve import SolvedProgram, SolverSession
+from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import Program
-from brachis.optimise.retiming import BetterPaths, PathEffort, improve_joint_paths
+from brachis.optimise.refine import RefinementOptions
+from brachis.optimise.retiming import (
+    ROUGH,
+    BetterPaths,
+    PathEffort,
+    improve_joint_paths,
+    is_timing_all,
+    lay_splines,
+)
 from brachis.optimise.transcription import program_over
 
 CHARTS = 4
 """Charts in which a guess is improved, no more, unless stated."""
 _TRANSVERSAL = 0.5
 """Least transversality of rows along a motion, below which its chart is left for another."""
+_MORE = 1.2
+"""Times the violation by which a timing takes longer."""
+_LESS = 0.9
+"""Factor on an excess beyond a limit that such a longer time should bring, at least."""
+_LONGEST = 0.1
+"""Part of the time by which it may."""
 
 
 @dataclass(frozen=True)
@@ -85,49 +99,54 @@ def improve_guess(
     found = improve_joint_paths(program, start.legs, solve, tolerance, effort)
     better = BetterGuess(_along(start, found), program, found)
     # A chart around a motion that is given is kept.
-    is_free = start.in_chart and start.durations is None
-    more = charts - 1 if is_free and better.start.is_improved else 0
-    for _ in range(more):
-        moved = _lay_chart(better)
-        if moved is None or solve.deadline.passed:
-            break
-        try:
-            grids = [phase.grid for phase in program.phases]
-            own = program_over(start.problem, moved.maps_by_leg(), grids)
+    if not start.in_chart or start.durations or not better.start.is_improved:
+        return better
+    with contextlib.suppress(UnreachableError):
+        for _ in range(charts - 1):
+            moved = _lay_chart(better)
+            if moved is None or solve.deadline.passed:
+                break
+            own = _program_like(program, moved)
             found = improve_joint_paths(own, moved.legs, solve, tolerance, effort)
-        except UnreachableError:
-            break
-        reports = (*better.found.reports, *found.reports)
-        found = dataclasses.replace(found, reports=reports)
-        gain = 1.0 - found.t_end / better.found.t_end
-        if gain < -tolerances.GAIN:
-            break
-        better = BetterGuess(_along(moved, found), own, found)
-        if gain < tolerances.GAIN:
-            break
-    return _centre(better) if is_free and better.start.is_improved else better
+            reports = (*better.found.reports, *found.reports)
+            found = dataclasses.replace(found, reports=reports)
+            gain = 1.0 - found.t_end / better.found.t_end
+            if gain < -tolerances.GAIN:
+                break
+            better = BetterGuess(_along(moved, found), own, found)
+            if gain < tolerances.GAIN:
+                break
+    with contextlib.suppress(UnreachableError):
+        better = _centre(better)
+    return better
+
+
+def _program_like(program: Program, start: InitialGuess) -> Program:
+    """Write the program of a guess down over the knots of another."""
+    grids = [phase.grid for phase in program.phases]
+    return program_over(start.problem, start.maps_by_leg(), grids)
 
 
 def _centre(better: BetterGuess) -> BetterGuess:
     """Lay the same chart around the better joint path: the search for a posture then begins beside it.
 
-    Its coordinates stay, and so do the timings that were found.
+    Its coordinates stay, and so do the timings that were found. Raises UnreachableError where no chart can be laid.
     """
-    start = better.start
+    chart, s, q = _chart_of(better.start)
+    centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
+    start = dataclasses.replace(better.start, joint_map=centred)
+    program = _program_like(better.program, start)
+    return dataclasses.replace(better, start=start, program=program)
+
+
+def _chart_of(start: InitialGuess) -> tuple[ChartMap, np.ndarray, np.ndarray]:
+    """Return the chart of a guess, its path coordinates, (S,), and postures, (S, n); raise UnreachableError without."""
     chart = start.joint_map
     assert isinstance(chart, ChartMap)
-    s = start.joint_path[:, 0]
     q = chart.postures(start.joint_path)
     if not np.isfinite(q).all():
-        return better
-    grids = [phase.grid for phase in better.program.phases]
-    try:
-        centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
-        start = dataclasses.replace(start, joint_map=centred)
-        program = program_over(start.problem, start.maps_by_leg(), grids)
-    except UnreachableError:
-        return better
-    return dataclasses.replace(better, start=start, program=program)
+        raise UnreachableError("the joint path leaves the chart")
+    return chart, start.joint_path[:, 0], q
 
 
 def _along(start: InitialGuess, found: BetterPaths) -> InitialGuess:
@@ -136,35 +155,127 @@ def _along(start: InitialGuess, found: BetterPaths) -> InitialGuess:
         return start
     curves = np.concatenate(found.curves)
     grows = np.append(True, np.diff(curves[:, 0]) > 0.0)
-    waiting = sum(leg.dwell for leg in start.problem.legs)
     return dataclasses.replace(
         start,
         joint_path=curves[grows],
-        estimate=found.t_end + waiting,
+        estimate=found.t_end + start.problem.dwell_time,
         durations=None,
         is_improved=True,
     )
 
 
 def _lay_chart(better: BetterGuess) -> InitialGuess | None:
-    """Lay a chart around a better joint path; None where its own one is good, and where it has none."""
-    chart = better.start.joint_map
-    assert isinstance(chart, ChartMap)
-    problem = better.start.problem
-    curves = better.start.joint_path
-    s = curves[:, 0]
-    q = chart.postures(curves)
-    if not np.isfinite(q).all():
-        return None
+    """Lay a chart around a better joint path; None where its own one is good. Raises UnreachableError as `_centre`."""
+    chart, s, q = _chart_of(better.start)
     newton = Newton(chart.task_map)
     rows = chart.rows.at(s)[0] * newton.scales
     least = transversality(rows, newton.self_motions(q)).min()
     if least >= _TRANSVERSAL and not better.found.is_held_back:
         return None
-    try:
-        moved = chart_around(problem.task_map, problem.path, s, q)
-    except UnreachableError:
-        return None
+    moved = chart_around(chart.task_map, chart.path, s, q)
     return dataclasses.replace(
         better.start, joint_map=moved, joint_path=moved.curves(s, q)
     )
+
+
+def solve_over_path(
+    start: InitialGuess, program: Program, session: SolverSession
+) -> Candidate | None:
+    """Solve from a guess over the path, where its timing may be the plan.
+
+    That is where the phase plane knows all limits, and the knots are open. As a fallback other solvers solve over time.
+
+    Parameters
+    ----------
+    start : InitialGuess
+    program : Program
+        Of its joint maps, over any knots.
+    session : SolverSession
+
+    Returns
+    -------
+    Candidate or None
+        None where that is not so, or where the limits allow no timing.
+    """
+    task = start.problem.task
+    is_open = task.spline.intervals == "auto"
+    is_first = start.solver == solvers_for(task.solver.name)[0].name
+    if not (is_open and is_first and is_timing_all(program)):
+        return None
+    reports: tuple[SolverReport, ...] = ()
+    if not start.is_improved:
+        try:
+            better = improve_guess(start, program, session, ROUGH)
+        except UnreachableError:
+            return None
+        start, program = better.start, better.program
+        reports = better.found.reports
+    if not start.is_improved:
+        return None
+    return Candidate.of(
+        start,
+        "planned",
+        program=program,
+        target=program,
+        is_over_path=True,
+        reports=reports,
+        coarse=start.estimate,
+    )
+
+
+def plan_timing(
+    candidate: Candidate,
+    program: Program,
+    timings: Sequence[PhaseTiming | None],
+    reports: tuple[SolverReport, ...],
+    options: RefinementOptions,
+) -> Candidate | None:
+    """Lay splines along the timings of all phases, and verify them.
+
+    Where a limit is exceeded by a little between the places looked at, the motion takes a little longer, if that helps.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    program : Program
+        Over any knots.
+    timings : sequence of PhaseTiming or None
+    reports : tuple of SolverReport
+        Of earlier solves.
+    options : RefinementOptions
+
+    Returns
+    -------
+    Candidate or None
+        None where a phase has no timing.
+    """
+    assert candidate.start is not None
+    spline = candidate.start.problem.task.spline
+    laid = lay_splines(
+        program, timings, spline.tolerance, spline.points_per_interval, options.deadline
+    )
+    if laid is None:
+        return None
+    finer, report = laid
+    factor = 1.0
+    if options.tolerance < report.violation < _LONGEST:
+        factor += _MORE * report.violation
+    most = np.inf
+    for number in itertools.count(1):
+        own = SolvedProgram(
+            finer, (report,), violation=report.violation, time_scaled=factor
+        )
+        done = verify(candidate, reports, own)
+        found = done.verification
+        if done.is_settled or found is None:
+            break
+        is_of_limits = all(check.passed or check.of_limit for check in found.checks)
+        excess = found.worst_ratio - 1.0
+        if not is_of_limits or excess > most:
+            break
+        most = _LESS * excess
+        # Torques that gravity adds to fall more slowly.
+        factor *= 1.0 + number * _MORE * max(excess, options.tolerance)
+        if factor > 1.0 + _LONGEST:
+            break
+    return done

@@ -16,7 +16,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from brachis.common.arrays import interpolate_columns
+from brachis.common.arrays import bisect, interpolate_columns
 from brachis.errors import UnreachableError
 from brachis.optimise.candidate import InitialGuess
 from brachis.optimise.guess import starting_point, worst_time_scaling_ratio
@@ -29,8 +29,6 @@ from brachis.path.time_law import TimeLaw
 from brachis.problem.problem import Problem
 from brachis.timing import JointPath, PhasePlane
 
-_LegGuess = tuple[np.ndarray, float | None]
-"""Guess for a leg: curves, (S, c), and duration, s, if these are a motion's at even times."""
 _STATIONS = 401
 """Stations along a joint path of a guess."""
 FEW_VARIABLES = 60
@@ -56,7 +54,7 @@ def least_time(problem: Problem, s: np.ndarray, q: np.ndarray) -> float:
     float
         s; infinite for a joint path that cannot be followed at any speed, or not at the given one.
     """
-    total = sum(leg.dwell for leg in problem.legs)
+    total = problem.dwell_time
     for part in fastest_times(problem, s, q):
         total += np.inf if part is None else float(part[1][-1])
     return total
@@ -81,20 +79,19 @@ def fastest_times(
         For each leg path coordinates (P,) from its beginning to its end, and times (P,) from 0 on, s. None for a leg
         that cannot be passed.
     """
-    found: list[tuple[np.ndarray, np.ndarray] | None] = []
+    found = []
     parts = zip(problem.legs, problem.leg_rates, problem.time_laws, strict=True)
     for leg, rates, law in parts:
-        stations, postures = stations_on(leg, s, q)
-        plane = PhasePlane(problem.limits, JointPath.through(stations, postures))
+        plane = phase_plane_on(problem, leg, s, q)
         times: np.ndarray | None
         if law is None:
             timing = plane.solve(rates)
             times = None if timing is None else timing.times
         else:
-            times, rate, acceleration = follow_law(law, stations)
+            times, rate, acceleration = follow_law(law, plane.path.s)
             if plane.speed_factor(rate, acceleration)[0] < _ROUGH:
                 times = None
-        found.append(None if times is None else (stations, times))
+        found.append(None if times is None else (plane.path.s, times))
     return found
 
 
@@ -108,15 +105,16 @@ def spread_stations(problem: Problem, count: int = _STATIONS) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def stations_on(
-    leg: Leg, s: np.ndarray, q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Take the part of a joint path, (S,) and (S, n), on a leg: path coordinates (P,) and postures (P, n)."""
+def phase_plane_on(
+    problem: Problem, leg: Leg, s: np.ndarray, q: np.ndarray
+) -> PhasePlane:
+    """Make the phase plane of the part of a joint path, (S,) and (S, n), on a leg."""
     inner = s[(s > leg.begin + _NEAR) & (s < leg.end - _NEAR)]
     if len(inner) < 3:
         inner = np.linspace(leg.begin, leg.end, 5)[1:-1]
     stations = np.concatenate([[leg.begin], inner, [leg.end]])
-    return stations, interpolate_columns(stations, s, q)
+    postures = interpolate_columns(stations, s, q)
+    return PhasePlane(problem.limits, JointPath.through(stations, postures))
 
 
 def follow_law(
@@ -143,15 +141,21 @@ def initial_guess(program: Program, start: InitialGuess) -> np.ndarray | None:
     (v,) ndarray or None
     """
     durations = start.durations or (None,) * len(start.legs)
-    given: list[_LegGuess] = list(zip(start.legs, durations, strict=True))
-    guesses = [given]
+    guesses = [(start.legs, durations)]
     if start.durations is None:
-        timed = _time_guesses(program, start, given)
-        if any(duration is not None for _, duration in timed):
-            guesses.append(timed)
+        # The joint paths of legs are timed that are near the best ones, have many knots, or moving ends.
+        is_near = start.is_improved or program.variables > FEW_VARIABLES
+        timed = [
+            _time_guess(phase, curves)
+            if is_near or _is_moving(phase)
+            else (curves, None)
+            for phase, curves in zip(program.phases, start.legs, strict=True)
+        ]
+        curves, durations = zip(*timed, strict=True)
+        if any(durations):
+            guesses.append((curves, durations))
     found = []
-    for guess in guesses:
-        curves, durations = zip(*guess, strict=True)
+    for curves, durations in guesses:
         x = starting_point(program, curves, durations)
         if x is not None:
             beyond = max(worst_time_scaling_ratio(program, x), 1.0)
@@ -198,23 +202,15 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
         Lengths of the first and the last interval; if they are too long the intervals are even.
     """
     half = count // 2
-    sides = []
-    for length in (first, last):
-        ratio = min(length * count, 1.0)
-        # Intervals e^(g k) long: g such that the first one has its share of the half.
-        growth = 0.0
-        if ratio < 1.0:
-            low = 0.0
-            high = 20.0
-            for _ in range(60):
-                growth = 0.5 * (low + high)
-                share = half * np.expm1(growth) / np.expm1(growth * half)
-                low, high = (growth, high) if share > ratio else (low, growth)
-        k = np.arange(half + 1.0)
-        sides.append(
-            np.expm1(growth * k) / np.expm1(growth * half) if growth else k / half
-        )
-    before, behind = sides
+    ratios = np.minimum(count * np.array([first, last]), 1.0)
+
+    def ends(growth: np.ndarray, k: np.ndarray | float) -> np.ndarray:
+        """Return where the first k intervals of a half end, which are e^(g k) long."""
+        return np.expm1(growth * k) / np.expm1(growth * half)
+
+    # Growths such that the first interval has its share of the half.
+    growth = bisect(lambda trial: half * ends(trial, 1.0) > ratios, np.full(2, 20.0))
+    before, behind = ends(growth[:, None], np.arange(half + 1.0))
     return np.concatenate([0.5 * before, 1.0 - 0.5 * behind[-2::-1]])
 
 
@@ -224,39 +220,26 @@ def _is_moving(phase: Phase) -> bool:
     return any(side.derivatives[:1].any() for side in sides)
 
 
-def _time_guesses(
-    program: Program, start: InitialGuess, plain: list[_LegGuess]
-) -> list[_LegGuess]:
-    """Time the joint paths of the legs that are near the best ones, have many knots, or moving ends."""
-    is_near = start.is_improved or program.variables > FEW_VARIABLES
-    return [
-        _time_guess(phase, own) if is_near or _is_moving(phase) else own
-        for phase, own in zip(program.phases, plain, strict=True)
-    ]
+def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | None]:
+    """Time the joint path of a leg: curves at even times, and duration, s.
 
-
-def _time_guess(phase: Phase, plain: _LegGuess) -> _LegGuess:
-    """Time the joint path of a leg; return the plain guess where the speed is given, and where no timing exists."""
-    curves, _ = plain
+    Where the speed is given, and where no timing exists, it is returned without a duration.
+    """
     if phase.time_law is not None or phase.joint_map.path is None:
-        return plain
+        return curves, None
     try:
         own = PhaseTiming.through(phase, curves, _STATIONS, is_rough=True)
     except UnreachableError:
-        return plain
+        return curves, None
     if own.timing is None:
-        return plain
+        return curves, None
     t = np.linspace(0.0, own.t_end, _STATIONS)
     return own.course.curves(own.timing, t)[0], own.t_end
 
 
-def _curves_along(start: InitialGuess, s: np.ndarray) -> np.ndarray:
-    """Curves, (S, c), of a guess at path coordinates, (S,)."""
-    path = start.joint_path
-    return np.column_stack([s, interpolate_columns(s, path[:, 0], path)[:, 1:]])
-
-
 def postures_along(start: InitialGuess, s: np.ndarray) -> np.ndarray | None:
     """Postures of a guess, (S, n), at path coordinates, (S,); None if some do not exist."""
-    q = start.joint_map.postures(_curves_along(start, s))
+    path = start.joint_path
+    others = interpolate_columns(s, path[:, 0], path)[:, 1:]
+    q = start.joint_map.postures(np.column_stack([s, others]))
     return q if np.isfinite(q).all() else None

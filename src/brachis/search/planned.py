@@ -100,7 +100,6 @@ class PlannedMotion(Summary):
         candidate = self.candidate
         report = self.solver_report
         trajectory = self.trajectory
-        least_motion = self.least_motion
         start, end = clear_rounding(trajectory.position([0.0, self.t_end])).tolist()
         return {
             "t_end": self.t_end,
@@ -119,7 +118,7 @@ class PlannedMotion(Summary):
             "refinement_rounds": candidate.refinement_rounds,
             "collocation_points": candidate.collocation_points,
             "time_scaled": candidate.time_scaled,
-            "least_motion": None if least_motion is None else least_motion.to_dict(),
+            "least_motion": self.least_motion and self.least_motion.to_dict(),
             "fits": [fit.to_dict() for fit in self.fits],
             "candidates": [each.to_dict() for each in self.candidates],
             "interrupted": self.interrupted,

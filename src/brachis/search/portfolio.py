@@ -23,28 +23,22 @@ from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener, ignore
 from brachis.common.words import name_first, write_count
+from brachis.errors import BrachisError, UnreachableError
 from brachis.optimise.backends import SolveStatus
-from brachis.optimise.candidate import Candidate, InitialGuess
+from brachis.optimise.candidate import Candidate
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import candidates
-from brachis.search.failure import (
-    Failure,
-    explain_first_failures,
-    explain_no_motion,
-    explain_time_limit,
-)
+from brachis.search.failure import explain_first_failures, explain_no_motion
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
 from brachis.search.holding import explain_holding, explain_postures
 from brachis.search.hopeless import explain_speeds
-from brachis.search.joint_path import ALL_POSTURES, DeadEnd
+from brachis.search.joint_path import ALL_POSTURES, NO_TIME, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.same_motion import SAME_MOTION, is_same_motion
 from brachis.search.schedule import Batch, batches
 from brachis.timing import TimingGap, find_timing_gap
 from brachis.trajectory import Trajectory
 
-NOT_TRIED = "not tried: the search ended"
-"""Status of a candidate for which there was no time."""
 _GAINS_MORE = 0.998
 """Factor by which another candidate may gain more by better knots than those so far."""
 _REFINED = 5e-3
@@ -143,7 +137,7 @@ class Search:
             self._solve(batch)
             self._refine_and_verify(batch)
         # The last solves may have been cut short.
-        self.interrupted = self.interrupted or self._deadline.passed
+        self.interrupted |= self._deadline.passed
 
     def _find_starts(
         self, given: Trajectory | None, exact: Candidate | None
@@ -194,12 +188,14 @@ class Search:
 
     def _start_from(self, motion: Trajectory, origin: str) -> Iterator[Batch]:
         """Yield the guess from a known motion, if it can be used; put down why a given one led to nothing."""
-        guess = given_guess(self._problem, self._decompositions, motion, origin)
-        if isinstance(guess, InitialGuess):
-            yield Batch((guess,), 1)
-            guess = "it led to no verified plan"
+        outcome = "it led to no verified plan"
+        try:
+            guess = given_guess(self._problem, self._decompositions, motion, origin)
+            yield Batch([guess], 1, fallback=False)
+        except UnreachableError as error:
+            outcome = str(error)
         if origin == GIVEN:
-            self._given_motion = guess
+            self._given_motion = outcome
 
     def _solve(self, batch: Batch) -> None:
         """Solve the guesses of a batch coarsely, and rank those that differ."""
@@ -208,7 +204,7 @@ class Search:
         if not self.is_satisfied:
             limit = limit.part(_COARSE_SHARE)
         work = run_in_processes(
-            _solve_in_time,
+            candidates.solve_candidate,
             batch.starts,
             limit,
             jobs=self._problem.task.search.jobs,
@@ -217,7 +213,7 @@ class Search:
         with closing(work) as outcomes:
             for number, candidate in enumerate(outcomes, first):
                 self.candidates[number] = candidate
-                if candidate.status == NOT_TRIED:
+                if candidate.status == candidates.NOT_TRIED:
                     self.interrupted = True
                 if candidate.usable:
                     self._solved[number] = candidate
@@ -236,7 +232,9 @@ class Search:
 
     def _refine_and_verify(self, batch: Batch) -> None:
         """Refine and verify the candidates of a batch in the order of their end times while they may be the fastest."""
-        jobs = self._jobs
+        jobs = self._problem.task.search.jobs
+        # With auto they are finished one by one, for the next one may not be needed.
+        jobs = 1 if jobs == "auto" else process_count(jobs)
         left = batch.refined
         while self._waiting and self._goes_on(left):
             numbers = self._waiting[:jobs]
@@ -253,9 +251,14 @@ class Search:
                     if number != numbers[0] and not self._goes_on(left):
                         return
                     left -= 1
-                    candidate = _drop_if_slow(
-                        self._solved[number], outcome, self._to_beat
-                    )
+                    candidate = outcome
+                    if self._to_beat <= outcome.adapted < np.inf:
+                        # Over all knots it is slower than what was verified meanwhile.
+                        candidate = dataclasses.replace(
+                            self._solved[number],
+                            adapted=outcome.adapted,
+                            status=candidates.SLOW,
+                        )
                     self._finish(number, candidate)
                     self._listener(candidate.describe())
 
@@ -287,27 +290,21 @@ class Search:
         if is_pressed and not self.is_satisfied:
             raise KeyboardInterrupt(self._describe_best())
 
-    def explain(self) -> Failure:
-        """Tell why no motion was found."""
+    def explain(self) -> BrachisError:
+        """Return the error that tells why no motion was found."""
         starts = [each.start for each in self.candidates if each.start is not None]
-        failure = explain_holding(starts)
-        if failure is None and starts:
-            failure = explain_postures(starts)
-            failure = failure or explain_speeds(starts, are_tried=True)
-        if failure is None and (self.interrupted or self._is_cut_short()):
-            self.interrupted = True
-            failure = explain_time_limit(
-                self._problem.task,
-                self.not_completed(),
-                self.candidates,
-                self._dead_ends,
-            )
-        return failure or explain_no_motion(
+        failure = explain_holding(starts) or explain_postures(starts)
+        failure = failure or explain_speeds(starts, are_tried=True)
+        if failure is not None:
+            return failure
+        self.interrupted |= self._is_cut_short()
+        return explain_no_motion(
             self._problem,
             self._decompositions,
             self.candidates,
             self._dead_ends,
             self._deadline,
+            self.not_completed(),
         )
 
     def not_completed(self) -> tuple[str, ...]:
@@ -325,11 +322,11 @@ class Search:
         if self._unfinished_lattices:
             names = name_first(list(self._unfinished_lattices), " | ")
             parts.append(f"the lattice of {names} was not searched completely")
-        unsolved = sum(each.status == NOT_TRIED for each in self.candidates)
+        unsolved = sum(each.status == candidates.NOT_TRIED for each in self.candidates)
         counts = {"planned": unsolved, "refined": len(self._waiting)}
-        if any(counts.values()):
+        left = [f"{n} not {what}" for what, n in counts.items() if n]
+        if left:
             total = write_count(len(self.candidates), "candidate")
-            left = [f"{n} not {what}" for what, n in counts.items() if n]
             parts.append(f"of {total} {', '.join(left)}")
         return (*parts, "the search that search.effort requires was not completed")
 
@@ -342,12 +339,6 @@ class Search:
 
         ordered = sorted(self.candidates, key=rank)
         return tuple(candidate.without_programs() for candidate in ordered)
-
-    @property
-    def _jobs(self) -> int:
-        """How many candidates are finished at the same time: with ``auto`` one, for the next one may not be needed."""
-        jobs = self._problem.task.search.jobs
-        return 1 if jobs == "auto" else process_count(jobs)
 
     @property
     def _latest(self) -> Deadline:
@@ -364,15 +355,17 @@ class Search:
     def _add_starts(self, batch: Batch) -> int:
         """Add guesses as candidates that were not tried yet; return the number of the first one."""
         first = len(self.candidates)
-        self.candidates += [Candidate.of(start, NOT_TRIED) for start in batch.starts]
+        self.candidates += [
+            Candidate.of(start, candidates.NOT_TRIED) for start in batch.starts
+        ]
         return first
 
     def _add_lattice(
-        self, decomposition: Decomposition | None, dead_end: DeadEnd | None
+        self, decomposition: Decomposition | None, dead_end: DeadEnd
     ) -> None:
-        """Put down that a lattice has no joint path, or, without a dead end, that there was no time for it."""
+        """Put down that a lattice has no joint path, or that there was no time for it."""
         name = ALL_POSTURES if decomposition is None else decomposition.name
-        if dead_end is None:
+        if dead_end.cause == NO_TIME:
             self._unfinished_lattices[name] = None
             self.interrupted = True
             return
@@ -388,7 +381,7 @@ class Search:
             self._decompositions, self.candidates, self._deadline
         )
         if failure is not None:
-            raise failure.error()
+            raise failure
 
     def _goes_on(self, left: int) -> bool:
         """Tell whether the first one of the waiting candidates is worth finishing."""
@@ -460,22 +453,6 @@ class Search:
             return ""
         over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)
         return f"the best motion so far takes {self.best.t_end:.4f} s, and exceeds a limit by {over:.2g} % (unverified)"
-
-
-def _solve_in_time(
-    start: InitialGuess, deadline: Deadline, listener: Listener
-) -> Candidate:
-    """Solve from a guess, unless the time is up."""
-    if deadline.passed:
-        return Candidate.of(start, NOT_TRIED)
-    return candidates.solve_candidate(start, deadline, listener)
-
-
-def _drop_if_slow(candidate: Candidate, done: Candidate, to_beat: float) -> Candidate:
-    """Return what was finished, or the candidate before that if its end time over all knots reaches `to_beat`, s."""
-    if not to_beat <= done.adapted < np.inf:
-        return done
-    return dataclasses.replace(candidate, adapted=done.adapted, status=candidates.SLOW)
 
 
 def round_end_time(time: float) -> float:

@@ -43,53 +43,6 @@ _ALWAYS = 1e-3
 """Length, s^2, up to which no way counts as long."""
 
 
-def start_postures(
-    problem: Problem,
-    decompositions: Sequence[Decomposition],
-    newton: Newton,
-    cells_per_turn: int,
-    count: int,
-    rng: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Find postures all over the self-motion manifold at the path's beginning, whatever the joint ranges are.
-
-    Parameters
-    ----------
-    problem : Problem
-    decompositions : sequence of Decomposition
-        Their closed forms give the postures, on all branches.
-    newton : Newton
-        Brings random postures to the beginning without decompositions.
-    cells_per_turn : int
-        Spacing of a single redundant joint, as of `Cells`.
-    count : int
-        Choices of several redundant joints, or random postures.
-    rng : Generator
-
-    Returns
-    -------
-    q : (K, n) ndarray
-        rad or m.
-    seeds : (K,) int ndarray
-        Which of the decompositions gave it; -1 for random ones.
-    """
-    target = problem.path.sample(np.zeros(1)).target
-    if not decompositions:
-        low, high = sampling_box(problem.robot)
-        drawn = rng.uniform(low, high, (count, len(low)))
-        q = newton.nearest(np.repeat(target, count, axis=0), drawn)
-        q = q[np.isfinite(q).all(axis=1)]
-        return q, np.full(len(q), -1)
-    found = []
-    for decomposition in decompositions:
-        cells = Cells.of(decomposition, cells_per_turn, None)
-        q_r = cells.positions(cells.everywhere(count, rng))
-        q = solve_all(decomposition, np.repeat(target, len(q_r), axis=0), q_r)
-        found.append(q[np.isfinite(q).all(axis=3)])
-    seeds = np.repeat(np.arange(len(found)), [len(q) for q in found])
-    return np.concatenate(found), seeds
-
-
 class PostureLattice(Lattice):
     """Lattice of all postures.
 
@@ -116,17 +69,18 @@ class PostureLattice(Lattice):
         super().__init__(problem, revolute, **options)
         self._only_minima = only_minima
         self._decompositions = decompositions
-        self._r = problem.robot.n - problem.task_map.m
+        self._r = problem.r
         self._size = cell_sizes(problem.robot, self._cells_per_turn)
         # Distance within which nodes are neighbours on the self-motion manifold.
-        self._around = 3.0 * float(self._size.max())
+        self._around = 3.0 * self._size.max()
         self._newton = Newton(problem.task_map)
         self._modulo = revolute & ~self._counts_turns
-        self._seeds: tuple[np.ndarray, np.ndarray] | None = None
+        # Postures at a free start, (K, n), that each of the decompositions gave; or random ones.
+        self._seeds: list[np.ndarray] = []
 
     def _at_end(self, last: Layer) -> np.ndarray:
         """Tell which nodes, (K,) bool, are the given end posture."""
-        return np.asarray(np.abs(last.q - self.problem.end).max(axis=1) < _SAME)
+        return np.abs(last.q - self.problem.end).max(axis=1) < _SAME
 
     def _choose(
         self, found: list[JointPath], ends: Layer, most: int
@@ -135,7 +89,7 @@ class PostureLattice(Lattice):
 
         Of several redundant joints the nodes are samples, which have no such minima.
         """
-        chosen: list[int] = []
+        chosen = []
         if self._r <= 1:
             first, second = self._near(ends.q, ends.q, self._around)
             own = ends.branch[first] == ends.branch[second]
@@ -151,26 +105,34 @@ class PostureLattice(Lattice):
         ]
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Make nodes all over the self-motion manifold, one in a cell."""
-        q, seeds = start_postures(
-            self.problem,
-            self._decompositions,
-            self._newton,
-            self._cells_per_turn,
-            4 * self._nodes,
-            rng,
-        )
-        self._seeds = q, seeds
+        """Make nodes all over the self-motion manifold at the path's beginning, one in a cell."""
+        target = self._targets[:1]
+        count = 4 * self._nodes
+        found = []
+        for decomposition in self._decompositions:
+            cells = Cells.of(decomposition, self._cells_per_turn, None)
+            q_r = cells.positions(cells.everywhere(count, rng))
+            q = solve_all(decomposition, np.repeat(target, len(q_r), axis=0), q_r)
+            found.append(q[np.isfinite(q).all(axis=3)])
+        if not found:
+            low, high = sampling_box(self._robot)
+            drawn = rng.uniform(low, high, (count, len(low)))
+            q = self._newton.nearest(np.repeat(target, count, axis=0), drawn)
+            found.append(q[np.isfinite(q).all(axis=1)])
+        self._seeds = found
+        q = np.concatenate(found)
         _, kept = np.unique(self._key(q, self._size), axis=0, return_index=True)
-        return Layer.start(q[kept], seeds[kept])
+        return Layer.start(q[kept], np.zeros(len(kept), dtype=int))
 
     def _seed_of(self, q: np.ndarray) -> str:
         """Name the closed form that gave the start, (n,); empty for a given one."""
-        if self._seeds is None:
+        if not self._seeds:
             return ""
-        postures, seeds = self._seeds
-        seed = seeds[np.abs(self._step(q, postures)).max(axis=1).argmin()]
-        return "random" if seed < 0 else self._decompositions[seed].name
+        if not self._decompositions:
+            return "random"
+        steps = [np.abs(self._step(q, own)).max(axis=1) for own in self._seeds]
+        nearest = [own.min(initial=np.inf) for own in steps]
+        return self._decompositions[int(np.argmin(nearest))].name
 
     def _choose_starts(self, layer: Layer) -> Layer:
         """Label the starts: joint paths of different labels do not displace each other.
@@ -280,7 +242,7 @@ class PostureLattice(Lattice):
         )
         found = found[np.isfinite(found).all(axis=1)]
         _, kept = np.unique(self._key(found, _SAME), axis=0, return_index=True)
-        return np.asarray(found[kept])
+        return found[kept]
 
     def _sample(
         self,
@@ -329,8 +291,7 @@ class PostureLattice(Lattice):
     def _is_short(self, layer: Layer) -> np.ndarray:
         """Tell which nodes, (K,) bool, are not much longer than those of other labels in the same posture."""
         keys = self._key(layer.q, _SAME)
-        _, postures = np.unique(keys, axis=0, return_inverse=True)
+        postures = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
         least = np.full(len(keys), np.inf)
-        np.minimum.at(least, postures.ravel(), layer.length)
-        most = _LONGER * least[postures.ravel()]
-        return np.asarray(layer.length <= most + _ALWAYS)
+        np.minimum.at(least, postures, layer.length)
+        return layer.length <= _LONGER * least[postures] + _ALWAYS

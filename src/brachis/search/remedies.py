@@ -47,9 +47,11 @@ def try_remedies(
     deadline : Deadline
         After it the hint names what to change, but not how far.
     """
+    if not error.remedies:
+        return
     deadline = deadline.within(_TIME)
     content = task.to_dict()
-    advice: list[str] = []
+    advice = []
     for number, remedy in enumerate(error.remedies):
         own = deadline.part(1.0 / (len(error.remedies) - number))
 
@@ -58,20 +60,14 @@ def try_remedies(
         ) -> bool | None:
             """Tell whether a value of the key gives a plan; None if the time was up."""
             limit = own.part(0.4) if most else own
-            found: bool | None = False
             try:
                 changed = load_task(_with_number(content, robot, key, value))
-                same = changed.robot == task.robot
-                changed_robot = (
-                    robot
-                    if same
-                    else robot_from_settings(changed.robot, urdf_text=robot.urdf)
-                )
-                found = is_planned(
-                    changed_robot, changed, families, own_limits, limit, most
-                )
+                arm = robot
+                if changed.robot != task.robot:
+                    arm = robot_from_settings(changed.robot, urdf_text=robot.urdf)
+                found = is_planned(arm, changed, families, own_limits, limit, most)
             except BrachisError:
-                pass
+                found = False
             return None if not found and limit.passed else found
 
         try:
@@ -83,11 +79,8 @@ def try_remedies(
             advice.append(f"{remedy.verb} {remedy.key} to {found}")
     # One number alone may not be enough.
     untried = " and ".join(f"{remedy.verb} {remedy.key}" for remedy in error.remedies)
-    text = ", or ".join(advice)
-    if untried and not text:
-        text = f"{untried} (how far is not known)"
-    if text:
-        error.put_advice(text[:1].upper() + text[1:])
+    text = ", or ".join(advice) or f"{untried} (how far is not known)"
+    error.put_advice(text[:1].upper() + text[1:])
 
 
 def is_planned(
@@ -111,7 +104,7 @@ def is_planned(
         search.run(most=most)
     if search.best is not None and search.best.verified:
         return True
-    return None if most or problem.robot.n > problem.task_map.m else False
+    return None if most or problem.r > 0 else False
 
 
 IsEnough = Callable[[float, int | None], bool | None]
@@ -140,7 +133,7 @@ def _bracket(
     """Find the smallest change known to be enough, None without any, and the largest one that is not."""
     lowers = remedy.guess < remedy.asked
     away = -1.0 if lowers else 1.0
-    good: float | None = None
+    good = None
     bad = remedy.asked
     step = _NEAR
     value = _round(remedy.guess, down=lowers)

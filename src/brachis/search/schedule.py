@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 from brachis.common.deadline import Deadline
@@ -21,7 +21,7 @@ from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.hopeless import refuse_hopeless
-from brachis.search.joint_path import DeadEnd
+from brachis.search.joint_path import NO_TIME, DeadEnd
 from brachis.search.processes import run_in_processes
 from brachis.search.starts import (
     SEARCH_LEVELS,
@@ -37,8 +37,8 @@ _SIZE = 12
 _LATTICE_SHARE = 0.4
 """Part of the time left in which the guesses of a level are looked for; those found by then are planned."""
 
-Lattices = tuple[tuple[Decomposition | None, DeadEnd | None], ...]
-"""Lattices that gave no guesses (None: of all postures), and where they end (None: the time was up)."""
+Lattices = list[tuple[Decomposition | None, DeadEnd]]
+"""Lattices that gave no guesses (None: of all postures), and where they end."""
 Found = tuple[list[InitialGuess], Lattices]
 
 
@@ -54,30 +54,21 @@ class Batch:
         How many of them are refined and verified, no more, once a motion is verified.
     fallback : bool
         Whether it is tried only while no motion is verified.
-    lattices : tuple of (Decomposition or None, DeadEnd or None)
-        Lattices that gave no guesses (None: of all postures), and where they end (None: the time was up).
+    lattices : list of (Decomposition or None, DeadEnd)
+        Lattices that gave no guesses (None: of all postures), and where they end.
     """
 
-    starts: tuple[InitialGuess, ...] = ()
+    starts: Sequence[InitialGuess] = ()
     refined: int = 0
-    fallback: bool = False
-    lattices: Lattices = ()
+    fallback: bool = True
+    lattices: Lattices = field(default_factory=list)
 
-    @classmethod
-    def of(
-        cls,
-        starts: Sequence[InitialGuess],
-        solvers: Sequence[str],
-        refined: int,
-        *,
-        fallback: bool = True,
-        lattices: Lattices = (),
-    ) -> Batch:
-        """Combine guesses with solvers."""
-        combined = tuple(
-            start.with_solver(solver) for solver in solvers for start in starts
-        )
-        return cls(combined, refined, fallback, lattices)
+
+def _with_solvers(
+    starts: Sequence[InitialGuess], solvers: Sequence[str]
+) -> list[InitialGuess]:
+    """Combine guesses with solvers."""
+    return [start.with_solver(solver) for solver in solvers for start in starts]
 
 
 def batches(
@@ -110,14 +101,14 @@ def batches(
     if isinstance(problem.task_map, JointSpace):
         start = joint_space_start(problem)
         refuse_hopeless([start])
-        for solver in solvers:
-            yield Batch.of([start], [solver], 1, fallback=solver != solvers[0])
+        for number, each in enumerate(_with_solvers([start], solvers)):
+            yield Batch([each], 1, fallback=number > 0)
         return
     if has_charts(problem, decompositions):
         find = partial(_guess_in_charts, problem, decompositions, deadline, listener)
         known = yield from _level_by_level(levels, solvers, find)
         for solver in solvers[1:]:
-            yield Batch.of(known[:_SIZE], [solver], len(known))
+            yield Batch(_with_solvers(known[:_SIZE], [solver]), len(known))
         levels = tuple(dataclasses.replace(level, fallback=True) for level in levels)
     if not decompositions:
         return
@@ -125,23 +116,21 @@ def batches(
     known = yield from _level_by_level(levels, solvers, find)
     many = len(known) + len(STRATEGIES)
     tried = {(start.joint_map.redundant_joints, start.origin) for start in known}
-    yield Batch.of(known[:_SIZE], solvers[1:2], many)
+    yield Batch(_with_solvers(known[:_SIZE], solvers[1:2]), many)
     for decomposition in decompositions[: levels[-1].decompositions]:
         for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
             if (start.joint_map.redundant_joints, start.origin) not in tried:
-                yield Batch.of([start], solvers[:2], many)
-    yield Batch.of(known[:2], solvers[2:], many)
+                yield Batch(_with_solvers([start], solvers[:2]), many)
+    yield Batch(_with_solvers(known[:2], solvers[2:]), many)
 
 
 def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
     """Tell whether motions are planned in charts: the task leaves the joints open, and the robot is redundant."""
     task = problem.task
-    is_open = (task.redundant_joints, task.branch, task.search.guesses) == (
-        "auto",
-        "auto",
-        "lattice",
-    )
-    return is_open and (problem.robot.n > problem.task_map.m or not decompositions)
+    is_open = task.redundant_joints == task.branch == "auto"
+    if not is_open or task.search.guesses != "lattice":
+        return False
+    return problem.r > 0 or not decompositions
 
 
 def _level_by_level(
@@ -150,20 +139,19 @@ def _level_by_level(
     find: Callable[[SearchLevel], Found],
 ) -> Generator[Batch, None, list[InitialGuess]]:
     """Yield batches of the guesses that are found for each level, with the first solver; return all guesses."""
-    known: list[InitialGuess] = []
+    known = []
     for level in levels:
         if level.fallback:
             # The search may end here, before lattices are looked at.
-            yield Batch(fallback=True)
+            yield Batch()
         starts, lattices = find(level)
         known += starts
         for first in range(0, max(1, len(starts)), _SIZE):
-            yield Batch.of(
-                starts[first : first + _SIZE],
-                solvers[:1],
+            yield Batch(
+                _with_solvers(starts[first : first + _SIZE], solvers[:1]),
                 level.refined,
-                fallback=level.fallback,
-                lattices=() if first else lattices,
+                level.fallback,
+                [] if first else lattices,
             )
     return known
 
@@ -180,8 +168,8 @@ def _guess_in_charts(
     soon = deadline.part(_LATTICE_SHARE)
     found = chart_starts(problem, decompositions, level, soon, listener)
     if isinstance(found, DeadEnd):
-        return [], ((None, found),)
-    return found, () if found else ((None, None),)
+        return [], [(None, found)]
+    return found, []
 
 
 def _guess_on_branches(
@@ -191,7 +179,7 @@ def _guess_on_branches(
     level: SearchLevel,
 ) -> Found:
     """Find guesses on the branches of closed forms; decompositions without a joint path make room for others."""
-    lattices: Lattices = ()
+    lattices: Lattices = []
     for first in range(0, len(decompositions), level.decompositions):
         some = decompositions[first : first + level.decompositions]
         starts, more = _guess_on_some_branches(some, deadline, listener, level)
@@ -213,23 +201,16 @@ def _guess_on_some_branches(
     if search.guesses == "numeric":
         most = level.joint_paths
         numeric = (numeric_starts(each, most, deadline) for each in decompositions)
-        return list(itertools.chain(*numeric)), ()
+        return list(itertools.chain(*numeric)), []
     deadline = deadline.part(_LATTICE_SHARE)
     outcomes = run_in_processes(
-        _starts_of,
-        decompositions,
-        level,
-        deadline,
-        jobs=search.jobs,
-        listener=listener,
+        _starts_of, decompositions, level, deadline, jobs=search.jobs, listener=listener
     )
     ranked: list[tuple[int, InitialGuess]] = []
-    lattices: Lattices = ()
+    lattices: Lattices = []
     for decomposition, found in zip(decompositions, list(outcomes), strict=True):
-        if isinstance(found, DeadEnd) or not found:
-            dead_end = found if isinstance(found, DeadEnd) else None
-            lattices += ((decomposition, dead_end),)
         if isinstance(found, DeadEnd):
+            lattices.append((decomposition, found))
             continue
         # Those that another process found have a copy of the problem.
         own = [
@@ -251,8 +232,9 @@ def _starts_of(
     listener: Listener,
 ) -> list[InitialGuess] | DeadEnd:
     if deadline.passed:
-        return []
-    has_joints = len(decomposition.redundant) > 0
-    place = f"lattice of {decomposition.name}" if has_joints else "branches"
+        return DeadEnd(0.0, NO_TIME)
+    place = "branches"
+    if decomposition.redundant:
+        place = f"lattice of {decomposition.name}"
     listener(f"looking for joint paths on the {place}")
     return lattice_starts(decomposition, level, deadline, listener)

@@ -73,9 +73,9 @@ def screen(
         is_slow = ratio > _SLOW and is_many
         is_one_too_many = ratio <= _NEAR_LEAST and len(kept) >= alike
         is_known = any(_is_same(start, other) for other in kept)
-        if not (is_slow or is_one_too_many or is_known) and len(kept) < most:
+        if not (is_slow or is_one_too_many or is_known):
             kept.append(start)
-    return kept
+    return kept[:most]
 
 
 def _spread_out(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
@@ -108,7 +108,7 @@ def _improve_most(
     A guess that stays slower than the fastest one was at first is given up.
     """
     # A program over the path knows no pauses, and its time differs a little from that of a timing.
-    waiting = sum(leg.dwell for leg in starts[0].problem.legs)
+    waiting = starts[0].problem.dwell_time
     least = min(start.estimate for start in starts) - waiting
     options = dataclasses.replace(effort.options, to_beat=_NEAR_LEAST * least)
     effort = dataclasses.replace(effort, options=options)
@@ -121,7 +121,7 @@ def _improve_most(
         jobs=starts[0].problem.task.search.jobs,
         listener=listener,
     )
-    solved: list[InitialGuess] = []
+    solved = []
     with closing(work) as outcomes:
         for start in outcomes:
             solved.append(start)

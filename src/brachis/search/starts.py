@@ -19,14 +19,8 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.common.progress import Listener, ignore
 from brachis.errors import PathError, UnreachableError
 from brachis.kernel import Spline, collocation
-from brachis.kinematics import (
-    CHART,
-    JointMap,
-    JointSpaceMap,
-    Newton,
-    chart_around,
-)
-from brachis.limits import Limit, Role
+from brachis.kinematics import CHART, JointMap, JointSpaceMap, Newton, chart_around
+from brachis.limits import Role
 from brachis.optimise.candidate import InitialGuess
 from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
@@ -34,13 +28,9 @@ from brachis.search.closed_form_lattice import ClosedFormLattice, cell_sizes
 from brachis.search.differential_ik import differential_ik_paths
 from brachis.search.holding import explain_beyond
 from brachis.search.hopeless import refuse_hopeless
-from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
+from brachis.search.joint_path import NO_CHART, NO_TIME, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.phase_plane import (
-    fastest_times,
-    least_time,
-    spread_stations,
-)
+from brachis.search.phase_plane import fastest_times, least_time, spread_stations
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screen
 
@@ -130,13 +120,11 @@ def lattice_starts(
     Returns
     -------
     list of InitialGuess or DeadEnd
-        Empty if the time was up.
     """
     r = len(decomposition.redundant)
     most = max(1, level.joint_paths // max(1, r))
-    if r < 2 or most == 1:
-        return _joint_paths(decomposition, level, most, deadline)
-    found = _joint_paths(decomposition, level, _LOOKED_AT * most, deadline)
+    looked_at = _LOOKED_AT * most if r > 1 and most > 1 else most
+    found = _joint_paths(decomposition, level, looked_at, deadline)
     kept = most * len(decomposition.branches)
     if isinstance(found, DeadEnd) or len(found) <= kept:
         return found
@@ -185,20 +173,19 @@ def _guess_on_branch(
 ) -> InitialGuess:
     """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
-    redundant = list(decomposition.redundant)
     for s, smoothed in itertools.islice(_smooth(joint_path), 2):
-        curves = np.column_stack([s, smoothed[:, redundant]])
+        curves = np.column_stack([s, smoothed[:, joint_map.redundant]])
         q = joint_map.postures(curves)
         if np.isfinite(q).all():
             # It keeps clear of the branch boundary, where the start does.
             margins = joint_map.branch_margins(q)
-            least = min(0.02, float(margins[0].min(initial=np.inf)))
+            least = min(0.02, margins[0].min(initial=np.inf))
             if margins.min(initial=np.inf) > 0.5 * least:
                 break
     else:
         s = joint_path.s
         q = joint_path.q
-        curves = np.column_stack([s, q[:, redundant]])
+        curves = np.column_stack([s, q[:, joint_map.redundant]])
     problem = decomposition.problem
     estimate = least_time(problem, s, q)
     family = decomposition.match.family
@@ -230,19 +217,16 @@ def numeric_starts(
     joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
     family = decomposition.match.family
     scene = [limit for limit in problem.limits if limit.role is Role.SCENE]
-    return [
-        InitialGuess(
-            problem, joint_map, joint_path, np.inf, f"numeric {number}", family
-        )
-        for number, joint_path in enumerate(joint_paths, 1)
-        if all(_is_clear(limit, joint_map.postures(joint_path)) for limit in scene)
-    ]
-
-
-def _is_clear(limit: Limit, q: np.ndarray) -> bool:
-    """Tell whether a limit holds along a joint path, (S, n), nearly."""
-    exists = np.isfinite(q).all(axis=1)
-    return bool(limit.holds_at_rest(q[exists], _NEARLY).all())
+    starts = []
+    for number, joint_path in enumerate(joint_paths, 1):
+        q = joint_map.postures(joint_path)
+        q = q[np.isfinite(q).all(axis=1)]
+        if all(limit.holds_at_rest(q, _NEARLY).all() for limit in scene):
+            origin = f"numeric {number}"
+            starts.append(
+                InitialGuess(problem, joint_map, joint_path, np.inf, origin, family)
+            )
+    return starts
 
 
 def chart_starts(
@@ -266,7 +250,7 @@ def chart_starts(
     Returns
     -------
     list of InitialGuess or DeadEnd
-        Those with the least estimated times first; empty if the time was up.
+        Those with the least estimated times first.
 
     Raises
     ------
@@ -288,13 +272,11 @@ def chart_starts(
             break
     if isinstance(found, DeadEnd):
         return found
-    if not found:
-        return []
     named = [
         (f"lattice {number}" + (f", from {each.seed}" if each.seed else ""), each)
         for number, each in enumerate(found, 1)
     ]
-    if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:
+    if problem.r > 1 and level.in_charts > 1:
         missing = 2 * level.in_charts - len(found)
         more = perturb(found, missing, problem.task.search.seed)
         named += [(f"perturbed {number}", each) for number, each in enumerate(more, 1)]
@@ -307,7 +289,7 @@ def chart_starts(
         if guess is not None:
             guesses.append(guess)
     if not guesses:
-        return [] if deadline.passed else DeadEnd(0.0, NO_CHART)
+        return DeadEnd(0.0, NO_TIME if deadline.passed else NO_CHART)
     guesses.sort(key=lambda guess: guess.estimate)
     refuse_hopeless(guesses)
     # Joint paths whose estimated time is three times the least one are hopeless.
@@ -422,14 +404,14 @@ def joint_space_start(problem: Problem) -> InitialGuess:
         if limit.at_rest != "nothing" and is_needed:
             beyond = explain_beyond(problem, limit, s, q)
             if beyond is not None:
-                raise beyond.failure.error()
+                raise beyond[1]
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if not is_passed:
         return InitialGuess(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
     durations = tuple(float(times[-1]) for _, times in passed)
     even = np.linspace(0.0, 1.0, 401)
     timed = [np.interp(even * times[-1], times, stations) for stations, times in passed]
-    estimate = sum(durations) + sum(leg.dwell for leg in problem.legs)
+    estimate = sum(durations) + problem.dwell_time
     motion = np.concatenate(timed)[:, None]
     return InitialGuess(
         problem, joint_map, motion, estimate, FAMILY, FAMILY, durations=durations
@@ -452,8 +434,7 @@ def first_maps(
         start = joint_space_start(problem)
         return start.maps_by_leg(), start.family
     first = next(iter(decompositions), None)
-    is_given = problem.start is not None and len(problem.legs) == 1
-    if first is not None and problem.start is not None and is_given:
+    if first is not None and problem.start is not None and len(problem.legs) == 1:
         return [first.joint_map(problem.start, first.branches[0])], first.match.family
     level = SEARCH_LEVELS["fast"][0]
     found = (
