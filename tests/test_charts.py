@@ -128,7 +128,7 @@ def test_a_saved_motion_is_loaded_and_verified(result, saved):
     )
     assert verify_trajectory(loaded).passed
     # The curves of the chart describe the motion: sigma = C q - p.
-    rows = ChartRows.of_arrays(loaded.chart_rows, loaded.chart_knots)
+    rows = ChartRows(loaded.chart_rows, loaded.chart_knots)
     sigma = rows.values(loaded.path_coordinate(loaded.times), loaded.q)
     np.testing.assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
 

@@ -74,9 +74,8 @@ def test_constant_rows_where_they_do(rows, start, make, scara):
     )
     s = np.linspace(0.0, 1.0, 50)
     chart = chart_around(task_map, path, s, least_motion(task_map, path, start, s))
-    coefficients, knots = chart.rows.arrays()
-    assert len(coefficients) == 1
-    assert not len(knots)
+    assert len(chart.rows.coefficients) == 1
+    assert chart.rows.is_constant
     own = chart.rows.at(s[:1])[0][0]
     np.testing.assert_allclose(own @ own.T, np.eye(len(own)), atol=1e-12)
     assert chart.redundant_joints == ()
@@ -92,8 +91,8 @@ def test_rows_follow_the_null_space_where_it_turns(once_around):
     null = np.swapaxes(turned_null_spaces(task_map, q), 1, 2)
     assert best_constant(null) < 0.3
     chart = chart_around(task_map, path, s, q)
-    assert len(chart.rows.arrays()[1])
-    assert len(chart.rows.arrays()[0]) < len(s)
+    assert len(chart.rows.knots)
+    assert len(chart.rows.coefficients) < len(s)
     rows, _ = chart.rows.at(s)
     assert transversality(rows, null).min() > 0.35
     augmented = np.concatenate([jacobian(task_map, q), rows], axis=1)
@@ -129,9 +128,9 @@ def test_rows_come_back_from_their_arrays(once_around):
         chart_around(task_map, path, s, q).rows,
         ChartRows.constant(np.array([[0.1, 0.2, 0.3]])),
     ):
-        again = ChartRows.of_arrays(*rows.arrays())
+        again = ChartRows(rows.coefficients, rows.knots)
         pairs = [*zip(rows.at(s), again.at(s), strict=True)]
-        if rows.knots is not None:
+        if not rows.is_constant:
             own, other = rows.conditions(s, q), again.conditions(s, q)
             pairs += [(own.turning, other.turning), (own.drift, other.drift)]
         else:

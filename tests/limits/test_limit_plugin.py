@@ -205,7 +205,7 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         (
             {"values": lambda motion: motion.qdot[:, 2]},
             "own_limits[0].values",
-            "found (2,) for 2 moments",
+            "found (6,) for 6 moments",
         ),
         (
             {"values": lambda motion: np.full((len(motion.q), 1), np.nan)},
@@ -215,7 +215,7 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         (
             {"partials": lambda motion: Partials(qdot=motion.q)},
             "own_limits[0].partials.qdot",
-            "(2, 1, 3)",
+            "(6, 1, 3)",
         ),
         (
             {"partials": lambda _motion: Partials()},
@@ -390,7 +390,7 @@ def test_a_failing_plugin_is_named(part, monkeypatch):
 def test_a_plugin_that_fails_later_is_named(monkeypatch):
     class Late(Rate):
         def values(self, motion):
-            if np.isnan(motion.s).any() or len(motion.q) in {2, 6, 24}:
+            if np.isnan(motion.s).any() or len(motion.q) in {6, 24, 72}:
                 return super().values(motion)
             raise ValueError("no licence")
 

@@ -10,8 +10,8 @@ import pytest
 
 import brachis
 from brachis.errors import PathError, TaskError
-from brachis.limits import Moments, limits_of
-from brachis.limits.tool import ToolMotion
+from brachis.limits import Label, Moments, limits_of
+from brachis.limits.tool import SpeedTable, ToolMotionLimit
 from brachis.robot import bind
 from brachis.search.given_motion import EXACT, GIVEN
 from brachis.search.portfolio import Search
@@ -98,10 +98,14 @@ def test_the_real_tool_is_limited_and_sampled():
     moving = Moments(*states, states[0], np.zeros(5))
     for quantity in ("speed", "angular speed", "acceleration"):
         expected = arm.chain.tool_sizes(quantity, *own)
-        tool = ToolMotion(robot, quantity)
-        np.testing.assert_allclose(tool.sizes(moving), expected, rtol=1e-12)
-        for slopes in tool.slopes(moving)[1]:
-            assert not slopes[:, arm.n :].any()
+        label = Label("tool", quantity, "-")
+        limit = ToolMotionLimit(robot, quantity, [SpeedTable([0.0], [1.0])], [label])
+        np.testing.assert_allclose(limit.values(moving)[:, 0], expected, rtol=1e-12)
+        partials = limit.partials(moving)
+        for slopes in (partials.q, partials.qdot):
+            assert slopes.any()
+            assert not slopes[..., arm.n :].any()
+        assert (partials.qddot is not None) == (quantity == "acceleration")
     position, _, speed = tool_motion(robot, states[0], states[1])
     np.testing.assert_allclose(position, arm.tool_placements(own[0])[0], atol=1e-12)
     np.testing.assert_allclose(speed, arm.chain.tool_sizes("speed", *own), rtol=1e-9)

@@ -13,9 +13,8 @@ from brachis.trajectory import (
     Trajectory,
     join_splines,
     phase_rows,
-    split_splines,
 )
-from brachis.trajectory.phases import list_phases
+from brachis.trajectory.phases import list_phases, split_splines
 from support.gantry import DWELL, SPEED, SPLINES, gantry_motion
 from support.result_files import with_parts
 

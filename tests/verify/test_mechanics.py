@@ -46,7 +46,24 @@ def test_own_mechanics_are_pinocchios(name):
         expected,
         atol=1e-13 * np.abs(expected).max(),
     )
+    joints = mechanics.joint_placements(robot, q)
     for mine, other in zip(
-        mechanics.tool_placements(robot, q), robot.tool_placements(q), strict=True
+        mechanics.tool_placements(robot, q, joints),
+        robot.tool_placements(q),
+        strict=True,
     ):
         np.testing.assert_allclose(mine, other, atol=1e-13)
+    states = [robot.of_real_joints(each) for each in (q, qdot, qddot)]
+    still = np.zeros_like(q)
+    sizes = [
+        np.linalg.norm(part, axis=0)
+        for part in (
+            *mechanics.tool_accelerations(robot, q, still, qdot),
+            mechanics.tool_accelerations(robot, q, qdot, qddot)[0],
+        )
+    ]
+    for quantity, mine in zip(
+        ("speed", "angular speed", "acceleration"), sizes, strict=True
+    ):
+        other = robot.chain.tool_sizes(quantity, *states)
+        np.testing.assert_allclose(mine, other, atol=1e-12 * other.max())

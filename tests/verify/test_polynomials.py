@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from brachis.verify.motion import roots, turns, values_of
+from brachis.trajectory.pieces import values_of
+from brachis.verify.motion import roots, turns
 
 
 def powers_of(c):

@@ -14,7 +14,7 @@ that brings its basis nearest to the one before (orthogonal Procrustes problem; 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -47,12 +47,12 @@ class ChartRows:
     ----------
     coefficients : (B, r, n + 1) ndarray
         Of [C, p]: one where they are constant, else the control points of splines of degree 5.
-    knots : (B + 6,) ndarray or None
-        None where they are constant.
+    knots : (B + 6,) ndarray
+        Empty where they are constant.
     """
 
     coefficients: np.ndarray
-    knots: np.ndarray | None = None
+    knots: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def constant(cls, rows: np.ndarray) -> ChartRows:
@@ -67,54 +67,45 @@ class ChartRows:
         spline = Spline.through(s, values, DEGREE)
         return cls(spline.control_points, spline.knots)
 
-    @classmethod
-    def of_arrays(cls, coefficients: np.ndarray, knots: np.ndarray) -> ChartRows:
-        """Read what `arrays` gave."""
-        return cls(coefficients, knots if len(knots) else None)
-
     @property
     def r(self) -> int:
         """Number of rows."""
         return int(self.coefficients.shape[1])
 
     @property
-    def closes(self) -> bool:
-        """Whether postures that are the same at both ends of the path have the same sigma there."""
-        return self.knots is None
-
-    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coefficients and knots as they are saved: no knots where the rows are constant."""
-        return self.coefficients, np.empty(0) if self.knots is None else self.knots
+    def is_constant(self) -> bool:
+        """Whether rows are the same along the path; then so is sigma of a posture."""
+        return not len(self.knots)
 
     @property
     def selected(self) -> tuple[int, ...]:
         """The joints that the rows select, ascending; none where they are other rows than unit rows."""
         rows = self.coefficients[0, :, :-1]
-        is_unit = np.all((rows == 0.0) | (rows == 1.0)) and np.all(
-            rows.sum(axis=1) == 1.0
+        joints = np.argmax(rows, axis=1)
+        selects = self.is_constant and np.array_equal(
+            rows, np.eye(rows.shape[1])[joints]
         )
-        if self.knots is not None or not is_unit:
-            return ()
-        return tuple(np.argmax(rows, axis=1).tolist())
+        return tuple(joints.tolist()) if selects else ()
 
     @cached_property
     def _spline(self) -> Spline:
-        return Spline(np.asarray(self.knots), self.coefficients, DEGREE)
+        return Spline(self.knots, self.coefficients, DEGREE)
 
     @cached_property
     def _orders_at(self) -> LastCall[np.ndarray]:
         return LastCall(self._orders)
 
     def _orders(self, s: np.ndarray) -> np.ndarray:
-        """[C, p] and, where they are not constant, three derivatives by s, (1 or 4, K, r, n + 1)."""
-        if self.knots is None:
-            shape = (1, len(s), *self.coefficients.shape[1:])
-            return np.broadcast_to(self.coefficients, shape)
+        """[C, p] and three derivatives by s, (4, K, r, n + 1), where they are splines."""
         return np.array([self._spline(s, order) for order in range(4)])
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """C, (K, r, n), and p, (K, r), at path coordinates (K,)."""
-        values = self._orders_at(s)[0]
+        values = (
+            self.coefficients.repeat(len(s), axis=0)
+            if self.is_constant
+            else self._orders_at(s)[0]
+        )
         return values[:, :, :-1], values[:, :, -1]
 
     def values(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -124,7 +115,7 @@ class ChartRows:
 
     def conditions(self, s: np.ndarray, q: np.ndarray) -> Conditions:
         """Return rows, and how they change along the path, in postures (K, n) at path coordinates (K,)."""
-        if self.knots is None:
+        if self.is_constant:
             return Conditions(self.coefficients[0, :, :-1])
         rows, _ = self.at(s)
         orders = self._orders_at(s)[1:]

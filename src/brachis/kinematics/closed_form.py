@@ -19,7 +19,7 @@ import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver
-from brachis.kernel import Conditions, follow_turns, pick_nearest, set_turns
+from brachis.kernel import Conditions, PathMotion, follow_turns, pick_nearest, set_turns
 from brachis.kinematics.joint_map import JointState
 from brachis.kinematics.path_map import PathMap
 from brachis.path import Path, PathSample
@@ -75,10 +75,6 @@ class ClosedFormMap(PathMap):
         """Margins of the branch, (K, b), in postures (K, n)."""
         return self.solver.branch_margins(q, self.branch)
 
-    def branch_margin_gradient(self, q: np.ndarray) -> np.ndarray:
-        """Differentiate `branch_margins` with respect to q, (K, b, n)."""
-        return self.solver.margin_gradient(q, self.branch)
-
     def start_margins(self) -> np.ndarray:
         """Margins of the branch at the start."""
         return self.branch_margins(self.start[None])[0]
@@ -89,7 +85,7 @@ class ClosedFormMap(PathMap):
 
     def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:
         """Differentiate the margins of the branch; they do not depend on s."""
-        return self.branch_margin_gradient(state.q), None
+        return self.solver.margin_gradient(state.q, self.branch), None
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, q_r), (1 + r,), in a posture, (n,)."""
@@ -132,8 +128,7 @@ class ClosedFormMap(PathMap):
     def choose_turns(
         self,
         q: np.ndarray,
-        qdot: np.ndarray,
-        qddot: np.ndarray,
+        motion: PathMotion,
         t: np.ndarray | None,
         near: np.ndarray | None,
     ) -> np.ndarray:
@@ -143,7 +138,8 @@ class ClosedFormMap(PathMap):
         if t is None or not self._ranged.any():
             return q  # no limit asks which turn an angle is in
         masks = self._turns, self._ranged
-        if not set_turns(q, (qdot, qddot), t, self.start, *masks):
+        rates = motion.qdot, motion.qddot
+        if not set_turns(q, rates, t, self.start, *masks):
             raise UnreachableError(
                 "a joint turns too far between collocation points to count its turns"
             )

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -35,8 +36,6 @@ class Nodes:
     q, qdot, qddot : (L + 1, n) ndarray
     qddot_before : (L + 1, n) ndarray
         Acceleration just before the nodes; differs from `qddot` where it jumps.
-    position_error : float
-        Largest difference found between the quintic pieces and the closed form, rad or m.
     """
 
     times: np.ndarray
@@ -44,24 +43,22 @@ class Nodes:
     qdot: np.ndarray
     qddot: np.ndarray
     qddot_before: np.ndarray
-    position_error: float
 
 
 def join_nodes(parts: Sequence[Nodes]) -> Nodes:
     """Put nodes of one phase after the other together; where they meet, those of the later one count."""
-    times = parts[0].times
-    for part in parts[1:]:
-        times = np.concatenate([times[:-1], times[-1] + part.times])
+    return reduce(_join, parts)
 
-    def join(name: str) -> np.ndarray:
-        """Put one quantity of all phases together, (L + 1, n)."""
-        own = [getattr(part, name) for part in parts]
-        return np.concatenate([*(each[:-1] for each in own[:-1]), own[-1]])
 
-    later = [part.qddot_before[1:] for part in parts]
-    before = np.concatenate([parts[0].qddot_before[:1], *later])
-    error = max(part.position_error for part in parts)
-    return Nodes(times, join("q"), join("qdot"), join("qddot"), before, error)
+def _join(first: Nodes, later: Nodes) -> Nodes:
+    """Put nodes of two phases together."""
+    times = np.concatenate([first.times[:-1], first.times[-1] + later.times])
+    q, qdot, qddot = (
+        np.concatenate([getattr(first, name)[:-1], getattr(later, name)])
+        for name in ("q", "qdot", "qddot")
+    )
+    before = np.concatenate([first.qddot_before, later.qddot_before[1:]])
+    return Nodes(times, q, qdot, qddot, before)
 
 
 def interpolate(
@@ -108,12 +105,11 @@ def interpolate(
             break
         times = np.union1d(times, merged[1::2][bad])
         inherited = np.repeat(np.where(bad, excess, 0.0), 1 + bad)
-    error = _POSITION_TOLERANCE * float(gaps[0].max())
-    if error > 1e-9:
+    if _POSITION_TOLERANCE * gaps[0].max() > 1e-9:
         raise UnreachableError("the motion is too sharp for polynomial pieces")
     # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
     q = _sum_positions(joint_map, curves, merged, state, before)
-    return Nodes(merged, q, state.qdot, state.qddot, before, error)
+    return Nodes(merged, q, state.qdot, state.qddot, before)
 
 
 def _sum_positions(
@@ -164,17 +160,20 @@ def _measure_gaps(
     position = 0.5 * (q[1:] + q[:-1]) - 5.0 * h / 32.0 * np.diff(v, axis=0)
     position += h**2 / 64.0 * ends - state.q[1::2]
     acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends - state.qddot[1::2]
-    gaps = [np.abs(position), np.abs(acceleration)]
+    largest = 1.0 + np.abs(state.qddot).max()
+    # Of each order the gap, its noise, and the tolerance.
     # Positions near a branch boundary have a noise of 1e-12 rad or m at most.
-    noises = [1e-12 + 0.0 * h, 6e-12 / h**2]
-    tolerances = [_POSITION_TOLERANCE, 1e-6 * (1.0 + np.abs(state.qddot).max())]
+    found = [
+        (np.abs(position), 1e-12 + 0.0 * h, _POSITION_TOLERANCE),
+        (np.abs(acceleration), 6e-12 / h**2, 1e-6 * largest),
+    ]
     if orders == 3:
         a = state.qddot[::2]
         jerk = 60.0 * np.diff(q, axis=0) / h**3 - (9.0 * a[:-1] - 3.0 * a[1:]) / h
         jerk -= (36.0 * v[:-1] + 24.0 * v[1:]) / h**2 + state.qdddot[:-1:2]
         rounding = 60.0 * np.finfo(float).eps * (1.0 + np.abs(q).max()) / h**3
-        gaps.append(np.abs(jerk) - rounding)
-        noises.append(60e-12 / h**3)
-        tolerances.append(1e-5 * (1.0 + np.abs(state.qdddot).max()))
-    scale = np.array(tolerances)[:, None]
-    return np.max(gaps, axis=2) / scale, np.array(noises)[:, :, 0] / scale
+        largest = 1.0 + np.abs(state.qdddot).max()
+        found.append((np.abs(jerk) - rounding, 60e-12 / h**3, 1e-5 * largest))
+    gaps = [gap.max(axis=1) / tolerance for gap, _, tolerance in found]
+    noises = [noise[:, 0] / tolerance for _, noise, tolerance in found]
+    return np.array(gaps), np.array(noises)

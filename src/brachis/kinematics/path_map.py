@@ -53,11 +53,9 @@ class PathState(JointState):
 
     Attributes
     ----------
-    path : PathSample
     motion : PathMotion
     """
 
-    path: PathSample
     motion: PathMotion
 
     @property
@@ -145,8 +143,7 @@ class PathMap(JointMap):
     def choose_turns(
         self,
         q: np.ndarray,
-        qdot: np.ndarray,
-        qddot: np.ndarray,
+        motion: PathMotion,
         t: np.ndarray | None,
         near: np.ndarray | None,
     ) -> np.ndarray:
@@ -182,10 +179,9 @@ class PathMap(JointMap):
             (ydot, yddot),
         )
         self.check_regular(motion.determinants)
-        found = (motion.qdot, motion.qddot)
-        q = self.choose_turns(q, *found, t, near)
-        moved = (y, ydot, yddot, ydddot, q, *found, motion.gradient)
-        return PathState(self, *moved, sample, motion)
+        q = self.choose_turns(q, motion, t, near)
+        found = (q, motion.qdot, motion.qddot, motion.gradient)
+        return PathState(self, y, ydot, yddot, ydddot, *found, motion)
 
     def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -28,27 +28,15 @@ from brachis.robot.custom_limits import (
     has_check,
 )
 
-_MOMENTS = 2
-"""Moments at which the shapes are tried; two tell (K, c) from (c,)."""
+
+def _is_label(label: object) -> bool:
+    """Tell whether a value is a label of texts."""
+    return isinstance(label, Label) and all(
+        isinstance(text, str) for text in vars(label).values()
+    )
 
 
-@dataclass(frozen=True)
-class _Member:
-    """What a member of a limit may be.
-
-    Attributes
-    ----------
-    is_allowed : callable
-        Tells of the value and the limit whether the value may be used; it may raise TypeError or ValueError if not.
-    allowed : str
-        The same in words.
-    """
-
-    is_allowed: Callable[[Any, Limit], object]
-    allowed: str
-
-
-def _is_text(value: object) -> bool:
+def _is_text(value: object, _limit: Limit) -> bool:
     return isinstance(value, str) and bool(value.strip())
 
 
@@ -58,75 +46,67 @@ def _is_per_value(value: Any, limit: Limit) -> bool:
     return np.shape(value) in sizes and bool(np.all(np.isfinite(value)))
 
 
-def _is_centre(value: np.ndarray, limit: Limit) -> bool:
+def _is_centre(value: Any, limit: Limit) -> bool:
     """Tell whether values lie between the bounds; NaN is for values without a bound."""
     is_open = np.isneginf(limit.lower) & np.isposinf(limit.upper)
     is_between = (limit.lower <= value) & (value <= limit.upper)
-    return value.shape == limit.lower.shape and bool(np.all(is_between | is_open))
+    return np.shape(value) == limit.lower.shape and bool(np.all(is_between | is_open))
 
 
-def _is_bound(value: object, limit: Limit) -> bool:
-    """Tell whether a value is a `Bound` of one of the limit's c values."""
-    if not isinstance(value, Bound) or value.side not in {None, "lower", "upper"}:
-        return False
-    figures = [value.figure, value.full_scale, value.per_unit]
-    return value.column in range(len(limit.labels)) and bool(
-        np.all(np.isfinite(figures))
+def _are_bounds(bounds: Any, limit: Limit) -> bool:
+    """Tell whether a value is a list of `Bound`, each of one of the limit's c values."""
+    return all(
+        isinstance(bound, Bound)
+        and bound.side in {None, "lower", "upper"}
+        and bound.column in range(len(limit.labels))
+        and np.all(np.isfinite([bound.figure, bound.full_scale, bound.per_unit]))
+        for bound in bounds
     )
 
 
-def _is_in_path(breaks: np.ndarray) -> bool:
-    """Tell whether an array holds path coordinates."""
-    return np.ndim(breaks) == 1 and bool(np.all((breaks >= 0.0) & (breaks <= 1.0)))
+def _are_in_path(breaks: Any, _limit: Limit) -> bool:
+    """Tell whether a value is a list of path coordinates."""
+    values = np.asarray(breaks)
+    return values.ndim == 1 and bool(np.all((values >= 0.0) & (values <= 1.0)))
 
 
-_MEMBERS = {
-    "kind": _Member(lambda kind, _: _is_text(kind), "a name"),
-    "guarantee": _Member(
-        lambda value, _: isinstance(value, Guarantee),
+_MEMBERS: dict[str, tuple[str, Callable[[Any, Limit], object]]] = {
+    "kind": ("a name", _is_text),
+    "guarantee": (
         "a brachis.limits.Guarantee, such as Guarantee.AS_MEAN",
+        lambda value, _: isinstance(value, Guarantee),
     ),
-    "role": _Member(
-        lambda value, _: isinstance(value, Role),
+    "role": (
         "a brachis.limits.Role, such as Role.PROCESS",
+        lambda value, _: isinstance(value, Role),
     ),
-    "longer_time": _Member(
-        lambda value, _: value in {"relieves", "neither"}, "'relieves' or 'neither'"
+    "longer_time": (
+        "'relieves' or 'neither'",
+        lambda value, _: value in {"relieves", "neither"},
     ),
-    "at_rest": _Member(
-        lambda value, _: value in {"nothing", "posture", "turns"},
+    "at_rest": (
         "'nothing', 'posture' or 'turns'",
+        lambda value, _: value in {"nothing", "posture", "turns"},
     ),
-    "order": _Member(
-        lambda value, _: value in {2, 3}, "2, or 3 if the values use qdddot"
-    ),
-    "breaks": _Member(
-        lambda breaks, _: _is_in_path(np.asarray(breaks)),
-        "path coordinates from 0 to 1, (b,)",
-    ),
-    "violation_scale": _Member(
-        lambda scale, limit: (
-            _is_per_value(scale, limit) and np.all(np.asarray(scale) > 0.0)
-        ),
+    "order": ("2, or 3 if the values use qdddot", lambda value, _: value in {2, 3}),
+    "breaks": ("path coordinates from 0 to 1, (b,)", _are_in_path),
+    "violation_scale": (
         "numbers > 0, (c,), or one number",
+        lambda scale, limit: _is_per_value(scale, limit) and np.min(scale) > 0.0,
     ),
-    "inset": _Member(
-        lambda inset, limit: (
-            _is_per_value(inset, limit) and np.all(np.asarray(inset) >= 0.0)
-        ),
+    "inset": (
         "numbers >= 0, (c,), or one number",
+        lambda inset, limit: _is_per_value(inset, limit) and np.min(inset) >= 0.0,
     ),
-    "centre": _Member(
-        lambda centre, limit: _is_centre(np.asarray(centre), limit),
-        "values between the bounds, (c,)",
-    ),
-    "bounds": _Member(
-        lambda bounds, limit: all(_is_bound(each, limit) for each in bounds),
+    "centre": ("values between the bounds, (c,)", _is_centre),
+    "bounds": (
         "a brachis.limits.Bound for each figure, of a column from 0 to c - 1, all numbers finite",
+        _are_bounds,
     ),
-    "refusal": _Member(lambda text, _: _is_text(text), "a text"),
+    "refusal": ("a text", _is_text),
 }
-"""What the members of a limit may be, apart from its labels and the arrays of its bounds, which are checked before."""
+"""What the members of a limit may be, in words and as a function that tells of a value whether it is; it may raise
+TypeError or ValueError if not. The labels and the arrays of the bounds are checked before."""
 
 
 def build_user_limits(
@@ -172,7 +152,9 @@ def build_user_limits(
                 raise InputError(problem, where=f"{where}.labels", found=str(label))
         _check_functions(limit, robot, where)
         if has_check(model):
-            _try_check(model, limit, robot, where)
+            moments = sample_moments(robot)
+            motion = (moments.q, moments.qdot, moments.qddot, moments.torque(robot))
+            check_ratios(where, model, robot, motion, len(limit.labels))
         labels |= {str(label) for label in limit.labels}
         limits.append(limit)
     return limits
@@ -185,19 +167,31 @@ def _check_members(limit: Limit, where: str) -> None:
     if missing:
         problem = "the limit lacks required attributes"
         raise InputError(problem, where=where, found=f"no {', '.join(missing)}")
-    _check_labels(limit, where)
+    labels = limit.labels
+    here = f"{where}.labels"
+    if not (isinstance(labels, tuple | list) and all(map(_is_label, labels))):
+        raise InputError(
+            "wrong type",
+            where=here,
+            found=labels,
+            allowed="a tuple with a brachis.limits.Label of texts for each value",
+        )
+    if not labels and not np.size(limit.lower):
+        raise InputError(
+            "the limit has no values", where=here, allowed="at least one label"
+        )
     for name in ("lower", "upper"):
-        check_array(getattr(limit, name), (len(limit.labels),), f"{where}.{name}")
+        check_array(getattr(limit, name), (len(labels),), f"{where}.{name}")
     if not np.all(limit.lower < limit.upper):
         raise InputError(
             "the lower bounds are not below the upper bounds",
             where=where,
             found=[limit.lower, limit.upper],
         )
-    for name, member in _MEMBERS.items():
+    for name, (allowed, tell) in _MEMBERS.items():
         value = getattr(limit, name)
         try:
-            is_allowed = member.is_allowed(value, limit)
+            is_allowed = tell(value, limit)
         except (TypeError, ValueError):
             is_allowed = False
         if not is_allowed:
@@ -205,27 +199,8 @@ def _check_members(limit: Limit, where: str) -> None:
                 f"{name} is not valid",
                 where=f"{where}.{name}",
                 found=f"{value!r:.200}",
-                allowed=member.allowed,
+                allowed=allowed,
             )
-
-
-def _check_labels(limit: Limit, where: str) -> None:
-    """Refuse what is not a list of labels, and labels that are not of text."""
-    labels = limit.labels
-    here = f"{where}.labels"
-    allowed = "a tuple with a brachis.limits.Label of texts for each value"
-    if not isinstance(labels, tuple | list):
-        raise InputError("wrong type", where=here, found=labels, allowed=allowed)
-    for label in labels:
-        if not isinstance(label, Label):
-            problem = "some labels are not a brachis.limits.Label"
-            raise InputError(problem, where=here, found=labels)
-        if not all(isinstance(text, str) for text in vars(label).values()):
-            raise InputError("wrong type", where=here, found=label, allowed=allowed)
-    if not labels and not np.size(limit.lower):
-        raise InputError(
-            "the limit has no values", where=here, allowed="at least one label"
-        )
 
 
 def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
@@ -233,13 +208,13 @@ def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
 
     A limit may be undefined in some postures: those are left out, if they are not most of them.
     """
-    few = sample_moments(robot, _MOMENTS)
-    _check_values(limit, few, where)
-    _check_shapes(limit, few, where)
     moments = sample_moments(robot)
-    values = _check_values(limit, moments, where)
+    count = len(moments.q)
+    c = len(limit.labels)
+    values = limit.values(moments)
+    check_array(values, (count, c), f"{where}.values", remark=f" for {count} moments")
     is_known = np.isfinite(values).all(axis=1)
-    if 2 * np.count_nonzero(is_known) <= len(is_known):
+    if 2 * np.count_nonzero(is_known) <= count:
         moment, column = np.argwhere(~np.isfinite(values))[0]
         posture = write_posture(moments, moment)
         raise InputError(
@@ -248,25 +223,8 @@ def _check_functions(limit: Limit, robot: Robot, where: str) -> None:
             found=f"{values[moment, column]} for {limit.labels[column]!s} at {posture}",
             allowed="finite numbers in most postures within the joints' ranges, at moderate speeds",
         )
-    parts = (getattr(moments, own.name)[is_known] for own in fields(moments))
-    known = Moments(*parts)
-    for name, part in _check_shapes(limit, known, where).items():
-        check_finite(part, f"{where}.partials.{name}")
-    check_partials(limit, known, robot, where)
-
-
-def _check_values(limit: Limit, moments: Moments, where: str) -> np.ndarray:
-    """Return the values, (K, c), which may not be finite."""
-    values = limit.values(moments)
-    count = len(moments.q)
-    shape = (count, len(limit.labels))
-    check_array(values, shape, f"{where}.values", remark=f" for {count} moments")
-    return values
-
-
-def _check_shapes(limit: Limit, moments: Moments, where: str) -> dict[str, np.ndarray]:
-    """Return the partial derivatives that are not None."""
-    partials = limit.partials(moments)
+    known = Moments(*(getattr(moments, own.name)[is_known] for own in fields(moments)))
+    partials = limit.partials(known)
     here = f"{where}.partials"
     if not isinstance(partials, Partials):
         problem = "the return value is not a brachis.limits.Partials"
@@ -277,16 +235,9 @@ def _check_shapes(limit: Limit, moments: Moments, where: str) -> dict[str, np.nd
         raise InputError(
             "all partial derivatives are None", where=here, allowed=allowed
         )
-    count, n = moments.q.shape
-    shape = (count, len(limit.labels))
+    count, n = known.q.shape
     for name, part in given.items():
-        own = shape if name == "s" else (*shape, n)
-        check_array(part, own, f"{here}.{name}", remark=f" for {count} moments")
-    return given
-
-
-def _try_check(model: LimitModel, limit: Limit, robot: Robot, where: str) -> None:
-    """Refuse a formula for the verification that does not give a ratio for every moment and value."""
-    moments = sample_moments(robot, _MOMENTS)
-    motion = (moments.q, moments.qdot, moments.qddot, moments.torque(robot))
-    check_ratios(where, model, robot, motion, len(limit.labels))
+        shape = (count, c) if name == "s" else (count, c, n)
+        check_array(part, shape, f"{here}.{name}", remark=f" for {count} moments")
+        check_finite(part, f"{here}.{name}")
+    check_partials(limit, known, robot, where)

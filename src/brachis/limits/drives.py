@@ -167,31 +167,30 @@ class TorqueSpeedLimit(Limit):
         self._signs = np.tile([1.0, -1.0], len(curves))
         at_rest = [robot.limits.torque_speed[joint][0][1] for joint in self._joints]
         self._at_rest = np.array(at_rest)
-        self.labels = tuple(
-            self._label(joint, sign)
-            for joint in curves
-            for sign in ("positive", "negative")
-        )
+        row = LIMIT_KINDS["torque"]
+        labels = []
+        for joint in curves:
+            name = robot.joint_names[joint]
+            unit = robot.position_units[joint]
+            torque = row.in_words(unit)
+            labels += [
+                Label(
+                    f"{name} {sign}",
+                    f"{torque} at speed",
+                    row.units[unit],
+                    f"robot.limits.torque_speed.{name}",
+                    active_text=f"{name} is on its {torque}-speed curve with {sign} {torque}",
+                    slack_text=f"{sign} {torque} all along the curve of {name}",
+                )
+                for sign in ("positive", "negative")
+            ]
+        self.labels = tuple(labels)
         self.lower = np.full(len(at_rest), -np.inf)
         self.upper = np.zeros(len(at_rest))
         # The whole curve rises with the torque at rest.
         self.bounds = tuple(
             Bound(column, level, level, 1.0 / level, "upper")
             for column, level in enumerate(at_rest)
-        )
-
-    def _label(self, joint: int, sign: str) -> Label:
-        name = self._robot.joint_names[joint]
-        unit = self._robot.position_units[joint]
-        row = LIMIT_KINDS["torque"]
-        torque = row.in_words(unit)
-        return Label(
-            f"{name} {sign}",
-            f"{torque} at speed",
-            row.units[unit],
-            f"robot.limits.torque_speed.{name}",
-            active_text=f"{name} is on its {torque}-speed curve with {sign} {torque}",
-            slack_text=f"{sign} {torque} all along the curve of {name}",
         )
 
     def _by_curve(

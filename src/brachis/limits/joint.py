@@ -120,9 +120,10 @@ class JointLimit(Limit):
         own = self._of_joints(self.quantity(motion))
         return (own - self._middle) * self._scale
 
-    def scaled_quantity(self, name: str, chain: Chain) -> ScaledQuantity | None:
-        """Return the kernel's quantity with a name, of the limited joints; None where they are of another chain."""
-        if self._robot.chain is not chain:
+    def scaled_quantity(self, chain: Chain) -> ScaledQuantity | None:
+        """Describe the values as a quantity of the kernel; see `to_scaled_quantity`."""
+        name = _QUANTITIES.get(type(self))
+        if name is None or self._robot.chain is not chain:
             return None
         return ScaledQuantity(name, self._joints, self._middle, self._scale, chain)
 
@@ -365,10 +366,7 @@ def to_scaled_quantity(limit: Limit, chain: Chain) -> ScaledQuantity | None:
     ScaledQuantity or None
         None for all other limits, for those of another chain, and for subclasses, which may have values of their own.
     """
-    name = _QUANTITIES.get(type(limit))
-    if name is None or not isinstance(limit, JointLimit):
-        return None
-    return limit.scaled_quantity(name, chain)
+    return limit.scaled_quantity(chain) if isinstance(limit, JointLimit) else None
 
 
 def reciprocals_near(

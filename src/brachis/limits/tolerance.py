@@ -37,8 +37,8 @@ class _Size(ToolRatios):
     Parameters
     ----------
     robot : Robot
-    joints : list of int
-        The virtual joints on which it depends.
+    ways : tuple of str
+        In which the virtual joints move the tool on which it depends.
     label : Label
     figure : float
         The largest size, in the unit of the label.
@@ -51,14 +51,14 @@ class _Size(ToolRatios):
     def __init__(
         self,
         robot: Robot,
-        joints: list[int],
+        ways: tuple[str, ...],
         label: Label,
         figure: float,
         largest: float,
     ) -> None:
         super().__init__([label], [figure])
         self._n = robot.n
-        self._joints = joints
+        self._joints = _joints_of(robot, *ways)
         self._largest = largest
         self.inset = compute_inset(largest)
 
@@ -85,9 +85,8 @@ class TiltLimit(_Size):
     kind = "tool_tilt"
 
     def __init__(self, robot: Robot, figure: float) -> None:
-        joints = _joints_of(robot, "side", "lead")
         label = Label("tool", "tilt", "deg", "tolerances.orientation.tilt")
-        super().__init__(robot, joints, label, figure, np.radians(figure))
+        super().__init__(robot, ("side", "lead"), label, figure, np.radians(figure))
 
     def values(self, motion: JointStates) -> np.ndarray:
         angles = motion.q[:, self._joints]
@@ -115,10 +114,9 @@ class DistanceLimit(_Size):
     kind = "tool_distance"
 
     def __init__(self, robot: Robot, figure: float) -> None:
-        joints = _joints_of(robot, "x", "y", "z")
         key = "tolerances.position.sphere"
         label = Label("tool", "distance from the path", "m", key)
-        super().__init__(robot, joints, label, figure, figure)
+        super().__init__(robot, ("x", "y", "z"), label, figure, figure)
 
     def values(self, motion: JointStates) -> np.ndarray:
         away = motion.q[:, self._joints]

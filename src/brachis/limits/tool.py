@@ -29,37 +29,6 @@ from brachis.task import SpeedTable as SpeedTableModel
 from brachis.task import Task
 
 
-class ToolMotion:
-    """Size of a motion of the tool: speed, m/s, or acceleration, m/s^2, of its frame's origin, or angular speed, rad/s.
-
-    Virtual joints do not move the tool: they say how far it is from the path.
-
-    Parameters
-    ----------
-    robot : Robot
-    quantity : {"speed", "angular speed", "acceleration"}
-    """
-
-    def __init__(self, robot: Robot, quantity: str) -> None:
-        self._robot = robot
-        self._quantity = quantity
-
-    def sizes(self, motion: JointStates) -> np.ndarray:
-        """Sizes at K moments, (K,)."""
-        return self._robot.chain.tool_sizes(self._quantity, *self._states(motion))
-
-    def slopes(self, motion: JointStates) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-        """Sizes at K moments, (K,), and their slopes by q, qdot and qddot, (K, n) each."""
-        chain = self._robot.chain
-        sizes, slopes = chain.tool_size_slopes(self._quantity, *self._states(motion))
-        return sizes, tuple(map(self._robot.of_real_joints, slopes))
-
-    def _states(self, motion: JointStates) -> list[np.ndarray]:
-        """Return q, qdot and qddot of the real joints, (K, n) each."""
-        states = (motion.q, motion.qdot, motion.qddot)
-        return [self._robot.of_real_joints(own) for own in states]
-
-
 class ToolRatios(Limit):
     """Ratios of what the tool does to its limits, at most 1.
 
@@ -82,47 +51,8 @@ class ToolRatios(Limit):
         )
 
 
-class ToolAccelerationLimit(ToolRatios):
-    """Size of the acceleration of the tool frame's origin over its limit.
-
-    Parameters
-    ----------
-    robot : Robot
-    figure : float
-        m/s^2.
-    """
-
-    kind = "tool_acceleration"
-    longer_time = "relieves"
-
-    def __init__(self, robot: Robot, figure: float) -> None:
-        label = Label(
-            "tool",
-            "acceleration",
-            "m/s^2",
-            "tool_limits.acceleration",
-            share="tool acceleration / limit",
-        )
-        super().__init__([label], [figure])
-        self._tool = ToolMotion(robot, "acceleration")
-        self._figure = figure
-
-    def values(self, motion: JointStates) -> np.ndarray:
-        return self._tool.sizes(motion)[:, None] / self._figure
-
-    def partials(self, motion: JointStates) -> Partials:
-        _, slopes = self._tool.slopes(motion)
-        return Partials(*(part[:, None] / self._figure for part in slopes))
-
-
-def build_tool_acceleration(robot: Robot, task: Task) -> ToolAccelerationLimit | None:
-    """Build the limit of a task that has one."""
-    figure = task.tool_limits.acceleration
-    return None if figure is None else ToolAccelerationLimit(robot, figure)
-
-
 class SpeedTable:
-    """Largest speeds at path coordinates: piecewise linear, with steps made into ramps on their faster side.
+    """Largest sizes of a motion at path coordinates: piecewise linear, with steps made into ramps on their faster side.
 
     Parameters
     ----------
@@ -151,18 +81,17 @@ class SpeedTable:
         speeds = np.array(speed, dtype=float)
         ramp = 5e-3  # length in s: Newton's steps need a slope
         for first in np.flatnonzero(np.diff(given) == 0.0).tolist():
-            # The side with the higher speed moves away from the step.
+            # The side with the higher speed moves away from the step, on the line to the next place.
             rises = speeds[first + 1] > speeds[first]
             moved = first + 1 if rises else first
             onwards = 1 if rises else -1
             beyond = moved + onwards
-            if not 0 <= beyond < len(given):
-                places[moved] += onwards * ramp
-                continue
-            gap = abs(given[beyond] - given[moved])
-            length = min(ramp, 0.4 * gap)
+            length = ramp
+            if 0 <= beyond < len(given):
+                gap = abs(given[beyond] - given[moved])
+                length = min(ramp, 0.4 * gap)
+                speeds[moved] += length / gap * (speed[beyond] - speed[moved])
             places[moved] += onwards * length
-            speeds[moved] += length / gap * (speed[beyond] - speed[moved])
         self.largest = float(speeds.max())
         self._whole = whole
         if not whole:  # beyond its ends the speed goes on rising within a ramp
@@ -186,53 +115,74 @@ class SpeedTable:
         return np.where(is_free, np.inf, speeds), slopes[piece]
 
 
-class ToolSpeedLimit(ToolRatios):
-    """Speed of the tool frame's origin over its limits.
+class ToolMotionLimit(ToolRatios):
+    """Size of a motion of the tool over its limits: speed or acceleration of its frame's origin, or angular speed.
+
+    Virtual joints do not move the tool: they say how far it is from the path.
 
     Parameters
     ----------
-    tool : ToolMotion
+    robot : Robot
+    quantity : {"speed", "angular speed", "acceleration"}
     tables : (c,) sequence of SpeedTable
-        Largest speeds.
+        The limits, m/s, rad/s or m/s^2.
     labels : (c,) sequence of Label
     """
 
-    kind = "tool_speed"
     longer_time = "relieves"
 
     def __init__(
-        self, tool: ToolMotion, tables: Sequence[SpeedTable], labels: Sequence[Label]
+        self,
+        robot: Robot,
+        quantity: str,
+        tables: Sequence[SpeedTable],
+        labels: Sequence[Label],
     ) -> None:
         # The largest figure of a table stands for all of them.
         super().__init__(labels, [table.largest for table in tables])
-        self._tool = tool
+        self.kind = f"tool_{quantity}".replace(" ", "_")
+        self._robot = robot
+        self._quantity = quantity
         self._tables = tables
         steps = [table.places for table in tables if len(table.places) > 1]
         self.breaks = np.unique(np.concatenate(steps or [[]]))
 
     def largest_at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Largest speeds, (K, c), at path coordinates s, (K,), and their derivatives by s."""
+        """Largest sizes, (K, c), at path coordinates s, (K,), and their derivatives by s."""
         largest, slopes = zip(*(table.at(s) for table in self._tables), strict=True)
         return np.column_stack(largest), np.column_stack(slopes)
 
+    def _states(self, motion: JointStates) -> list[np.ndarray]:
+        """Return q, qdot and qddot of the real joints, (K, n) each."""
+        states = (motion.q, motion.qdot, motion.qddot)
+        return [self._robot.of_real_joints(own) for own in states]
+
     def values(self, motion: JointStates) -> np.ndarray:
-        return self._tool.sizes(motion)[:, None] / self.largest_at(motion.s)[0]
+        chain = self._robot.chain
+        sizes = chain.tool_sizes(self._quantity, *self._states(motion))
+        return sizes[:, None] / self.largest_at(motion.s)[0]
 
     def partials(self, motion: JointStates) -> Partials:
-        """Slopes of the values by q and qdot, (K, c, n) each, and by s, (K, c)."""
+        """Slopes of the values by q, qdot and, for accelerations, qddot, (K, c, n) each, and by s, (K, c)."""
+        chain = self._robot.chain
+        sizes, slopes = chain.tool_size_slopes(self._quantity, *self._states(motion))
         largest, slope = self.largest_at(motion.s)
-        speed, (by_q, by_qdot, _) = self._tool.slopes(motion)
-        q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))
-        return Partials(q=q, qdot=qdot, s=-speed[:, None] * slope / largest**2)
+        q, qdot, qddot = (
+            self._robot.of_real_joints(part)[:, None] / largest[:, :, None]
+            for part in slopes
+        )
+        s = -sizes[:, None] * slope / largest**2
+        if self._quantity == "acceleration":
+            return Partials(q, qdot, qddot, s=s)
+        return Partials(q, qdot, s=s)
 
 
-class ToolAngularSpeedLimit(ToolSpeedLimit):
-    """Angular speed of the tool over its limit."""
+def _label(quantity: str, unit: str) -> Label:
+    key = f"tool_limits.{quantity}".replace(" ", "_")
+    return Label("tool", quantity, unit, key, share=f"tool {quantity} / limit")
 
-    kind = "tool_angular_speed"
 
-
-def build_tool_speed(robot: Robot, task: Task) -> ToolSpeedLimit | None:
+def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
     """Build the limit of a task that has one, or whose path has feed rates."""
     speed = task.tool_limits.speed
     tables = []
@@ -243,32 +193,31 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolSpeedLimit | None:
             if isinstance(speed, SpeedTableModel)
             else SpeedTable([0.0], [speed])
         )
-        labels.append(
-            Label(
-                "tool", "speed", "m/s", "tool_limits.speed", share="tool speed / limit"
-            )
-        )
+        labels.append(_label("speed", "m/s"))
     for part in task.tool_limits.feed:
         tables.append(SpeedTable(part.s, part.speed, whole=False))
         where = f"tool, s = {part.s[0]:g} to {part.s[-1]:g},"
         labels.append(Label(where, "feed rate", "m/s", "tool_limits.feed"))
-    return (
-        ToolSpeedLimit(ToolMotion(robot, "speed"), tables, labels) if tables else None
-    )
+    return ToolMotionLimit(robot, "speed", tables, labels) if tables else None
 
 
-def build_tool_angular_speed(robot: Robot, task: Task) -> ToolAngularSpeedLimit | None:
+def _build_constant(
+    robot: Robot, quantity: str, unit: str, figure: float | None
+) -> ToolMotionLimit | None:
     """Build the limit of a task that has one."""
-    figure = task.tool_limits.angular_speed
     if figure is None:
         return None
-    label = Label(
-        "tool",
-        "angular speed",
-        "rad/s",
-        "tool_limits.angular_speed",
-        share="tool angular speed / limit",
-    )
-    return ToolAngularSpeedLimit(
-        ToolMotion(robot, "angular speed"), [SpeedTable([0.0], [figure])], [label]
-    )
+    table = SpeedTable([0.0], [figure])
+    return ToolMotionLimit(robot, quantity, [table], [_label(quantity, unit)])
+
+
+def build_tool_acceleration(robot: Robot, task: Task) -> ToolMotionLimit | None:
+    """Build the limit of a task that has one."""
+    figure = task.tool_limits.acceleration
+    return _build_constant(robot, "acceleration", "m/s^2", figure)
+
+
+def build_tool_angular_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
+    """Build the limit of a task that has one."""
+    figure = task.tool_limits.angular_speed
+    return _build_constant(robot, "angular speed", "rad/s", figure)

@@ -45,7 +45,8 @@ def extract_trajectory(task: Task, solved: SolvedProgram) -> Trajectory:
     rows = np.empty((0, 0, 0))
     chart_knots = np.empty(0)
     if isinstance(joint_map, ChartMap):
-        rows, chart_knots = joint_map.rows.arrays()
+        rows = joint_map.rows.coefficients
+        chart_knots = joint_map.rows.knots
     nodes = join_nodes([part.nodes for part in parts])
     return Trajectory(
         task=task,
@@ -98,7 +99,7 @@ class _Part:
         q = np.tile(self.nodes.q[-1], (2, 1))
         still = np.zeros_like(q)
         times = np.array([0.0, self.pause])
-        nodes = Nodes(times, q, still, still, still, 0.0)
+        nodes = Nodes(times, q, still, still, still)
         return _Part(PhaseSpline(self.pause, knots, degree, points), nodes)
 
 

@@ -61,7 +61,7 @@ def program_over(
     """
     is_periodic = problem.task.boundary.periodic
     first = joint_maps[0]
-    if is_periodic and isinstance(first, ChartMap) and not first.rows.closes:
+    if is_periodic and isinstance(first, ChartMap) and not first.rows.is_constant:
         raise UnreachableError(
             "chart coordinates at start and end differ, so the motion cannot be periodic in them"
         )

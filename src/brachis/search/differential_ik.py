@@ -148,7 +148,7 @@ def _wish(
     wish -= 20.0 * np.maximum(q - upper + clear, 0.0)
     margins = joint_map.branch_margins(q[None])[0]
     if np.any(margins < strategy.threshold):
-        gradients = joint_map.branch_margin_gradient(q[None])[0]
+        gradients = joint_map.solver.margin_gradient(q[None], joint_map.branch)[0]
         shortfall = np.clip(strategy.threshold - margins, 0.0, 2.0 * strategy.threshold)
         wish += strategy.push * shortfall @ gradients
     if strategy.centre:

@@ -178,7 +178,7 @@ def _lay_chart(
     joints = [motion.joint_names.index(name) for name in motion.redundant_joints]
     rows = ChartRows.constant(np.eye(motion.robot.n)[joints])
     if len(motion.chart_rows):
-        rows = ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
+        rows = ChartRows(motion.chart_rows, motion.chart_knots)
     task_map = problem.task_map
     newton = Newton(task_map)
     is_same = motion.joint_names == problem.robot.joint_names

@@ -348,7 +348,7 @@ def _guess_in_chart(
             chart = chart_around(problem.task_map, problem.path, s, q)
         except UnreachableError:
             continue
-        if problem.task.boundary.periodic and not chart.rows.closes:
+        if problem.task.boundary.periodic and not chart.rows.is_constant:
             continue
         estimate = least_time(problem, s, q)
         curves = chart.curves(s, q)

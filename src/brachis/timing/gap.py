@@ -153,7 +153,7 @@ def find_timing_gap(
         if phase.kind != "move":
             total += phase.duration
             continue
-        found = _time_phase(trajectory, phase, len(spline.breaks) - 1, limits)
+        found = _time_phase(trajectory, phase, len(np.unique(spline.knots)) - 1, limits)
         if found is None:
             return None
         path, own, times = found

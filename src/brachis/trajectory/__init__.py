@@ -6,11 +6,9 @@ from brachis.trajectory.phases import (
     PhaseSpline,
     join_splines,
     phase_rows,
-    split_splines,
 )
 from brachis.trajectory.pieces import Pieces
-from brachis.trajectory.recovered import Recovered, check_tolerance
-from brachis.trajectory.result_file import SCHEMA
+from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.trajectory import (
     CONTINUOUS_TORQUE,
@@ -23,7 +21,6 @@ from brachis.trajectory.trajectory import (
 __all__ = [
     "CONTINUOUS_TORQUE",
     "PHASE_COLUMNS",
-    "SCHEMA",
     "Motion",
     "MotionPhase",
     "PhaseSpline",
@@ -31,10 +28,8 @@ __all__ = [
     "Recovered",
     "Samples",
     "Trajectory",
-    "check_tolerance",
     "join_splines",
     "motion_of",
     "of_motion",
     "phase_rows",
-    "split_splines",
 ]

@@ -42,19 +42,15 @@ class PhaseSpline(Summary):
     degree: int
     control_points: np.ndarray
 
-    @property
-    def breaks(self) -> np.ndarray:
-        """Times between which the curves are polynomials, (N + 1,), s."""
-        return np.unique(self.knots) * self.t_end
-
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), s.
 
         At knots those just after them.
         """
         t_norm = np.clip(t / self.t_end, 0.0, 1.0)
-        orders = (self._spline(t_norm, order) for order in range(4))
-        return tuple(part / self.t_end**order for order, part in enumerate(orders))
+        return tuple(
+            self._spline(t_norm, order) / self.t_end**order for order in range(4)
+        )
 
     @cached_property
     def _spline(self) -> Spline:
@@ -198,8 +194,8 @@ def list_phases(
         is_dwell = s_begin == s_end
         # The phases of a recorded motion are between its stops, and longer than the parts.
         ends = (s_begin, s_end)
-        given = [part.speed for part in speeds if np.allclose(ends, part.s, 0.0, 1e-9)]
-        speed = None if is_dwell or not given else given[0]
+        given = (part.speed for part in speeds if np.allclose(ends, part.s, 0.0, 1e-9))
+        speed = None if is_dwell else next(given, None)
         phases.append(MotionPhase(begin, end, s_begin, s_end, speed, is_dwell))
     return tuple(phases)
 
@@ -209,9 +205,8 @@ def times_of_knots(
 ) -> np.ndarray:
     """Return joined knots in s; those where phases meet are exactly the ends of the phases, (P,), s."""
     times = knots * phase_ends[-1]
-    numbers = find_phase_knots(knots, degree)
-    for first, end in zip(numbers[1:], phase_ends, strict=True):
-        times[first : first + degree + 1] = end
+    first = find_phase_knots(knots, degree)[1:]
+    times[first[:, None] + np.arange(degree + 1)] = phase_ends[:, None]
     return times
 
 

@@ -54,11 +54,9 @@ class Pieces:
         flat = t.ravel()
         piece = np.searchsorted(self.x[1:-1], flat, side="right")
         begin = self.x[piece]
-        u = ((flat - begin) / (self.x[piece + 1] - begin))[:, None]
-        values = self.c[:, piece]
-        while len(values) > 1:
-            values = (1.0 - u) * values[:-1] + u * values[1:]
-        return values[0].reshape(t.shape + self.c.shape[2:])
+        u = (flat - begin) / (self.x[piece + 1] - begin)
+        values = values_of(self.c[:, piece], u)
+        return values.reshape(t.shape + self.c.shape[2:])
 
     @cached_property
     def derivative(self) -> Pieces:
@@ -69,6 +67,15 @@ class Pieces:
         return Pieces(
             degree * np.diff(self.c, axis=0) / np.diff(self.x)[:, None], self.x
         )
+
+
+def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,), by de Casteljau's algorithm."""
+    values = coefficients
+    u = u.reshape(-1, *[1] * (values.ndim - 2))
+    while len(values) > 1:
+        values = (1.0 - u) * values[:-1] + u * values[1:]
+    return values[0]
 
 
 def piece_coefficients(

@@ -47,12 +47,12 @@ ARRAYS = (
     "chart_knots",
 )
 """Names of the arrays in the file; as in `Trajectory`."""
-_MOST = {
-    "bytes": 128_000_000,  # of the file, and of what it holds unpacked
-    "nodes": 500_000,  # of a motion: they bound the time that its verification takes
-    "degree": 7,  # of splines, as in tasks
-}
-"""Bounds on what a result file may hold."""
+_MOST_BYTES = 128_000_000
+"""Largest size of a result file, and of what it holds unpacked."""
+_MOST_NODES = 500_000
+"""Largest number of nodes of a motion: they bound the time that its verification takes."""
+_HIGHEST_DEGREE = 7
+"""Highest degree of splines, as in tasks."""
 _BROKEN = (
     OSError,
     ValueError,
@@ -118,7 +118,7 @@ def read_result(path: Path) -> dict[str, Any]:
     check_kind(path, Kind.RESULT, ResultFileError)
     where = str(path)
     try:
-        meta, arrays = _read_parts(io.BytesIO(read_file(path, _MOST["bytes"])))
+        meta, arrays = _read_parts(io.BytesIO(read_file(path, _MOST_BYTES)))
     except FileNotFoundError as error:
         raise ResultFileError("the file does not exist", where=where) from error
     except _BROKEN as error:
@@ -159,9 +159,9 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
     if not {member.compress_type for member in members} <= numpys:
         raise ValueError("an archive that NumPy does not write")
     unpacked = sum(member.file_size for member in members)
-    if unpacked > _MOST["bytes"]:
+    if unpacked > _MOST_BYTES:
         raise ValueError(
-            f"an archive of {unpacked / 1e6:.3g} MB unpacked, at most {_MOST['bytes'] / 1e6:g} MB are read"
+            f"an archive of {unpacked / 1e6:.3g} MB unpacked, at most {_MOST_BYTES / 1e6:g} MB are read"
         )
     stream.seek(0)
     with np.load(stream, allow_pickle=False) as archive:
@@ -183,10 +183,10 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     robot, _ = bind(robot, task.task_space, task.tolerances)
     _refuse_unless(
         meta.joint_names == list(robot.joint_names),
+        "joint_names",
         "the joints are not those of the URDF",
-        where="joint_names",
-        found=meta.joint_names,
-        allowed=robot.joint_names,
+        meta.joint_names,
+        robot.joint_names,
     )
     for key, posture in (("start", task.start), ("end", task.end)):
         if posture != "free":
@@ -194,18 +194,18 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     redundant = [name for name in robot.joint_names if name in meta.redundant_joints]
     _refuse_unless(
         meta.redundant_joints == redundant,
+        "redundant_joints",
         "unknown joints",
-        where="redundant_joints",
-        found=meta.redundant_joints,
-        allowed=f"some of {', '.join(robot.joint_names)}, in this order",
+        meta.redundant_joints,
+        f"some of {', '.join(robot.joint_names)}, in this order",
     )
     for name, array in arrays.items():
-        usable = array.dtype.kind in "fiu" and (np.abs(array) <= LARGEST).all()
         _refuse_unless(
-            usable,
+            array.dtype.kind in "fiu" and (np.abs(array) <= LARGEST).all(),
+            name,
             "some numbers are not finite or are too large",
-            where=name,
-            allowed=f"numbers between -{LARGEST:g} and {LARGEST:g}",
+            array,
+            f"numbers between -{LARGEST:g} and {LARGEST:g}",
         )
     arrays = {name: array.astype(float) for name, array in arrays.items()}
     r = _redundancy(
@@ -225,9 +225,14 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     }
 
 
-def _refuse_unless(fits: bool | np.bool_, problem: str, **details: Any) -> None:
-    if not fits:
-        raise InputError(problem, **details)
+def _refuse_unless(
+    fits: bool | np.bool_, where: str, problem: str, found: object, allowed: object
+) -> None:
+    if fits:
+        return
+    if isinstance(found, np.ndarray):
+        found = f"an array of {found.dtype}, {found.shape}"
+    raise InputError(problem, where=where, found=found, allowed=allowed)
 
 
 def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
@@ -242,17 +247,17 @@ def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
         fits = knots.shape == (count,) and (not count or _are_knots(rounded, degree))
     _refuse_unless(
         fits,
+        "chart_rows",
         "the rows and knots of the chart do not fit each other or the robot",
-        where="chart_rows",
-        found=f"{rows.shape}, knots {knots.shape}",
-        allowed=f"rows (B, r, {n + 1}), and B + {degree + 1} knots from 0 to 1 if B is not 1",
+        f"{rows.shape}, knots {knots.shape}",
+        f"rows (B, r, {n + 1}), and B + {degree + 1} knots from 0 to 1 if B is not 1",
     )
     _refuse_unless(
         named in (0, rows.shape[1]),
+        "redundant_joints",
         "the joints are not those of the chart",
-        where="redundant_joints",
-        found=named,
-        allowed=rows.shape[1],
+        named,
+        rows.shape[1],
     )
     return int(rows.shape[1])
 
@@ -260,7 +265,7 @@ def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
 def _are_knots(knots: np.ndarray, degree: int) -> bool:
     """Return whether these are the knots of splines of a degree over [0, 1]."""
     outer = degree + 1
-    if not 1 <= degree <= _MOST["degree"] or knots.ndim != 1 or len(knots) < 2 * outer:
+    if not 1 <= degree <= _HIGHEST_DEGREE or knots.ndim != 1 or len(knots) < 2 * outer:
         return False
     ends = not knots[:outer].any() and (knots[-outer:] == 1.0).all()
     return bool(ends and (np.diff(knots) >= 0.0).all())
@@ -275,26 +280,27 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     begins = times.ndim == 1 and len(times) > 1 and times[0] == 0.0
     _refuse_unless(
         begins and (np.diff(times) >= shortest).all(),
+        "times",
         "not times",
-        where="times",
-        found=_describe(times),
-        allowed=f"ascending numbers from 0, at least {shortest:g} s apart",
+        times,
+        f"ascending numbers from 0, at least {shortest:g} s apart",
     )
     _refuse_unless(
         _are_knots(knots, degree),
+        "knots",
         f"not the knots of a spline of degree {degree}",
-        where="knots",
-        found=_describe(knots),
-        allowed=f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_MOST['degree']}",
+        knots,
+        f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_HIGHEST_DEGREE}",
     )
     inner = knots[degree : len(knots) - degree]
     ends = knots[find_phase_knots(knots, degree)]
     gaps = np.diff(inner)
     _refuse_unless(
         ((gaps >= shortest) | np.isin(inner[1:], ends) & (gaps == 0.0)).all(),
+        "knots",
         "internal knots are repeated",
-        where="knots",
-        allowed=f"every internal knot once, at least {shortest:g} apart, or degree + 1 times where phases meet",
+        knots,
+        f"every internal knot once, at least {shortest:g} apart, or degree + 1 times where phases meet",
     )
     phase_ends = arrays["phase_ends"]
     fits = phase_ends.shape == (len(ends) - 1,) and phase_ends[-1] == times[-1]
@@ -302,33 +308,24 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
         fits
         and np.isin(phase_ends, times).all()
         and (np.abs(phase_ends / times[-1] - ends[1:]) <= shortest).all(),
+        "phase_ends",
         "not the ends of the phases",
-        where="phase_ends",
-        found=_describe(phase_ends),
-        allowed="times of nodes, where knots are repeated; the last one is the end time",
+        phase_ends,
+        "times of nodes, where knots are repeated; the last one is the end time",
     )
     shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
     shapes["control_points"] = (1 + r, len(knots) - degree - 1)
     for name, shape in shapes.items():
         found = arrays[name].shape
-        _refuse_unless(
-            found == shape, "wrong shape", where=name, found=found, allowed=shape
-        )
+        _refuse_unless(found == shape, name, "wrong shape", found, shape)
 
 
 def _check_nodes(times: np.ndarray) -> None:
     """Refuse motions of so many nodes that they are not verified."""
     _refuse_unless(
-        times.size <= _MOST["nodes"],
+        times.size <= _MOST_NODES,
+        "times",
         "the motion has too many nodes",
-        where="times",
-        found=times.size,
-        allowed=_MOST["nodes"],
-        hint="Import fewer rows, or a part of them",
+        times.size,
+        f"{_MOST_NODES}: import fewer rows, or a part of them",
     )
-
-
-def _describe(array: np.ndarray) -> str:
-    if array.ndim != 1 or not len(array):
-        return f"an array of shape {array.shape}"
-    return f"{len(array)} numbers from {array[0]:g} to {array[-1]:g}"

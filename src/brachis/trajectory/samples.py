@@ -13,7 +13,6 @@ from brachis.common.arrays import freeze, with_like_signs
 from brachis.common.summary import Summary
 from brachis.errors import NotInstalledError
 from brachis.robot import Robot
-from brachis.robot.task_map import Pose
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -122,5 +121,5 @@ def tool_motion(
     position, rotations = robot.tool_placements(q)
     coefficients = [pin.Quaternion(rotation).coeffs() for rotation in rotations]
     quaternion = np.roll(np.reshape(coefficients, (-1, 4)), 1, axis=1)
-    velocity = np.einsum("ikn,kn->ik", Pose(robot).twists(q)[:3], qdot)
-    return position, with_like_signs(quaternion), np.linalg.norm(velocity, axis=0)
+    speed = robot.chain.tool_sizes("speed", q, qdot, np.zeros_like(q))
+    return position, with_like_signs(quaternion), speed

@@ -29,16 +29,14 @@ _AXES = np.eye(3)
 
 
 def tool_placements(
-    robot: Robot, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray] | None = None
+    robot: Robot, q: np.ndarray, joints: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n).
 
     Positions of virtual joints say how far the tool is from the path; the place on the path is returned then. `joints`
-    are the `joint_placements` if they are known.
+    are the `joint_placements`.
     """
-    origin, rotation = real_tool_placements(
-        robot, *(joints or joint_placements(robot, q))
-    )
+    origin, rotation = real_tool_placements(robot, *joints)
     count = len(robot.urdf_joints)
     away = dict(zip(robot.joint_names[count:], q.T[count:], strict=True))
     if not away:
@@ -122,7 +120,9 @@ def _rigid(
     """Torques (K, n) without armature and friction."""
     tau = np.zeros_like(q)
     bodies = robot.urdf_dynamics.bodies
-    motions = _motions(robot, q, qdot, qddot)
+    base = placement_matrix(robot.settings.mounting)[:3, :3]
+    upwards = base.T @ -np.array(robot.model.gravity.linear)
+    motions = _motions(robot, q, qdot, qddot, upwards)
     force = np.zeros((3, len(q)))
     moment = np.zeros((3, len(q)))
     for joint in reversed(range(len(bodies))):
@@ -144,30 +144,45 @@ def _rigid(
     return tau
 
 
-def _motions(
+def tool_accelerations(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Acceleration, m/s^2, and angular acceleration, rad/s^2, of the tool frame in axes of its own, (3, K) each.
+
+    Virtual joints do not move the tool. From rest, with qdot = 0, accelerations depend on qddot as velocities on qdot.
+    """
+    motion = _motions(robot, q, qdot, qddot, np.zeros(3))[-1]
+    tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
+    return _accelerate(tool[:3, 3, None], *motion), motion[1]
+
+
+def _motions(
+    robot: Robot,
+    q: np.ndarray,
+    qdot: np.ndarray,
+    qddot: np.ndarray,
+    of_base: np.ndarray,
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Angular velocity, angular acceleration, and acceleration less gravity of every joint's frame, (3, K) each."""
-    base = placement_matrix(robot.settings.mounting)[:3, :3]
-    upwards = base.T @ -np.array(robot.model.gravity.linear)
+    """Angular velocity, angular acceleration, and acceleration of every joint's frame, (3, K) each.
+
+    `of_base`, (3,), is the acceleration of the base in its own axes.
+    """
     spin = np.zeros((3, len(q)))
     gain = np.zeros((3, len(q)))
-    acceleration = np.tile(upwards[:, None], len(q))
+    acceleration = np.tile(of_base[:, None], len(q))
     motions = []
     for joint, body in enumerate(robot.urdf_dynamics.bodies):
         axis = body.axis[:, None]
         offset = body.placement[:3, 3, None]
         rotation = body.placement[:3, :3].T
-        turning = cross(gain, offset) + cross(spin, cross(spin, offset))
+        acceleration = rotation @ _accelerate(offset, spin, gain, acceleration)
         spin = rotation @ spin
         gain = rotation @ gain
-        acceleration = rotation @ (acceleration + turning)
         rate = axis * qdot[:, joint]
         push = axis * qddot[:, joint]
         if body.sliding:
-            offset = axis * q[:, joint]
-            coriolis = cross(spin, cross(spin, offset) + 2.0 * rate)
-            acceleration = acceleration + cross(gain, offset) + coriolis + push
+            moved = _accelerate(axis * q[:, joint], spin, gain, acceleration)
+            acceleration = moved + 2.0 * cross(spin, rate) + push
         else:
             spin, gain, acceleration = (
                 _rotate(body.axis, -q[:, joint], part)
@@ -201,10 +216,16 @@ def _resistance(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force, and moment about the joint's origin, (3, K), that a body's motion takes: w, e and a of the frame."""
     com = body.com[:, None]
-    turning = cross(gain, com) + cross(spin, cross(spin, com))
-    force = body.mass * (acceleration + turning)
+    force = body.mass * _accelerate(com, spin, gain, acceleration)
     moment = body.inertia @ gain + cross(spin, body.inertia @ spin)
     return force, moment + cross(com, force)
+
+
+def _accelerate(
+    point: np.ndarray, spin: np.ndarray, gain: np.ndarray, acceleration: np.ndarray
+) -> np.ndarray:
+    """Acceleration, (3, K), of points fixed in a frame that moves with w, e and a."""
+    return acceleration + cross(gain, point) + cross(spin, cross(spin, point))
 
 
 def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:

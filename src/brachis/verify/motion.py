@@ -12,8 +12,7 @@ does.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -24,22 +23,14 @@ from brachis.errors import InputError
 from brachis.path import Path
 from brachis.path.legs import Leg, legs_of
 from brachis.robot import Robot, TaskMap
-from brachis.task import Task
-from brachis.trajectory import Trajectory
+from brachis.task import SpeedTable, Task
+from brachis.trajectory import MotionPhase, Trajectory
+from brachis.trajectory.pieces import values_of
 from brachis.verify.mechanics import joint_placements, torques
 from brachis.verify.report import VerifyOptions
 
 _HALVINGS = 30
 """After so many halves no two roots are in one part, unless they are nearer than `SAME_PLACE`."""
-
-
-def values_of(coefficients: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Evaluate F polynomials, (m + 1, F, ...), each at its own u in [0, 1], (F,), by de Casteljau's algorithm."""
-    values = coefficients
-    u = u.reshape(-1, *[1] * (values.ndim - 2))
-    while len(values) > 1:
-        values = (1.0 - u) * values[:-1] + u * values[1:]
-    return values[0]
 
 
 def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -111,9 +102,14 @@ SAME_PLACE = 1e-9
 """Places in a piece that are nearer to each other, as parts of the piece, are the same."""
 
 
-@dataclass(frozen=True, eq=False)
 class MotionPieces:
     """Joint motion as polynomials in Bernstein form over L pieces; u in [0, 1] is the place in a piece.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    robot : Robot
+        That is verified.
 
     Attributes
     ----------
@@ -133,34 +129,18 @@ class MotionPieces:
     robot : Robot
     """
 
-    times: np.ndarray
-    lengths: np.ndarray
-    nodes: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    jerk: np.ndarray
-    path_coordinate: Callable[[np.ndarray], np.ndarray]
-    robot: Robot
-
-    @classmethod
-    def of(cls, trajectory: Trajectory, robot: Robot) -> MotionPieces:
-        """Take the pieces of a trajectory of a robot."""
-        position = trajectory.pieces.c
-        lengths = np.diff(trajectory.times)
-        velocity = 5.0 * np.diff(position, axis=0) / lengths[:, None]
-        acceleration = 4.0 * np.diff(velocity, axis=0) / lengths[:, None]
-        return cls(
-            trajectory.times,
-            lengths,
-            trajectory.q[:-1],
-            position,
-            velocity,
-            acceleration,
-            trajectory.jerk_pieces.c,
-            trajectory.path_spline,
-            robot,
-        )
+    def __init__(self, trajectory: Trajectory, robot: Robot) -> None:
+        position = trajectory.pieces
+        velocity = position.derivative
+        self.times = trajectory.times
+        self.lengths = np.diff(trajectory.times)
+        self.nodes = trajectory.q[:-1]
+        self.position = position.c
+        self.velocity = velocity.c
+        self.acceleration = velocity.derivative.c
+        self.jerk = trajectory.jerk_pieces.c
+        self.path_coordinate = trajectory.path_spline
+        self.robot = robot
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the times of places, s."""
@@ -178,12 +158,8 @@ class MotionPieces:
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates, (P,), are reached; s(t) does not decrease."""
-
-        def is_before(t: np.ndarray) -> np.ndarray:
-            """Tell which path coordinates are not reached yet."""
-            return self.path_coordinate(t) < s
-
-        return bisect(is_before, np.full(len(s), self.times[-1]))
+        end = np.full(len(s), self.times[-1])
+        return bisect(lambda t: self.path_coordinate(t) < s, end)
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +220,7 @@ class MotionStates:
         """Torques of the robot that is verified, (K, n), as a user's limit asks for them."""
         return self.tau
 
-    def only(self, chosen: np.ndarray | slice) -> MotionStates:
+    def only(self, chosen: np.ndarray | slice | list[int]) -> MotionStates:
         """Return some of the states, in the order that is chosen."""
         return MotionStates(*(values[chosen] for values in vars(self).values()))
 
@@ -266,9 +242,6 @@ class Given:
     robot : Robot
     task_map : TaskMap
     path : Path
-    pieces : MotionPieces
-    states : MotionStates
-        The motion at all times at which it is checked.
     options : VerifyOptions
     """
 
@@ -276,8 +249,6 @@ class Given:
     robot: Robot
     task_map: TaskMap
     path: Path
-    pieces: MotionPieces
-    states: MotionStates
     options: VerifyOptions
 
     @property
@@ -285,12 +256,15 @@ class Given:
         """Task of the trajectory."""
         return self.trajectory.task
 
-    def with_states_at(self, s: np.ndarray) -> Given:
-        """Return the same, with the states at further path coordinates, (P,)."""
-        places = self.pieces.place(self.pieces.times_of(s))
-        both, _ = self.states.merge(MotionStates.at(self.pieces, *places))
-        apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > SAME_PLACE)
-        return replace(self, states=both.only(np.append(True, apart)))
+    @cached_property
+    def pieces(self) -> MotionPieces:
+        """The joint motion."""
+        return MotionPieces(self.trajectory, self.robot)
+
+    @cached_property
+    def states(self) -> MotionStates:
+        """The motion at all times at which it is checked."""
+        return MotionStates.at(self.pieces, *_all_places(self))
 
     @cached_property
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
@@ -302,17 +276,14 @@ class Given:
         """Legs of the path, found anew from the task."""
         return legs_of(self.task, self.task_map, self.path)
 
-    def during(self, begin: float, end: float) -> Given:
-        """Return the same with only the states of the pieces between two times, s.
-
-        A piece counts if a part of it lies between them.
-        """
+    def during(self, phase: MotionPhase) -> MotionStates:
+        """Return the states of the pieces of which a part lies in a phase."""
         times = self.pieces.times
         rounding = tolerances.TIME * times[-1]
-        first = np.searchsorted(times, begin + rounding, side="right") - 1
-        last = np.searchsorted(times, end - rounding)
+        first = np.searchsorted(times, phase.begin + rounding, side="right") - 1
+        last = np.searchsorted(times, phase.end - rounding)
         inside = (self.states.piece >= first) & (self.states.piece < last)
-        return replace(self, states=self.states.only(inside))
+        return self.states.only(inside)
 
 
 MOST_INSTANTS = 2_000_000
@@ -332,9 +303,7 @@ Places = tuple[np.ndarray, np.ndarray]
 """Pieces (K,) and places u in them (K,)."""
 
 
-def all_places(
-    trajectory: Trajectory, pieces: MotionPieces, path: Path, options: VerifyOptions
-) -> Places:
+def _all_places(given: Given) -> Places:
     """List all places at which a motion is checked, in any order.
 
     Raises
@@ -342,9 +311,13 @@ def all_places(
     InputError
         They are more than `MOST_INSTANTS`.
     """
+    pieces = given.pieces
+    tables = list_speed_tables(given.task)
+    ends_of_tables = np.array([s for table in tables for s in table.s])
     parts = (
-        _spread(trajectory, pieces, options),
-        _within_path_pieces(pieces, path.breaks, options),
+        _spread(given),
+        _within_path_pieces(given),
+        pieces.place(pieces.times_of(ends_of_tables)),
         _peaks(pieces),
         _reversals(pieces),
     )
@@ -353,10 +326,10 @@ def all_places(
     return piece, u
 
 
-def _spread(
-    trajectory: Trajectory, pieces: MotionPieces, options: VerifyOptions
-) -> Places:
+def _spread(given: Given) -> Places:
     """Both ends of every piece and places between, no two of them further apart than a knot interval allows."""
+    pieces = given.pieces
+    trajectory = given.trajectory
     knots = np.unique(trajectory.knots) * trajectory.t_end
     edges = np.union1d(pieces.times, knots[(knots > 0.0) & (knots < pieces.times[-1])])
     first, _ = pieces.place(edges[:-1])
@@ -366,7 +339,9 @@ def _spread(
     interval = np.searchsorted(knots, middle).clip(1, len(knots) - 1)
     share = np.diff(edges) / np.diff(knots)[interval - 1]
     each = np.clip(_USUAL_INSTANTS / len(knots), _FEWEST, None)
-    by_interval = share * min(options.points_per_interval, each) - 1e-6  # less rounding
+    by_interval = (
+        share * min(given.options.points_per_interval, each) - 1e-6
+    )  # less rounding
     travel = np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)
     by_travel = travel[first] * (high - low) / _TRAVEL
     wanted = np.nan_to_num(np.maximum(by_interval, by_travel))
@@ -377,6 +352,13 @@ def _spread(
     part = (np.arange(len(begins)) - begins) / np.repeat(steps, count)
     u = (1.0 - part) * np.repeat(low, count) + part * np.repeat(high, count)
     return np.repeat(first, count), u
+
+
+def list_speed_tables(task: Task) -> list[SpeedTable]:
+    """List the tool's largest speeds, and the feed rates of the path's points, that depend on s."""
+    limits = task.tool_limits
+    given = [limits.speed] if isinstance(limits.speed, SpeedTable) else []
+    return [*given, *limits.feed]
 
 
 def _check_count(count: int) -> None:
@@ -392,14 +374,13 @@ def _check_count(count: int) -> None:
         )
 
 
-def _within_path_pieces(
-    pieces: MotionPieces, breaks: np.ndarray, options: VerifyOptions
-) -> Places:
+def _within_path_pieces(given: Given) -> Places:
     """Spread places over every piece of the path, however short: no small blend is stepped over."""
-    parts = np.linspace(0.0, 1.0, options.points_per_interval)
+    breaks = given.path.breaks
+    parts = np.linspace(0.0, 1.0, given.options.points_per_interval)
     _check_count(len(breaks) * len(parts))
     s = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
-    return pieces.place(pieces.times_of(s))
+    return given.pieces.place(given.pieces.times_of(s))
 
 
 def _peaks(pieces: MotionPieces) -> Places:

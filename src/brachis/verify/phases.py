@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 
 from brachis.path.legs import Leg
 from brachis.robot.joints import UNITS
 from brachis.trajectory import MotionPhase
-from brachis.verify.limits.protocol import worst_between
-from brachis.verify.limits.tool import frame_motion
+from brachis.verify.limits.protocol import Worst, worst_between
+from brachis.verify.limits.tool import tool_sizes
 from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
 
@@ -37,22 +39,12 @@ def check_stops(given: Given) -> list[Check]:
         _check_worst("s at stops", misses, options.progress_tolerance, "-", places),
         _check_worst("duration of dwells", off, _DWELL, "s", places),
     ]
-    pieces = given.pieces
-    piece, u = pieces.place(times_of_stops(given))
+    piece, u = given.pieces.place(times_of_stops(given))
     before = piece[(u == 0.0) & (piece > 0)] - 1
     sides = (np.append(before, piece), np.append(np.ones(len(before)), u))
-    states = MotionStates.at(pieces, *sides)
-    jerks = np.abs(pieces.jerk).max(initial=0.0)
-    derivatives = (states.qdot, states.qddot, states.qdddot / (1.0 + jerks))
-    resting = zip(derivatives_at_rest(given), derivatives, strict=False)
-    for (name, kind, allowed), values in resting:
-        title = f"{name} at stops"
-        checks.append(check_joints(given, title, values, states.t, kind, allowed))
-    moved = [
-        given.during(phase.begin, phase.end).states
-        for phases in dwells
-        for phase in phases
-    ]
+    states = MotionStates.at(given.pieces, *sides)
+    checks += check_rest(given, "{} at stops", states)
+    moved = [given.during(phase) for phases in dwells for phase in phases]
     if moved:
         speeds = np.concatenate([each.qdot for each in moved])
         times = np.concatenate([each.t for each in moved])
@@ -62,15 +54,25 @@ def check_stops(given: Given) -> list[Check]:
     return checks
 
 
-def derivatives_at_rest(given: Given) -> list[tuple[str, str, float]]:
-    """List the derivatives that vanish at ends and stops: their name, kind (see `check_joints`) and largest value."""
+def check_rest(given: Given, title: str, states: MotionStates) -> list[Check]:
+    """Check the derivatives that vanish where the arm rests; `title` has a gap for their names."""
     options = given.options
-    derivatives = [
-        ("velocity", "velocity", options.rest_velocity_tolerance),
-        ("acceleration", "acceleration", options.rest_acceleration_tolerance),
-        ("jerk", "relative", options.rest_jerk_tolerance),
+    jerks = states.qdddot / (1.0 + np.abs(given.pieces.jerk[[0, -1]]).max())
+    derivatives = (
+        ("velocity", "velocity", states.qdot, options.rest_velocity_tolerance),
+        (
+            "acceleration",
+            "acceleration",
+            states.qddot,
+            options.rest_acceleration_tolerance,
+        ),
+        ("jerk", "relative", jerks, options.rest_jerk_tolerance),
+    )
+    count = max(given.task.spline.vanishing, 1)
+    return [
+        check_joints(given, title.format(name), values, states.t, kind, allowed)
+        for name, kind, values, allowed in derivatives[:count]
     ]
-    return derivatives[: max(given.task.spline.vanishing, 1)]
 
 
 def times_of_stops(given: Given) -> np.ndarray:
@@ -91,41 +93,41 @@ def check_process_speed(given: Given) -> list[Check]:
     legs = [leg for leg in given.legs if leg.speed is not None]
     if not legs:
         return []
-    subjects = [f"tool, s = {leg.begin:g} to {leg.end:g}" for leg in legs]
-    misses = []
-    found = []
-    for leg, subject in zip(legs, subjects, strict=True):
-        phase, miss = _nearest_phase(given, leg)
-        misses.append(miss)
-
-        def deviations(states: MotionStates, leg: Leg = leg) -> np.ndarray:
-            """Return relative deviations from the speed, (K, 1), in units of `_RESOLUTION`."""
-            speeds = frame_motion(given.robot, states, "linear")
-            return np.abs(speeds / leg.speed - 1.0) / _RESOLUTION
-
-        part = given.during(phase.begin, phase.end)
-        worst = worst_between(part, deviations, (subject,))
-        found.append(worst._replace(ratio=worst.ratio * _RESOLUTION))
-    worst = found[np.argmax([each.ratio for each in found])]
+    found = [_worst_deviation(given, leg) for leg in legs]
+    worst = max(found, key=attrgetter("ratio"))
     speed = (worst.ratio, _SPEED, "relative", worst.subject, worst.time, worst.remark)
+    title = "s where process speeds begin and end"
+    misses = [_distance(_nearest_phase(given, leg), leg) for leg in legs]
+    subjects = [each.subject for each in found]
     tolerance = given.options.progress_tolerance
     return [
         Check("process speed", *speed),
-        _check_worst(
-            "s where process speeds begin and end", misses, tolerance, "-", subjects
-        ),
+        _check_worst(title, misses, tolerance, "-", subjects),
     ]
 
 
-def _nearest_phase(given: Given, leg: Leg) -> tuple[MotionPhase, float]:
-    """Return the phase that passes a leg, or nearly so, and how far its ends are off, in s."""
+def _worst_deviation(given: Given, leg: Leg) -> Worst:
+    """Find the largest relative deviation from the speed that a leg gives."""
 
-    def miss(phase: MotionPhase) -> float:
-        """Return how far the ends of a phase are from those of the leg, in s."""
-        return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
+    def deviations(states: MotionStates) -> np.ndarray:
+        """Return relative deviations from the speed, (K, 1), in units of `_RESOLUTION`."""
+        speeds = tool_sizes(given.robot, states, "speed")
+        return np.abs(speeds / leg.speed - 1.0)[:, None] / _RESOLUTION
 
-    nearest = min(given.trajectory.phases, key=miss)
-    return nearest, miss(nearest)
+    phase = _nearest_phase(given, leg)
+    subject = f"tool, s = {leg.begin:g} to {leg.end:g}"
+    worst = worst_between(given, deviations, (subject,), given.during(phase))
+    return worst._replace(ratio=worst.ratio * _RESOLUTION)
+
+
+def _nearest_phase(given: Given, leg: Leg) -> MotionPhase:
+    """Return the phase that passes a leg, or nearly so."""
+    return min(given.trajectory.phases, key=lambda phase: _distance(phase, leg))
+
+
+def _distance(phase: MotionPhase, leg: Leg) -> float:
+    """Return how far the ends of a phase are from those of a leg, in s."""
+    return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
 
 
 def _dwells(given: Given, leg: Leg) -> list[MotionPhase]:

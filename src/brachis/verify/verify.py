@@ -27,7 +27,7 @@ from brachis.verify.checks import (
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.margins import find_margins
 from brachis.verify.mechanics import tool_placements
-from brachis.verify.motion import Given, MotionPieces, MotionStates, all_places
+from brachis.verify.motion import Given
 from brachis.verify.phases import check_process_speed, check_stops
 from brachis.verify.report import Check, Verification, VerifyOptions
 
@@ -77,7 +77,7 @@ def verify_trajectory(
         ratio_tolerance=trajectory.task.refinement.tolerance
     )
     task = trajectory.task
-    asked = trajectory.robot if robot is None else robot
+    asked = robot or trajectory.robot
     robot, task_map = bind(asked, task.task_space, task.tolerances)
     if robot.joint_names != trajectory.joint_names:
         raise InputError(
@@ -86,11 +86,7 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    pieces = MotionPieces.of(trajectory, robot)
-    path = path_of(task_map, trajectory.task)
-    places = all_places(trajectory, pieces, path, options)
-    states = MotionStates.at(pieces, *places)
-    given = Given(trajectory, robot, task_map, path, pieces, states, options)
+    given = Given(trajectory, robot, task_map, path_of(task_map, task), options)
     path_check = _check_path(given)
     ratios = check_limits(given, own_limits)
     checks = [
@@ -105,20 +101,19 @@ def verify_trajectory(
     ]
     worst = max((check.value for check in ratios), default=0.0)
     margins = find_margins(given)
-    return Verification(tuple(checks), len(states.t), worst, path_check.value, margins)
+    return Verification(
+        tuple(checks), len(given.states.t), worst, path_check.value, margins
+    )
 
 
 def _check_path(given: Given) -> Check:
     """Check the largest distance of the tool from the path at the saved s(t)."""
-    once = np.append(np.diff(given.states.t) > 0.0, True)  # not both sides of a node
-    states = given.states.only(once)
+    states = given.states
     task_map = given.task_map
     targets = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
     found = states.q
     if not isinstance(task_map, JointSpace):
-        rotations, origins = given.joints
-        joints = rotations[once], origins[once]
-        placed = tool_placements(task_map.robot, states.q, joints)
+        placed = tool_placements(task_map.robot, states.q, given.joints)
         found = task_map.of_placements(*placed)
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = np.argmax(errors)

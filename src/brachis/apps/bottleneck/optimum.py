@@ -165,7 +165,7 @@ def _problem(
     elif task.task_space == JOINTS:
         joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
-        rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
+        rows = ChartRows(trajectory.chart_rows, trajectory.chart_knots)
         s = trajectory.path_coordinate(trajectory.times)
         path = problem.path
         joint_map = chart_around(problem.task_map, path, s, trajectory.q, rows)

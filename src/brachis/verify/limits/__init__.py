@@ -6,7 +6,6 @@ Only a user's own limit without a check is verified by its own values, and marke
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,35 +16,21 @@ from brachis.robot.custom_limits import (
     has_check,
     list_models,
 )
-from brachis.task import LIMIT_KINDS
 from brachis.verify.limits.clearance import worst_clearance
-from brachis.verify.limits.joint import (
-    JOINT_CHECKS,
-    worst_torque_at_speed,
-    worst_total_power,
-)
+from brachis.verify.limits.joint import JOINT_CHECKS
 from brachis.verify.limits.margins import MARGIN_CHECKS
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
-from brachis.verify.limits.tolerance import TOLERANCE_CHECKS
 from brachis.verify.limits.tool import TOOL_CHECKS
 from brachis.verify.motion import Given, MotionStates
 from brachis.verify.report import Check
 
-_AFTER: dict[str, dict[str, LimitCheck]] = {
-    "position": TOOL_CHECKS,
-    "power": {
-        "total_power": worst_total_power,
-        "torque_speed": worst_torque_at_speed,
-    },
+TABLE: dict[str, LimitCheck] = {
+    **JOINT_CHECKS,
+    **TOOL_CHECKS,
+    **MARGIN_CHECKS,
+    "clearance": worst_clearance,
 }
-TABLE: dict[str, LimitCheck] = {}
-"""By kind, in the order of the checks: a joint limit, then those that `_AFTER` lists for it."""
-for _kind in LIMIT_KINDS:
-    TABLE[_kind] = JOINT_CHECKS[_kind]
-    TABLE |= _AFTER.get(_kind, {})
-TABLE |= MARGIN_CHECKS
-TABLE |= TOLERANCE_CHECKS
-TABLE["clearance"] = worst_clearance
+"""By kind, in the order of the checks."""
 
 
 def check_limits(given: Given, user_limits: Sequence[LimitModel]) -> list[Check]:
@@ -79,29 +64,17 @@ def _check_model(where: str, model: LimitModel, given: Given) -> tuple[str, Wors
     """
     limit = bind_model(where, model, given.robot)
     subjects = [label.subject for label in limit.labels]
-    if not has_check(model):
-        return limit.name, _check_values(limit, given, subjects)
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the ratios by the model's own check, (K, c)."""
+        """Return the sizes of the ratios, (K, c)."""
+        if not has_check(model):
+            return np.abs(limit.ratios(states, states.t))
         motion = (states.q, states.qdot, states.qddot, states.tau)
         return check_ratios(where, model, given.robot, motion, len(subjects))
 
-    return limit.name, worst_between(given, ratios, subjects)
-
-
-def _check_values(limit: Any, given: Given, subjects: Sequence[str]) -> Worst:
-    """Find the worst ratio by the values of a `brachis.limits.Limit` itself."""
-
-    def ratios(states: MotionStates) -> np.ndarray:
-        """Return the sizes of the limit's ratios, (K, c)."""
-        return np.abs(limit.ratios(states, states.t))
-
+    worst = worst_between(given, ratios, subjects)
+    if has_check(model):
+        return limit.name, worst
     if limit.guarantee.is_mean:
-        means = ratios(given.states)[0]
-        column = int(np.argmax(means))
-        time = given.states.t[-1]
-        worst = Worst(means[column], subjects[column], time)
-    else:
-        worst = worst_between(given, ratios, subjects)
-    return worst._replace(remark="checked by its own formula")
+        worst = worst._replace(time=given.states.t[-1])
+    return limit.name, worst._replace(remark="checked by its own formula")

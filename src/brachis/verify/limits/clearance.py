@@ -35,22 +35,32 @@ def worst_clearance(given: Given) -> Worst | None:
     scene = scene_of(given.robot, given.task)
     if scene is None or not len(scene.pairs):
         return None
-    least, known, time, pair = _Search(given, scene, wanted).smallest()
+    search = _Search(given, scene, wanted)
+    search.run()
+    least = search.least
     found = f"smallest distance {1e3 * least:.2f} mm"
-    subject = scene.names(pair)
+    subject = scene.names(search.pair)
     if least >= wanted + _LOOK:
         found = f"nothing is closer than {1e3 * least:.0f} mm"
         subject = "scene"
-    if known < min(wanted, least) - 2.0 * _ROUNDING:
-        found = f"search stopped early: {found}, the proven lower bound is {1e3 * known:.2f} mm"
-        least = known
+    if search.proven < min(wanted, least) - 2.0 * _ROUNDING:
+        least = search.proven
+        found = f"search stopped early: {found}, the proven lower bound is {1e3 * least:.2f} mm"
     ratio = max(1.0 + (wanted - least) / UNIT, 0.0)
     is_kept = given.task.collision_mode == "avoid"
-    return Worst(ratio, subject, time, found, is_kept)
+    return Worst(ratio, subject, search.time, found, is_kept)
 
 
 class _Search:
-    """Branch and bound over time."""
+    """Branch and bound over time.
+
+    Attributes
+    ----------
+    least, time, pair : float, float, int
+        Smallest distance that was found, m, when, s, and between what.
+    proven : float
+        No distance is smaller than this and `least`, but for the gaps that are allowed, m.
+    """
 
     def __init__(self, given: Given, scene: Scene, wanted: float) -> None:
         self._given = given
@@ -58,22 +68,20 @@ class _Search:
         self._wanted = wanted
         self._reach = _reaches(given, scene)
         self._fastest = np.abs(given.pieces.velocity).max(axis=0)[:, : len(self._reach)]
-        self._least = wanted + _LOOK
-        self._place = (float(given.states.t[0]), 0)
+        self.least = wanted + _LOOK
+        self.time = given.states.t[0]
+        self.pair = 0
+        self.proven = np.inf
         self._halved = 0
 
-    def smallest(self) -> tuple[float, float, float, int]:
-        """Smallest distance found, what is proven, m, and time, s, and pair of the former."""
+    def run(self) -> None:
+        """Search the whole motion."""
         states = self._given.states
-        known = np.inf
-        starts = range(0, max(len(states.t) - 1, 1), _STATES)
-        for first in starts:
-            part = states.only(slice(first, first + _STATES + 1))
-            known = min(known, self._within(part))
-        return self._least, min(known, self._least), *self._place
+        for first in range(0, max(len(states.t) - 1, 1), _STATES):
+            self._search(states.only(slice(first, first + _STATES + 1)))
 
-    def _within(self, states: MotionStates) -> float:
-        """Prove what the distances between states are at least, m."""
+    def _search(self, states: MotionStates) -> None:
+        """Search the states, and between them."""
         placed = joint_placements(self._given.robot, states.q)
         far = self._wanted + _LOOK
         distance = np.maximum(self._scene.bounds(placed), far)
@@ -88,10 +96,9 @@ class _Search:
         moved = (travel * self._fastest[piece]) @ self._reach
         lower = 0.5 * (distance[1:] + distance[:-1] - moved)
         index, pair = np.nonzero(lower < self._goal)
-        known = lower.min(initial=np.inf, where=lower >= self._goal)
         ends = states.u[index], states.u[index + 1]
         values = distance[index, pair], distance[index + 1, pair]
-        return min(known, self._halve(piece[index], pair, ends, values))
+        self._halve(piece[index], pair, ends, values)
 
     def _halve(
         self,
@@ -99,20 +106,21 @@ class _Search:
         pair: np.ndarray,
         ends: tuple[np.ndarray, np.ndarray],
         values: tuple[np.ndarray, np.ndarray],
-    ) -> float:
-        """Halve steps of pairs, (M,), until enough is known of each; return what is proven, m."""
+    ) -> None:
+        """Halve steps of pairs, (M,), until enough is known of each."""
         pieces = self._given.pieces
-        known = np.inf
         u = np.array(ends)
         d = np.array(values)
         while len(piece):
-            approach = self._compute_approach(piece, pair, u[1] - u[0])
+            travel = ((u[1] - u[0]) * pieces.lengths[piece])[:, None]
+            moved = travel * self._fastest[piece]
+            approach = np.einsum("mj,jm->m", moved, self._reach[:, pair])
             lower = 0.5 * (d.sum(axis=0) - approach)
             is_open = lower < self._goal
             self._halved += int(is_open.sum())
             if self._halved > _MOST:
-                return min(known, lower.min())
-            known = min(known, lower.min(initial=np.inf, where=~is_open))
+                self.proven = min(self.proven, lower.min())
+                return
             piece = piece[is_open]
             pair = pair[is_open]
             u = u[:, is_open]
@@ -126,29 +134,20 @@ class _Search:
             d = np.hstack([[d[0], found], [found, d[1]]])
             piece = np.tile(piece, 2)
             pair = np.tile(pair, 2)
-        return known
-
-    def _compute_approach(
-        self, piece: np.ndarray, pair: np.ndarray, step: np.ndarray
-    ) -> np.ndarray:
-        """How far the solids of pairs move towards each other within steps at most, (M,), m."""
-        travel = (step * self._given.pieces.lengths[piece])[:, None]
-        return np.einsum(
-            "mj,jm->m", travel * self._fastest[piece], self._reach[:, pair]
-        )
 
     @property
     def _goal(self) -> float:
         """What has to be proven of a step, m."""
-        near = min(self._least, self._wanted) - _ROUNDING
-        return max(near, self._least - _FINE)
+        near = min(self.least, self._wanted) - _ROUNDING
+        return max(near, self.least - _FINE)
 
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
         """Keep the smallest distance."""
-        if distance.min(initial=np.inf) < self._least:
+        if distance.min(initial=np.inf) < self.least:
             best = np.argmin(distance)
-            self._least = distance[best]
-            self._place = float(t[best]), int(pair[best])
+            self.least = distance[best]
+            self.time = t[best]
+            self.pair = int(pair[best])
 
 
 def _reaches(given: Given, scene: Scene) -> np.ndarray:

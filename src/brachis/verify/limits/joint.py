@@ -71,10 +71,6 @@ def _worst_quantity(
     return worst_between(given, ratios, robot.joint_names)
 
 
-def _torque_rate(robot: Robot, states: MotionStates) -> np.ndarray:
-    return torque_rates(robot, states.q, states.qdot, states.qddot, states.qdddot)
-
-
 def _worst_rms_torque(given: Given) -> Worst | None:
     """Find the largest ratio of a root mean square of torques, by Simpson's rule between all states of each piece."""
     limit = given.robot.limits.rms_torque
@@ -93,22 +89,7 @@ def _worst_rms_torque(given: Given) -> Worst | None:
     return Worst(ratios[joint], name, states.t[-1])
 
 
-JOINT_CHECKS: dict[str, LimitCheck] = {
-    "torque": partial(_worst_quantity, "torque", lambda _, states: states.tau),
-    "velocity": partial(_worst_derivative, "velocity"),
-    "acceleration": partial(_worst_derivative, "acceleration"),
-    "position": _worst_position,
-    "power": partial(
-        _worst_quantity, "power", lambda _, states: states.tau * states.qdot
-    ),
-    "rms_torque": _worst_rms_torque,
-    "jerk": partial(_worst_derivative, "jerk"),
-    "torque_rate": partial(_worst_quantity, "torque_rate", _torque_rate),
-}
-"""The check of every row of `LIMIT_KINDS`."""
-
-
-def worst_total_power(given: Given) -> Worst | None:
+def _worst_total_power(given: Given) -> Worst | None:
     """Find the largest ratio of the sum of all joints' powers."""
     limit = given.robot.limits.total_power
     if not np.isfinite(limit):
@@ -121,7 +102,7 @@ def worst_total_power(given: Given) -> Worst | None:
     return worst_between(given, ratios, ("all joints",))
 
 
-def worst_torque_at_speed(given: Given) -> Worst | None:
+def _worst_torque_at_speed(given: Given) -> Worst | None:
     """Find the torque that is furthest beyond what its joint's curve allows at its speed.
 
     The ratio is 1 on the curve; differences count as parts of the torque at rest.
@@ -145,3 +126,26 @@ def worst_torque_at_speed(given: Given) -> Worst | None:
         return np.column_stack(columns)
 
     return worst_between(given, ratios, [robot.joint_names[joint] for joint in joints])
+
+
+JOINT_CHECKS: dict[str, LimitCheck] = {
+    "torque": partial(_worst_quantity, "torque", lambda _, states: states.tau),
+    "velocity": partial(_worst_derivative, "velocity"),
+    "acceleration": partial(_worst_derivative, "acceleration"),
+    "position": _worst_position,
+    "power": partial(
+        _worst_quantity, "power", lambda _, states: states.tau * states.qdot
+    ),
+    "total_power": _worst_total_power,
+    "torque_speed": _worst_torque_at_speed,
+    "rms_torque": _worst_rms_torque,
+    "jerk": partial(_worst_derivative, "jerk"),
+    "torque_rate": partial(
+        _worst_quantity,
+        "torque_rate",
+        lambda robot, states: torque_rates(
+            robot, states.q, states.qdot, states.qddot, states.qdddot
+        ),
+    ),
+}
+"""The check of every row of `LIMIT_KINDS`, and of the limits of drives."""

@@ -41,6 +41,7 @@ def worst_between(
     given: Given,
     ratio_at: Callable[[MotionStates], np.ndarray],
     subjects: Sequence[str],
+    states: MotionStates | None = None,
 ) -> Worst:
     """Find the largest of ratios that are not polynomials, at the states and wherever between them it may lie.
 
@@ -55,19 +56,22 @@ def worst_between(
         ``ratio_at(states)`` returns the ratios, (K, c).
     subjects : sequence of str
         What the c ratios are of.
+    states : MotionStates, optional
+        States to begin with, unless those of the whole motion.
 
     Returns
     -------
     Worst
         If 100,000 more states are not enough, it is the largest ratio that is possible, with a remark.
     """
-    states = given.states
+    states = given.states if states is None else states
+    most_states = len(states.t) + 100_000
     ratio = ratio_at(states)
     for _ in range(40):
         steps, most = _may_hold_more(states, given.pieces.lengths, ratio)
         if not len(steps):
             break
-        if len(states.t) + len(steps) > len(given.states.t) + 100_000:
+        if len(states.t) + len(steps) > most_states:
             k = int(np.argmax(most))
             column = int(np.argmax(ratio[steps[k]]))
             remark = f"not searched to the end: {ratio.max():.6g} was found, and more than this is not possible"

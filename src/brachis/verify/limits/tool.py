@@ -1,82 +1,86 @@
-"""Ratios of the tool's speed, angular speed and acceleration to their limits, with Pinocchio's own frame motion."""
+"""How fast the tool moves, turns and accelerates, and how far it leaves the path, over what the task allows.
+
+All by the URDF's own chain and the path alone. With the rotation D of the tool in the axes of the path's orientation,
+and its third column z, the tool's axis there:
+
+    tilt = acos z_z,   lead = asin z_x,   side = atan2(z_y, z_z),   roll = atan2(-D_xy, D_xx).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import pinocchio as pin
 
+from brachis.common.arrays import apply_each
 from brachis.robot import Robot
 from brachis.task import SpeedTable
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
-from brachis.verify.motion import Given, MotionStates
+from brachis.verify.mechanics import (
+    joint_placements,
+    real_tool_placements,
+    tool_accelerations,
+)
+from brachis.verify.motion import Given, MotionStates, list_speed_tables
 
-
-def frame_motion(robot: Robot, states: MotionStates, vector: str) -> np.ndarray:
-    """Sizes, (K, 1), of the tool frame's velocity (``linear``, m/s; ``angular``, rad/s), or ``acceleration``, m/s^2.
-
-    Virtual joints do not move the tool.
-    """
-    model = robot.model
-    data = model.createData()
-    frame = (robot.frame_id, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-    motion = [states.q.copy(), states.qdot.copy(), states.qddot.copy()]
-    for part in motion:
-        part[:, len(robot.urdf_joints) :] = 0.0
-    sizes = np.empty((len(states.t), 1))
-    for k in range(len(sizes)):
-        pin.forwardKinematics(model, data, *(part[k] for part in motion))
-        if vector == "acceleration":
-            part = pin.getFrameClassicalAcceleration(model, data, *frame).linear
-        else:
-            part = getattr(pin.getFrameVelocity(model, data, *frame), vector)
-        sizes[k] = np.linalg.norm(part)
-    return sizes
-
-
-def _worst_motion(key: str, vector: str, given: Given) -> Worst | None:
-    """Find the largest ratio to one of the task's tool limits, at the states and between them."""
-    limit = getattr(given.task.tool_limits, key)
-    if limit is None:
-        return None
-
-    def ratios(states: MotionStates) -> np.ndarray:
-        """Return the sizes over the limit, (K, 1)."""
-        return frame_motion(given.robot, states, vector) / limit
-
-    return worst_between(given, ratios, ("tool",))
-
-
+_ANGLES = ("lead", "side", "roll")
 _SAME_S = 1e-12
 """Path coordinates that are nearer to each other are the same."""
 
 
+def tool_sizes(robot: Robot, states: MotionStates, quantity: str) -> np.ndarray:
+    """Sizes, (K,), of the tool's ``speed``, m/s, ``angular_speed``, rad/s, or ``acceleration``, m/s^2."""
+    rates = (states.qdot, states.qddot)
+    if quantity != "acceleration":
+        rates = (np.zeros_like(states.q), states.qdot)
+    linear, angular = tool_accelerations(robot, states.q, *rates)
+    vectors = angular if quantity == "angular_speed" else linear
+    return np.linalg.norm(vectors, axis=0)
+
+
+def _worst_size(
+    given: Given, largest: float | None, sizes: Callable[[MotionStates], np.ndarray]
+) -> Worst | None:
+    """Find the largest ratio of a size of the tool's, (K,), to the largest that is allowed; None without one."""
+    if largest is None:
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        """Return the sizes over the largest one, (K, 1)."""
+        return sizes(states)[:, None] / largest
+
+    return worst_between(given, ratios, ("tool",))
+
+
+def _worst_motion(quantity: str, given: Given) -> Worst | None:
+    """Find the largest ratio to one of the task's tool limits, at the states and between them."""
+    largest = getattr(given.task.tool_limits, quantity)
+    return _worst_size(
+        given, largest, lambda states: tool_sizes(given.robot, states, quantity)
+    )
+
+
 def _worst_speed(given: Given) -> Worst | None:
-    """Find the largest ratio of the tool's speed, at the states and between them; also at the places of tables."""
+    """Find the largest ratio of the tool's speed, at the states and between them."""
     limits = given.task.tool_limits
-    tables = [
-        *([limits.speed] if isinstance(limits.speed, SpeedTable) else []),
-        *limits.feed,
-    ]
+    tables = list_speed_tables(given.task)
     if not tables:
-        return _worst_motion("speed", "linear", given)
+        return _worst_motion("speed", given)
 
     def ratios(states: MotionStates) -> np.ndarray:
         """Return the speeds over the lowest limit at each s, (K, 1)."""
         s = states.s
-        limit = np.full(
-            len(s), limits.speed if isinstance(limits.speed, float) else np.inf
-        )
+        constant = limits.speed if isinstance(limits.speed, float) else np.inf
+        limit = np.full(len(s), constant)
         for table in tables:
             # A table of feed rates says nothing beyond its ends.
             within = (s >= table.s[0] - _SAME_S) & (s <= table.s[-1] + _SAME_S)
             holds = within | (table is limits.speed)
-            limit = np.where(holds, np.minimum(limit, _speed_limit(table, s)), limit)
-        return frame_motion(given.robot, states, "linear") / limit[:, None]
+            limit = np.minimum(limit, np.where(holds, _speed_limit(table, s), np.inf))
+        return (tool_sizes(given.robot, states, "speed") / limit)[:, None]
 
-    places = np.unique([place for table in tables for place in table.s])
-    return worst_between(given.with_states_at(places), ratios, ("tool",))
+    return worst_between(given, ratios, ("tool",))
 
 
 def _speed_limit(table: SpeedTable, s: np.ndarray) -> np.ndarray:
@@ -87,8 +91,66 @@ def _speed_limit(table: SpeedTable, s: np.ndarray) -> np.ndarray:
     return np.minimum(before, behind)
 
 
+def _worst_deviation(name: str, given: Given) -> Worst | None:
+    """Find the largest ratio of a tilt, or of a distance from the path, to the largest that is allowed."""
+    tolerances = given.task.tolerances
+    is_tilt = name == "tilt"
+    largest = tolerances.orientation.tilt if is_tilt else tolerances.position.sphere
+    return _worst_size(given, largest, lambda states: _deviations(given, states)[name])
+
+
+def _worst_range(given: Given) -> Worst | None:
+    """Find the largest part of a range that the tool uses; None without ranges."""
+    tolerances = given.task.tolerances
+    angles = {way: getattr(tolerances.orientation, way) for way in _ANGLES}
+    lengths = {way: getattr(tolerances.position, way) for way in "xyz"}
+    every = angles | lengths
+    ranges = {way: ends for way, ends in every.items() if ends not in (None, "free")}
+    if not ranges:
+        return None
+
+    def ratios(states: MotionStates) -> np.ndarray:
+        """Return the used parts of the ranges, (K, c)."""
+        found = _deviations(given, states)
+        columns = []
+        for way, (low, high) in ranges.items():
+            away = found[way] - 0.5 * (low + high)
+            if way in _ANGLES:
+                away = np.remainder(away + 180.0, 360.0) - 180.0
+            columns.append(np.abs(away) / (0.5 * (high - low)))
+        return np.stack(columns, axis=1)
+
+    return worst_between(given, ratios, [f"tool {way}" for way in ranges])
+
+
+def _deviations(given: Given, states: MotionStates) -> dict[str, np.ndarray]:
+    """Angles, degrees, and displacements, m, by which the tool is not where the path wants it, (K,) each."""
+    joints = joint_placements(given.robot, states.q)
+    origin, rotation = real_tool_placements(given.robot, *joints)
+    target = given.path.sample(np.clip(states.s, 0.0, 1.0)).target
+    shift = origin - target[:, :3]
+    wanted = target[:, 3:].reshape(-1, 3, 3) if given.task.of_poses else rotation
+    back = np.swapaxes(wanted, 1, 2)
+    turned = back @ rotation
+    if given.task.tolerances.position.axes == "tool":
+        shift = apply_each(back, shift)
+    x, y, z = turned[:, :, 2].T
+    radians = {
+        "tilt": np.arctan2(np.hypot(x, y), z),
+        "lead": np.arcsin(np.clip(x, -1.0, 1.0)),
+        "side": np.arctan2(y, z),
+        "roll": np.arctan2(-turned[:, 0, 1], turned[:, 0, 0]),
+    }
+    found = {way: np.degrees(angle) for way, angle in radians.items()}
+    found |= zip("xyz", shift.T, strict=True)
+    return {**found, "distance": np.linalg.norm(shift, axis=1)}
+
+
 TOOL_CHECKS: dict[str, LimitCheck] = {
     "tool_speed": _worst_speed,
-    "tool_acceleration": partial(_worst_motion, "acceleration", "acceleration"),
-    "tool_angular_speed": partial(_worst_motion, "angular_speed", "angular"),
+    "tool_acceleration": partial(_worst_motion, "acceleration"),
+    "tool_angular_speed": partial(_worst_motion, "angular_speed"),
+    "tool_tilt": partial(_worst_deviation, "tilt"),
+    "tool_distance": partial(_worst_deviation, "distance"),
+    "tool_range": _worst_range,
 }
