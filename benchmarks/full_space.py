@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from brachis.common.arrays import spread
 from brachis.kinematics import DirectJointMap, JointState
-from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern
+from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern, greville
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
@@ -105,11 +105,11 @@ class FullSpace:
 
     def _equations(self, still: int, free: list[bool]) -> None:
         """Lay the path's equations out; `still` control points at each end are one, which is free or not."""
-        greville = self.phase.splines[0].greville[still:-still]
-        self.t_norm = np.concatenate([[0.0][: free[0]], greville, [1.0][: free[1]]])
+        inner = greville(self.phase.knots, self.phase.degree)[still:-still]
+        self.t_norm = np.concatenate([[0.0][: free[0]], inner, [1.0][: free[1]]])
         self._basis = LocalBasis.of(self.phase.knots, self.phase.degree, self.t_norm)
         self._places = [
-            SparsityPattern.of(self._basis.columns, spline)
+            SparsityPattern(self._basis.columns, spline.free_part, 1)
             for spline in self.phase.splines
         ]
         self._values = [
@@ -158,7 +158,7 @@ class FullSpace:
 
     def starting_point(self, joint_path: np.ndarray, t_end: float) -> np.ndarray:
         """Point x of a motion along a joint path, (K, n), at equal steps of s, that speeds up and slows down evenly."""
-        t = self.phase.splines[0].greville
+        t = greville(self.phase.knots, self.phase.degree)
         s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
         at = np.linspace(0.0, 1.0, len(joint_path))
         points = np.array([s, *(np.interp(s, at, joint) for joint in joint_path.T)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pytest
@@ -82,7 +83,7 @@ FIRST = solved(Fake(5.0))
 
 def test_every_motion_is_kept_unless_said_otherwise():
     changes, seen = changes_to(Fake(4.0), Fake(6.0), Fake(5.5))
-    found = improve(FIRST, changes, attempt_once(solve))
+    found = improve(FIRST, changes, partial(attempt_once, solve))
     assert found.t_end == 5.5
     assert seen == [5.0, 4.0, 6.0]
     assert [report.objective for report in found.reports] == [5.0, 4.0, 6.0, 5.5]
@@ -91,7 +92,7 @@ def test_every_motion_is_kept_unless_said_otherwise():
 def test_only_gains_are_kept_and_the_report_of_what_is_kept_is_the_last():
     changes, seen = changes_to(Fake(4.0), Fake(6.0), Fake(4.5))
     found = improve(
-        FIRST, changes, attempt_once(solve), least_gain=0.0, go_on_above=None
+        FIRST, changes, partial(attempt_once, solve), least_gain=0.0, go_on_above=None
     )
     assert found.t_end == 4.0
     assert found.program.t_end == 4.0
@@ -101,7 +102,7 @@ def test_only_gains_are_kept_and_the_report_of_what_is_kept_is_the_last():
 
 def test_a_small_gain_is_kept_and_is_the_last():
     changes, seen = changes_to(Fake(4.0), Fake(3.99), Fake(1.0))
-    attempt = attempt_once(solve)
+    attempt = partial(attempt_once, solve)
     found = improve(FIRST, changes, attempt, least_gain=0.0, go_on_above=0.01)
     assert found.t_end == 3.99
     assert len(seen) == 2
@@ -109,7 +110,7 @@ def test_a_small_gain_is_kept_and_is_the_last():
 
 def test_a_failure_ends_it():
     changes, seen = changes_to(Fake(4.0), Fake(1.0, usable=False), Fake(2.0))
-    found = improve(FIRST, changes, attempt_once(solve))
+    found = improve(FIRST, changes, partial(attempt_once, solve))
     assert found.t_end == 4.0
     assert len(seen) == 2
 
@@ -117,32 +118,35 @@ def test_a_failure_ends_it():
 def test_without_a_motion_the_next_one_takes_its_place():
     changes, seen = changes_to(Fake(4.0, usable=False), Fake(3.0), Fake(2.99))
     nothing = SolvedProgram(Fake(np.inf))
-    found = improve(nothing, changes, attempt_once(solve), least_gain=0.1)
+    found = improve(nothing, changes, partial(attempt_once, solve), least_gain=0.1)
     assert found.t_end == 3.0
     assert seen == [None, 4.0, 3.0]
     changes, _ = changes_to(Fake(4.0, usable=False), Fake(3.0, usable=False))
-    assert improve(nothing, changes, attempt_once(solve)).program.t_end == 3.0
+    assert improve(nothing, changes, partial(attempt_once, solve)).program.t_end == 3.0
 
 
 def test_it_ends_with_the_time_or_with_a_reason():
     changes, seen = changes_to(Fake(4.0))
-    over = improve(FIRST, changes, attempt_once(solve), deadline=Deadline(0.0))
+    over = improve(FIRST, changes, partial(attempt_once, solve), deadline=Deadline(0.0))
     assert over.t_end == 5.0
     assert not seen
     reasons = [lambda _kept: "too many", lambda _kept: pytest.fail("it went on")]
-    assert improve(FIRST, reasons, attempt_once(solve)).not_completed == "too many"
+    assert (
+        improve(FIRST, reasons, partial(attempt_once, solve)).not_completed
+        == "too many"
+    )
     nothing = [lambda _kept: None, lambda _kept: pytest.fail("it went on")]
-    assert improve(FIRST, nothing, attempt_once(solve)).not_completed == ""
+    assert improve(FIRST, nothing, partial(attempt_once, solve)).not_completed == ""
 
 
 def test_an_early_end_counts_if_it_is_faster_than_its_beginning():
     early = Fake(4.0, usable=False)
     changes, _ = changes_to(early)
-    kept = improve(FIRST, changes, attempt_once(solve, accept_early_end=True))
+    kept = improve(FIRST, changes, partial(attempt_once, solve, accept_early_end=True))
     assert kept.t_end == 4.0
     assert kept.report.status is SolveStatus.ACCEPTABLE
     changes, _ = changes_to(Fake(6.0, usable=False))
-    kept = improve(FIRST, changes, attempt_once(solve, accept_early_end=True))
+    kept = improve(FIRST, changes, partial(attempt_once, solve, accept_early_end=True))
     assert kept.t_end == 5.0
 
 
@@ -151,7 +155,7 @@ def test_judged_by_something_else():
     found = improve(
         FIRST,
         changes,
-        attempt_once(solve),
+        partial(attempt_once, solve),
         least_gain=0.0,
         go_on_above=None,
         judge=lambda tried: 10.0 - tried.t_end,

@@ -12,6 +12,7 @@ from brachis.common.deadline import NEVER
 from brachis.errors import UnreachableError
 from brachis.kinematics import ClosedFormMap
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
+from brachis.optimise.boundary import greville
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram, SolverSession
 from brachis.optimise.refine import add_points_where_lost
@@ -34,7 +35,7 @@ def swinging(program):
     few = program.with_points([np.linspace(0.0, 1.0, 5)])
     (phase,) = few.phases
     motion = phase.motion(next(starting_points(program)))
-    places = phase.splines[1].greville
+    places = greville(phase.knots, phase.degree)
     points = motion.control_points.copy()
     swing = np.where((places > 0.15) & (places < 0.85), np.sin(8.0 * np.pi * places), 0)
     points[1] += 2.0 * swing

@@ -67,6 +67,17 @@ def interpolate_columns(
     return np.column_stack([np.interp(places, s, column) for column in values.T])
 
 
+def cut(values: np.ndarray, begin: float, end: float) -> np.ndarray:
+    """Take ascending numbers, (P,), that are between two others, with these as the first and the last one."""
+    inside = values[(values > begin) & (values < end)]
+    return np.concatenate([[begin], inside, [end]])
+
+
+def drop_near(values: np.ndarray, least: float) -> np.ndarray:
+    """Leave out ascending numbers, (P,), that are no more than `least` before the next one."""
+    return values[np.append(np.diff(values) > least, True)]
+
+
 def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
     """Spread numbers, such as times, evenly over every interval, with both its ends.
 

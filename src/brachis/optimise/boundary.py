@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from brachis.kernel import Basis
 from brachis.optimise.bspline import ORDERS, local_basis
@@ -83,21 +84,16 @@ class FreePart:
 
 @dataclass(frozen=True)
 class BoundarySpline:
-    """A scalar spline over normalised time with boundary conditions built in.
+    """A scalar spline of degree d over normalised time with boundary conditions built in.
 
     Attributes
     ----------
-    knots : (N + 2 d + 1,) ndarray
-    degree : int
-        d.
     free_part : FreePart
         S.
     given : (1 + p, N + d) ndarray
         Given terms of the control points, by powers of the duration, up to the highest one that matters, p.
     """
 
-    knots: np.ndarray
-    degree: int
     free_part: FreePart
     given: np.ndarray
 
@@ -128,17 +124,12 @@ class BoundarySpline:
         shape = (count, int(variables.max(initial=-1)) + 1)
         free_part = FreePart(points, variables, np.ones(len(points)), shape)
         powers = np.flatnonzero(given[1:].any(axis=1)) + 1
-        return cls(knots, degree, free_part, given[: 1 + powers.max(initial=0)])
+        return cls(free_part, given[: 1 + powers.max(initial=0)])
 
     @property
     def free(self) -> int:
         """Number of free variables."""
         return self.free_part.shape[1]
-
-    @property
-    def greville(self) -> np.ndarray:
-        """Greville abscissae (N + d,): the normalised times to which the control points belong."""
-        return greville(self.knots, self.degree)
 
     def given_points(self, duration: float) -> np.ndarray:
         """Return the given part of the control points, (N + d,)."""
@@ -155,7 +146,7 @@ class BoundarySpline:
         is_alone = (part.counts[part.point] == 1) & (part.weight == 1.0)
         variable = part.variable[is_alone]
         sums = np.bincount(variable, own_part[part.point[is_alone]], self.free)
-        return np.asarray(sums / np.bincount(variable, minlength=self.free))
+        return sums / np.bincount(variable, minlength=self.free)
 
 
 def stack_splines(
@@ -183,17 +174,19 @@ def stack_splines(
     """
     most = max((len(spline.given) for spline in splines), default=1)
     given = np.zeros((most, len(splines), count))
-    parts = [spline.free_part for spline in splines]
     points = [np.empty(0, dtype=int)]
     columns = [np.empty(0, dtype=int)]
+    weights = [np.empty(0)]
     for number, (spline, own) in enumerate(zip(splines, slices, strict=True)):
+        part = spline.free_part
         given[: len(spline.given), number] = spline.given
-        points.append(number * count + spline.free_part.point)
-        columns.append(own.start + spline.free_part.variable)
+        points.append(number * count + part.point)
+        columns.append(own.start + part.variable)
+        weights.append(part.weight)
     free_part = FreePart(
         np.concatenate(points),
         np.concatenate(columns),
-        np.concatenate([np.empty(0), *(part.weight for part in parts)]),
+        np.concatenate(weights),
         (len(splines) * count, variables),
     )
     return free_part, given.reshape(most, -1)
@@ -210,14 +203,14 @@ def sum_powers(
         return np.zeros_like(terms[0]) if slope else terms[0]
     powers = np.arange(len(terms))
     if slope:
-        return np.asarray((powers[1:] * duration ** powers[:-1]) @ terms[1:])
-    return np.asarray(duration**powers @ terms)
+        return (powers[1:] * duration ** powers[:-1]) @ terms[1:]
+    return duration**powers @ terms
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Return the Greville abscissae (N + d,) of a clamped knot vector."""
-    windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
-    return np.asarray(windows.mean(axis=1))
+    """Greville abscissae (N + d,) of a clamped knot vector: the times to which control points belong."""
+    windows = sliding_window_view(knots[1:-1], degree)
+    return windows.mean(axis=1)
 
 
 def _blossoms(knots: np.ndarray, degree: int, anchor: int, most: int) -> np.ndarray:
@@ -230,7 +223,7 @@ def _blossoms(knots: np.ndarray, degree: int, anchor: int, most: int) -> np.ndar
     (1 + most or 2, N + d) ndarray
     """
     abscissae = greville(knots, degree)
-    own = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
+    own = sliding_window_view(knots[1:-1], degree)
     own = own - abscissae[anchor]
     symmetric = np.zeros((degree + 1, len(own)))
     symmetric[0] = 1.0
@@ -256,8 +249,9 @@ def periodic(
 
     Parameters
     ----------
-    knots, degree
-        See `BoundarySpline`.
+    knots : (N + 2 d + 1,) ndarray
+    degree : int
+        d.
     start : float
         Value at the start, NaN where free.
     jump : float
@@ -275,7 +269,7 @@ def periodic(
     if not np.isnan(start):
         given[0] += start * matrix[:, 0]
         matrix = matrix[:, 1:]
-    return BoundarySpline(knots, degree, FreePart.of(matrix), given)
+    return BoundarySpline(FreePart.of(matrix), given)
 
 
 @dataclass(frozen=True)
@@ -327,6 +321,13 @@ class Boundary:
     def given(self) -> int:
         """Number of curves that are given and have no spline: 1 with a time law, else 0."""
         return int(self.time_law is not None)
+
+    @property
+    def rates(self) -> tuple[float, float]:
+        """First derivatives of the first curve at start and end, 1/s; zero where these are free."""
+        sides = (self.start[0], self.end[0])
+        first, last = (float(side.derivatives[:1].sum()) for side in sides)
+        return first, last
 
     @property
     def ahead(self) -> np.ndarray:
@@ -384,38 +385,40 @@ class LocalBasis:
         return Basis(self.values, self.first)
 
 
-@dataclass(frozen=True)
 class SparsityPattern:
-    """Where the free variables of a spline matter: each pair of a time and a variable once.
+    """Where the free variables of splines matter: each time and variable of a spline once, one spline after the other.
+
+    Parameters
+    ----------
+    columns : (K, d + 1) int ndarray
+        Control points of a spline that matter at each time; see `LocalBasis`.
+    part : FreePart
+        Of splines over the same knots, stacked.
+    curves : int
+        Number of these.
 
     Attributes
     ----------
-    point, variable : (z,) int ndarray
+    curve, point, variable : (z,) int ndarray
+        Numbers of the spline, of the time, and of the variable.
     """
 
-    point: np.ndarray
-    variable: np.ndarray
-    _terms: tuple[np.ndarray, np.ndarray]
-    _place: np.ndarray
-    _weight: np.ndarray
-
-    @classmethod
-    def of(cls, columns: np.ndarray, spline: BoundarySpline) -> SparsityPattern:
-        """Find the places of a spline's local basis, whose `columns` are (K, d + 1)."""
-        part = spline.free_part
+    def __init__(self, columns: np.ndarray, part: FreePart, curves: int) -> None:
         begins = np.cumsum(part.counts) - part.counts
-        points = columns.ravel()
+        count, width = columns.shape
+        firsts = np.arange(curves) * (part.shape[0] // max(curves, 1))
+        points = (firsts[:, None, None] + columns).ravel()
         counts = part.counts[points]
         term = np.repeat(np.arange(len(points)), counts)
         within = np.arange(len(term)) - np.repeat(np.cumsum(counts) - counts, counts)
         entry = begins[points][term] + within
-        variable = part.variable[entry]
-        weight = part.weight[entry]
-        point, function = np.divmod(term, columns.shape[1])
-        numbers = point * spline.free + variable
-        unique, place = np.unique(numbers, return_inverse=True)
-        own_point, own_variable = np.divmod(unique, max(spline.free, 1))
-        return cls(own_point, own_variable, (point, function), place, weight)
+        self._weight = part.weight[entry]
+        row, function = np.divmod(term, width)
+        self._terms = (row % count, function)
+        numbers = row * part.shape[1] + part.variable[entry]
+        unique, self._place = np.unique(numbers, return_inverse=True)
+        own_row, self.variable = np.divmod(unique, part.shape[1])
+        self.curve, self.point = np.divmod(own_row, count)
 
     def entries(self, values: np.ndarray) -> np.ndarray:
         """Differentiate value and three derivatives by the free variables, (4, z); `values` are (4, K, d + 1)."""

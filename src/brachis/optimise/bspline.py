@@ -42,14 +42,16 @@ def local_basis(
         Per unit of the knots' time.
     """
     breaks = knots[degree : len(knots) - degree]
-    t_norm = np.clip(t_norm, breaks[0], breaks[-1])
-    first = np.clip(
-        np.searchsorted(breaks, t_norm, side="right") - 1, 0, len(breaks) - 2
-    )
+    first, fraction = locate(breaks, np.clip(t_norm, breaks[0], breaks[-1]))
     lengths = np.diff(knots)[first[:, None] + np.arange(1, 2 * degree)]
-    return first, basis_functions(
-        lengths, (t_norm - breaks[first]) / lengths[:, degree - 1]
-    )
+    return first, basis_functions(lengths, fraction)
+
+
+def locate(breaks: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the interval of each of given times, (K,), and the fraction of it that is behind."""
+    interval = np.searchsorted(breaks, times, side="right") - 1
+    interval = interval.clip(0, len(breaks) - 2)
+    return interval, (times - breaks[interval]) / np.diff(breaks)[interval]
 
 
 def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarray:
@@ -110,7 +112,7 @@ def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     """
     step = 1e-30
     moved = lengths + 1j * step * np.eye(lengths.shape[-1])[:, None]
-    return np.asarray(basis_functions(moved, fraction[None]).imag / step)
+    return basis_functions(moved, fraction[None]).imag / step
 
 
 def _raise_degree(

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from brachis.common.arrays import interpolate_columns
+from brachis.common.arrays import cut, interpolate_columns
 from brachis.common.summary import Summary
 from brachis.common.words import write_count
 from brachis.errors import UnreachableError
-from brachis.kinematics import (
-    CHART,
-    ChartMap,
-    ClosedFormMap,
-    JointMap,
-    JointSpaceMap,
-)
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap, JointMap, JointSpaceMap
 from brachis.optimise.backends import SolverReport
 from brachis.optimise.extraction import extract_trajectory
 from brachis.optimise.improve import Solve, SolvedProgram
@@ -28,9 +21,7 @@ from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.optimise.transcription import maps_by_leg
 from brachis.problem.problem import Problem
-from brachis.trajectory import (
-    Trajectory,
-)
+from brachis.trajectory import Trajectory
 from brachis.verify import Verification, verify_trajectory
 
 PathMap = ClosedFormMap | ChartMap | JointSpaceMap
@@ -98,8 +89,7 @@ class InitialGuess(Summary):
         s = self.joint_path[:, 0]
         parts = []
         for leg in legs:
-            inside = s[(s > leg.begin) & (s < leg.end)]
-            own = np.concatenate([[leg.begin], inside, [leg.end]])
+            own = cut(s, leg.begin, leg.end)
             parts.append(interpolate_columns(own, s, self.joint_path))
         return parts
 
@@ -127,7 +117,7 @@ class InitialGuess(Summary):
 
     def with_solver(self, name: str) -> InitialGuess:
         """Return the same guess for another solver."""
-        return dataclasses.replace(self, solver=name)
+        return replace(self, solver=name)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -273,9 +263,7 @@ class Candidate(Summary):
 
     def without_programs(self) -> Candidate:
         """Return the candidate without what only the search needs."""
-        return dataclasses.replace(
-            self, start=None, program=None, target=None, to_beat=np.inf
-        )
+        return replace(self, start=None, program=None, target=None, to_beat=np.inf)
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown: what was tried and what came of it."""
@@ -378,7 +366,7 @@ def verify(
             verification = verify_trajectory(trajectory, own_limits=problem.user_limits)
     phase = refined.program.phases[0]
     tolerance = problem.task.refinement.tolerance
-    return dataclasses.replace(
+    return replace(
         candidate,
         redundant_joints=phase.joint_map.redundant_joints,
         branch=phase.joint_map.branch_label,

@@ -35,8 +35,6 @@ class Evaluator:
         As given.
     is_mean : (c,) bool ndarray
         Which of the limits' values are held as means over the motion.
-    has_means : bool
-        Whether any value is held as a mean.
     """
 
     def __init__(self, joint_map: JointMap, limits: Sequence[Limit]) -> None:
@@ -45,7 +43,6 @@ class Evaluator:
         counts = [len(limit.lower) for limit in self.limits]
         means = [limit.guarantee.is_mean for limit in self.limits]
         self.is_mean = np.repeat(np.array(means, dtype=bool), counts)
-        self.has_means = any(means)
         chain = joint_map.robot.chain
         quantities = [to_scaled_quantity(limit, chain) for limit in self.limits]
         self._groups = ValueGroups(quantities, counts)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.common.arrays import cut
 from brachis.kinematics import ChartMap, Nodes, interpolate, join_nodes
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import SolvedProgram
@@ -84,7 +85,8 @@ class _Part:
         assert path is not None
         if before is not None:
             joint_map = joint_map.along(path, before.nodes.q[-1])
-        joins = motion.times_of(_select_inside(path.breaks, motion))
+        begin, end = motion.at(np.array([0.0, motion.t_end]))[0][:, 0]
+        joins = motion.times_of(cut(path.breaks, begin, end)[1:-1])
         gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
         breaks = np.union1d(motion.breaks, joins[gaps > 1e-7 * motion.t_end])
         jumps = motion.degree < CONTINUOUS_TORQUE
@@ -125,9 +127,3 @@ def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> M
     count = 1 + max(given, *link.orders)
     curves = [curve - phase.boundary.given for curve in link.curves]
     return motion.with_start(own[:count, list(link.curves)], curves)
-
-
-def _select_inside(s: np.ndarray, motion: Motion) -> np.ndarray:
-    """Select of path coordinates, (P,), those between the ends of a motion."""
-    begin, end = motion.at(np.array([0.0, motion.t_end]))[0][:, 0]
-    return s[(s > begin) & (s < end)]

@@ -16,7 +16,7 @@ from brachis.common.arrays import interpolate_columns, spread
 from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.limits import Limit, Moments
-from brachis.optimise.bspline import clamped_knots
+from brachis.optimise.bspline import clamped_knots, locate
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
@@ -77,12 +77,10 @@ class Laid:
     outside: float = np.inf
     is_cut: bool = False
 
-    def is_better_than(self, other: Laid) -> bool:
-        """Tell whether they exceed limits on postures less, or where both keep them, are faster."""
-        keeps_to = max(self.outside, _ENOUGH), max(other.outside, _ENOUGH)
-        if keeps_to[0] == keeps_to[1]:
-            return self.needed < other.needed
-        return keeps_to[0] < keeps_to[1]
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Less for those that exceed limits on postures less, or where both keep them, are faster."""
+        return max(self.outside, _ENOUGH), self.needed
 
     @property
     def needed(self) -> float:
@@ -150,7 +148,7 @@ def follow(
         allowed = np.inf if is_last else tolerance
         laid = _hold_limits(phase, own, timing, breaks, allowed, deadline)
         laid = _look_at_postures(phase, laid)
-        if best is None or laid.is_better_than(best):
+        if best is None or laid.rank < best.rank:
             best = laid
         is_fast = laid.slower < tolerance
         is_done = is_fast and not _ENOUGH < laid.outside < _BETTER * outside
@@ -250,13 +248,8 @@ def _look_at_postures(phase: Phase, laid: Laid) -> Laid:
         state = phase.joint_map.state(*motion.at(t), t=t)
     except UnreachableError:
         return replace(laid, outside=np.inf)
-    still = Moments.at_rest(state.q)
-    beyond = [
-        limit.violation(limit.values(still)).max()
-        for limit in phase.limits
-        if limit.is_of_postures
-    ]
-    return replace(laid, outside=max(beyond, default=0.0))
+    outside = phase.posture_violation(Moments.at_rest(state.q))
+    return replace(laid, outside=outside)
 
 
 def _hold_limits(
@@ -338,8 +331,8 @@ def _between_stations(
     _raise_to(most, np.searchsorted(breaks, t_norm, side="right"), values)
     at_breaks = np.maximum(most[1:], most[:-1])
     t = timing.times / timing.t_end
-    first = (np.searchsorted(breaks, t, side="right") - 1).clip(0, len(breaks) - 2)
-    part = ((t - breaks[first]) / np.diff(breaks)[first])[:, None]
+    first, fraction = locate(breaks, t)
+    part = fraction[:, None]
     lines = (1.0 - part) * at_breaks[first] + part * at_breaks[first + 1]
     found = np.maximum(lines[1:], lines[:-1])
     station = (np.searchsorted(t, breaks, side="right") - 1).clip(0, len(found) - 1)

@@ -19,44 +19,15 @@ from functools import cached_property
 import numpy as np
 
 from brachis.common import tolerances
+from brachis.common.arrays import LastCall
 from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import (
     ORDERS,
     basis_derivatives,
     basis_functions,
     clamped_knots,
+    locate,
 )
-
-
-def interval_weights(breaks: np.ndarray, t_norm: np.ndarray, degree: int) -> np.ndarray:
-    """Weights for integrals over each knot interval, taken to be of length 1.
-
-    Parameters
-    ----------
-    breaks : (N + 1,) ndarray
-        Ends of the intervals.
-    t_norm : (K,) ndarray
-        Points, ascending, all breaks among them.
-    degree : int
-        Of the splines.
-
-    Returns
-    -------
-    (N, K) ndarray
-        ``diff(breaks) @ weights`` are the weights of the integral over all.
-    """
-    weights = np.zeros((len(breaks) - 1, len(t_norm)))
-    for row, low, high in zip(weights, breaks[:-1], breaks[1:], strict=True):
-        inside = np.flatnonzero(
-            (t_norm > low - tolerances.TIME) & (t_norm < high + tolerances.TIME)
-        )
-        # Without continuous accelerations, the values at the end belong to the next interval.
-        if degree < 3 and high < breaks[-1]:
-            inside = inside[:-1]
-        u = (t_norm[inside] - low) / (high - low)
-        kept = _spaced_places(u)
-        row[inside[kept]] = _weights(u[kept])
-    return weights
 
 
 def _spaced_places(u: np.ndarray) -> list[int]:
@@ -158,11 +129,23 @@ class FixedGrid:
 
     @cached_property
     def _interval_weights(self) -> np.ndarray:
-        return interval_weights(self.breaks, self.t_norm, self.degree)
+        """Weights, (N, K), of the collocation points in integrals over each interval, taken to be of length 1."""
+        weights = np.zeros((len(self.breaks) - 1, len(self.t_norm)))
+        ends = itertools.pairwise(self.breaks)
+        for row, (low, high) in zip(weights, ends, strict=True):
+            is_behind = self.t_norm > low - tolerances.TIME
+            inside = np.flatnonzero(is_behind & (self.t_norm < high + tolerances.TIME))
+            # Without continuous accelerations, the values at the end belong to the next interval.
+            if self.degree < 3 and high < self.breaks[-1]:
+                inside = inside[:-1]
+            u = (self.t_norm[inside] - low) / (high - low)
+            kept = _spaced_places(u)
+            row[inside[kept]] = _weights(u[kept])
+        return weights
 
     def mean_weights(self, _h: np.ndarray) -> np.ndarray:
         """Weights, (K,), of the mean over time of what is known at the collocation points."""
-        return np.asarray(np.diff(self.breaks) @ self._interval_weights)
+        return np.diff(self.breaks) @ self._interval_weights
 
     @property
     def mean_slopes(self) -> np.ndarray:
@@ -191,17 +174,14 @@ class FreeGrid(FixedGrid):
         count = len(breaks) - 1
         self.lower = np.full(count, shortest)
         self.upper = np.ones(count)
-        interval = np.searchsorted(breaks, t_norm, side="right") - 1
-        self._interval = np.clip(interval, 0, count - 1)
-        within = t_norm - breaks[self._interval]
-        self._fraction = within / np.diff(breaks)[self._interval]
+        self._interval, self._fraction = locate(breaks, t_norm)
         around = self._interval[:, None] + np.arange(1 - degree, degree)
         self._inside = (around >= 0) & (around < count)
         # Beyond the ends: an interval without length.
         self._around = np.where(self._inside, around, count)
         self.point, _ = np.nonzero(self._inside)
         self.variable = around[self._inside]
-        self._last: tuple[bytes, LocalBasis] | None = None
+        self._basis_at = LastCall(self._find_basis)
 
     def knots_at(self, h: np.ndarray) -> np.ndarray:
         """Knots for interval lengths `h`, at least the shortest each."""
@@ -221,18 +201,18 @@ class FreeGrid(FixedGrid):
 
     def basis(self, h: np.ndarray) -> LocalBasis:
         """Basis functions at the collocation points; kept until `h` changes."""
-        key = h.tobytes()
-        if self._last is None or self._last[0] != key:
-            values = basis_functions(self._lengths_around(h), self._fraction)
-            self._last = (key, LocalBasis(self._interval, values))
-        return self._last[1]
+        return self._basis_at(h)
+
+    def _find_basis(self, h: np.ndarray) -> LocalBasis:
+        values = basis_functions(self._lengths_around(h), self._fraction)
+        return LocalBasis(self._interval, values)
 
     def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
         """Differentiate splines by the 2 d - 1 lengths around each collocation point."""
         derivatives = basis_derivatives(self._lengths_around(h), self._fraction)
         points = control_points[:, self.basis(h).columns]
         slopes = np.einsum("oikw,ckw->okic", derivatives, points)
-        return np.asarray(slopes[:, self._inside])
+        return slopes[:, self._inside]
 
     def fix(self, h: np.ndarray) -> FixedGrid:
         """Return the grid with fixed knots, in normalised time."""
@@ -241,7 +221,7 @@ class FreeGrid(FixedGrid):
 
     def mean_weights(self, h: np.ndarray) -> np.ndarray:
         """Weights of the mean over time: those of every interval times its length."""
-        return np.asarray(h @ self._interval_weights)
+        return h @ self._interval_weights
 
     @property
     def mean_slopes(self) -> np.ndarray:

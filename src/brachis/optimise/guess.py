@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -90,10 +91,7 @@ def _motion_along(
         # An even drift lets the path end as far ahead of its start as it has to.
         missing = boundary.ahead - (joint_path[-1] - joint_path[0])
         joint_path = joint_path + grid[:, None] * missing
-    first, last = (
-        float(end[0].derivatives[0]) if len(end[0].derivatives) else 0.0
-        for end in (boundary.start, boundary.end)
-    )
+    first, last = boundary.rates
     total = first + last
     way = float(joint_path[-1, 0] - joint_path[0, 0])
     part = t_norm
@@ -129,9 +127,8 @@ def fit_curves(
     own = wanted[:, phase.boundary.given :]
     for spline, values in zip(phase.splines, own.T, strict=True):
         missing = values - basis @ spline.given_points(duration)
-        parts.append(
-            np.linalg.lstsq(basis @ spline.free_part.matrix(), missing, rcond=None)[0]
-        )
+        free = basis @ spline.free_part.matrix()
+        parts.append(np.linalg.lstsq(free, missing, rcond=None)[0])
     parts.append(phase.grid.lengths_of(phase.knots))
     return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
 
@@ -162,14 +159,14 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
         phase.state(x)
         return x
 
-    def scale(x: np.ndarray, factor: float) -> np.ndarray:
-        return phase.with_time_scaled(x, factor, held)
-
+    scale = partial(phase.with_time_scaled, held=held)
+    has_path = phase.joint_map.path is not None
     best = x
     least = np.inf
     while x[0] < 200.0:
-        worst = _worst_ratio(phase, x)
-        if _goes_back(phase, x):
+        worst = phase.worst_time_scaling_ratio(x)
+        # A long motion between moving ends goes backwards along the path.
+        if has_path and phase.state(x).ydot[:, 0].min() < 0.0:
             return best
         if worst <= 1.0:
             break
@@ -184,22 +181,12 @@ def _scale_time(phase: Phase, x: np.ndarray, held: tuple[int, int]) -> np.ndarra
     shorter = x
     while shorter[0] > 0.01:
         shorter = scale(shorter, 0.8)
-        if _worst_ratio(phase, shorter) > 1.0:
+        if phase.worst_time_scaling_ratio(shorter) > 1.0:
             break
         x = shorter
     return x
 
 
-def _goes_back(phase: Phase, x: np.ndarray) -> bool:
-    """Tell whether a motion goes backwards along the path, as a long one between moving ends must."""
-    is_along_path = phase.joint_map.path is not None
-    return is_along_path and bool(phase.state(x).ydot[:, 0].min() < 0.0)
-
-
 def worst_time_scaling_ratio(program: Program, x: np.ndarray) -> float:
     """Largest ratio to a limit that a longer time relieves, such as those of velocity, acceleration and torque."""
-    return max(_worst_ratio(phase, part) for phase, part in program.split(x))
-
-
-def _worst_ratio(phase: Phase, x: np.ndarray) -> float:
-    return float(np.abs(phase.time_scaling_ratios(x)).max())
+    return max(phase.worst_time_scaling_ratio(part) for phase, part in program.split(x))

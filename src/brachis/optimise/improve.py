@@ -6,10 +6,10 @@ program. `improve` tries such changes in turn, and its answer is a `SolvedProgra
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -146,15 +146,13 @@ def improve(
             break
         tried = attempt(*proposal)
         value = judge(tried)
-        gain = 1.0 - value / best if np.isfinite(best) else -np.inf
-        if not np.isfinite(best) and np.isfinite(value):
-            gain = 1.0
+        gain = 1.0 - value / best  # not a number where neither is a motion
+        reports = (*kept.reports, *tried.reports)
         was_usable = kept.usable
         if gain > least_gain or not was_usable:
-            kept = replace(tried, reports=(*kept.reports, *tried.reports))
+            kept = replace(tried, reports=reports)
             best = value
         else:
-            reports = (*kept.reports, *tried.reports)
             kept = replace(kept, reports=with_last(kept.report, reports))
         if was_usable and go_on_above is not None and not gain > go_on_above:
             break
@@ -166,24 +164,23 @@ def _objective(solved: SolvedProgram) -> float:
     return solved.report.objective if solved.usable else np.inf
 
 
-def attempt_once(solve: Solve, *, accept_early_end: bool = False) -> Attempt:
-    """Make an attempt of a single solve.
+def attempt_once(
+    solve: Solve, program: Program, x: np.ndarray, *, accept_early_end: bool = False
+) -> SolvedProgram:
+    """Attempt a single solve.
 
     Parameters
     ----------
     solve : callable
+    program : Program
+    x : (v,) ndarray
     accept_early_end : bool, optional
         Whether a solve counts that ended early with a feasible motion faster than the one it began with.
     """
-
-    def attempt(program: Program, x: np.ndarray) -> SolvedProgram:
-        """Solve once."""
-        report = solve(program, x)
-        if accept_early_end:
-            report = judge_early_end(report, program.end_time(x))
-        return SolvedProgram(program, (report,))
-
-    return attempt
+    report = solve(program, x)
+    if accept_early_end:
+        report = judge_early_end(report, program.end_time(x))
+    return SolvedProgram(program, (report,))
 
 
 _EARLY = (
@@ -224,10 +221,9 @@ def keep_feasible(solved: SolvedProgram, x: np.ndarray) -> SolvedProgram:
         return solved
     fastest = min(feasible, key=lambda own: own.objective)
     kept = replace(fastest, status=SolveStatus.ACCEPTABLE)
-    reports = (*solved.reports[:-1], kept)
     return replace(
         solved,
-        reports=reports,
+        reports=(*solved.reports[:-1], kept),
         not_completed="a solve ran out of time, and its motion may be far from the fastest",
     )
 
@@ -275,12 +271,12 @@ def _slow_down(program: Program, x: np.ndarray) -> np.ndarray:
 
 def _worst_ratio(program: Program, x: np.ndarray) -> float:
     """Largest ratio to a limit that a longer time relieves at single points, where the time is not given."""
-    ratios = [
-        np.abs(phase.time_scaling_ratios(part)).max(initial=0.0)
+    ratios = (
+        phase.worst_time_scaling_ratio(part)
         for phase, part in program.split(x)
         if phase.time_law is None
-    ]
-    return float(max(ratios, default=0.0))
+    )
+    return max(ratios, default=0.0)
 
 
 _ITERATIONS = 100
@@ -288,13 +284,12 @@ _ITERATIONS = 100
 
 _LARGE_PROGRAM = 250
 """Variables of a program over the path above which an interior-point method is as fast as others, or faster."""
-_NEAR_STEP = 0.1
-"""Factor on the first step from a motion that is nearly as fast as possible. Very many rows are near their bounds
-there, and a small subproblem takes half as long."""
-_NEAR_WIDENING = 1e-6
-"""Widening of bounds there; see `SolverOptions`."""
+_NEAR_OPTIONS: dict[str, Any] = {"first_step": 0.1, "widening": 1e-6}
+"""`SolverOptions` from a motion that is nearly as fast as possible. Very many rows are near their bounds there, and a
+small subproblem takes half as long."""
 _PROGRESS = 1e-4
-"""Gain over five iterates, as a part of the time that is not given, below which a solve with given speeds ends."""
+"""Gain over five iterates, as a part of the time that is not given, below which a solve ends where many motions are
+equally fast."""
 
 
 @dataclass(frozen=True)
@@ -347,16 +342,13 @@ class SolverSession:
         default = SolverSettings.model_fields["max_iterations"].default
         if settings.name == "auto" and iterations == default:
             iterations = _ITERATIONS * max(joint_map.r, 1)
-        options = SolverOptions(settings.tolerance, iterations, settings.time_limit)
-        if isinstance(joint_map, ChartMap):
-            options = dataclasses.replace(options, progress=1e-4, patience=5)
-        if has_time_law and joint_map.r:
-            options = dataclasses.replace(options, progress=_PROGRESS, patience=5)
-        options = dataclasses.replace(options, apart=has_time_law)
+        limits = (settings.tolerance, iterations, settings.time_limit)
+        options = SolverOptions(*limits, apart=has_time_law)
+        if isinstance(joint_map, ChartMap) or (has_time_law and joint_map.r):
+            options = replace(options, progress=_PROGRESS, patience=5)
 
         def progress(iteration: int, objective: float) -> None:
-            text = f"iteration {iteration}, t_E = {objective:.4f} s"
-            listener(Iteration(text))
+            listener(Iteration(f"iteration {iteration}, t_E = {objective:.4f} s"))
 
         for_large = solver_for_large(settings.name)
         return cls(backend, options, deadline, progress, for_large=for_large)
@@ -367,13 +359,13 @@ class SolverSession:
         Of iterations and time the task may only allow less. Their tolerance is no matter of the task's.
         """
         task = self.options
-        own = dataclasses.replace(
+        own = replace(
             options,
             max_iterations=min(options.max_iterations, task.max_iterations),
             time_limit=min(options.time_limit, task.time_limit),
             apart=task.apart,
         )
-        return dataclasses.replace(self, options=own, acceptable=1e-2)
+        return replace(self, options=own, acceptable=1e-2)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,), or from a slightly slower motion that is within the limits.
@@ -395,20 +387,19 @@ class SolverSession:
         ) -> SolverReport:
             """Solve in the time that is left."""
             nonlocal learnt
-            is_near = isinstance(problem, NearRows)
-            options = dataclasses.replace(
+            own = _NEAR_OPTIONS if isinstance(problem, NearRows) else {}
+            options = replace(
                 self.options,
                 time_limit=until.left,
                 progress=progress,
-                first_step=_NEAR_STEP if is_near else self.options.first_step,
-                widening=_NEAR_WIDENING if is_near else self.options.widening,
                 learnt=learnt,
+                **own,
             )
             report = backend.solve(problem, x, options, self.progress)
             if report.learnt is not None:
                 learnt = report.learnt
             self._last[:] = [report]
-            return dataclasses.replace(report, learnt=None)  # results stay small
+            return replace(report, learnt=None)  # results stay small
 
         is_large = isinstance(program, PathProgram) and len(x) > _LARGE_PROGRAM
         if is_large and self.for_large not in (None, self.backend):
@@ -424,8 +415,7 @@ class SolverSession:
             solve(problem, x) if is_interior else solve_near_rows(problem, x, solve)
         )
         if self.pull > 0.0:
-            objective = objective_at(program, report.x)
-            report = dataclasses.replace(report, objective=objective)
+            report = replace(report, objective=objective_at(program, report.x))
         if report.status.usable or report.violation > self.acceptable:
             return report
-        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)
+        return replace(report, status=SolveStatus.ACCEPTABLE)

@@ -30,6 +30,7 @@ from brachis.optimise.boundary import (
     BoundarySpline,
     FreePart,
     SparsityPattern,
+    stack_splines,
     sum_powers,
 )
 from brachis.optimise.grid import FixedGrid
@@ -46,51 +47,46 @@ class Progress:
     ----------
     given : (1 + k, p) ndarray
         Given terms of the rows, by powers of the duration.
-    row, variable : (z,) int ndarray
-        Entries of the Jacobian, each place once; variables of the phase, the duration among them.
-    weight : (z,) ndarray
-        The entries; 0 for the duration.
+    part : FreePart
+        What variables of the phase add to the rows, each place once; the duration, variable 0, adds nothing.
     """
 
     given: np.ndarray
-    row: np.ndarray
-    variable: np.ndarray
-    weight: np.ndarray
+    part: FreePart
 
     @classmethod
     def none(cls) -> Progress:
         """Make no rows."""
-        nothing = np.empty(0, dtype=int)
-        return cls(np.empty((1, 0)), nothing, nothing, np.empty(0))
+        return cls(np.empty((1, 0)), FreePart.of(np.empty((0, 1))))
 
     @classmethod
     def of(cls, spline: BoundarySpline) -> Progress:
         """Take the differences of a spline whose free variables follow the duration, variable 0."""
         given = np.diff(spline.given, axis=1)
-        depends = np.any(given[1:] != 0.0, axis=0)
         row, variable, weight = _differences(spline.free_part)
-        several = np.bincount(row, minlength=len(depends)) + depends > 1
-        several |= np.any(given[2:] != 0.0, axis=0)
-        number = np.cumsum(several) - 1
-        chosen = several[row]
-        by_duration = np.flatnonzero(depends[several])
-        row = np.concatenate([by_duration, number[row[chosen]]])
+        by_duration = np.flatnonzero(given[1:].any(axis=0))
         none = np.zeros_like(by_duration)
-        variable = np.concatenate([none, 1 + variable[chosen]])
-        weight = np.concatenate([none, weight[chosen]])
+        row = np.concatenate([by_duration, row])
+        variable = np.concatenate([none, 1 + variable])
+        weight = np.concatenate([none, weight])
+        several = np.bincount(row, minlength=given.shape[1]) > 1
+        several |= given[2:].any(axis=0)
         order = np.lexsort((variable, row))
-        return cls(given[:, several], row[order], variable[order], weight[order])
+        order = order[several[row[order]]]
+        number = np.cumsum(several) - 1
+        shape = (int(several.sum()), 1 + spline.free)
+        part = FreePart(number[row[order]], variable[order], weight[order], shape)
+        return cls(given[:, several], part)
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (p,)."""
-        terms = self.weight * x[self.variable]
-        parts = np.bincount(self.row, terms, self.given.shape[1])
-        return sum_powers(self.given, x[0]) + parts
+        return sum_powers(self.given, x[0]) + self.part.control_points(x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian, (z,)."""
         by_duration = sum_powers(self.given, x[0], slope=True)
-        return np.where(self.variable == 0, by_duration[self.row], self.weight)
+        part = self.part
+        return np.where(part.variable == 0, by_duration[part.point], part.weight)
 
 
 def _differences(part: FreePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -100,18 +96,25 @@ def _differences(part: FreePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     column = np.tile(part.variable, 2)
     weight = np.concatenate([part.weight, -part.weight])
     inside = (row >= 0) & (row < rows - 1)
-    places, place = np.unique(
-        row[inside] * columns + column[inside], return_inverse=True
-    )
+    numbers = row[inside] * columns + column[inside]
+    places, place = np.unique(numbers, return_inverse=True)
     values = np.bincount(place, weight[inside], len(places))
     kept = values != 0.0
     row, column = np.divmod(places[kept], max(columns, 1))
     return row, column, values[kept]
 
 
-@dataclass(frozen=True, eq=False)
 class VariableLayout:
     """Places of the variables in x, and the collocation points at which they matter; see the module.
+
+    Parameters
+    ----------
+    grid : FixedGrid
+    boundary : Boundary
+    has_path : bool
+        Whether the first spline is s; with a time law the duration is given, and none of the splines is s.
+    splines : tuple of BoundarySpline, optional
+        Those of another grid with the same knots.
 
     Attributes
     ----------
@@ -121,155 +124,114 @@ class VariableLayout:
         Variables of each curve.
     lengths : slice
         Variables h; empty where the knots are fixed.
-    patterns : tuple of SparsityPattern
-        Where the variables of each curve matter.
+    free_part : FreePart
+        Of all curves, by all variables; see `stack_splines`.
+    given : (1 + p, c (N + d)) ndarray
+        Given terms of all control points, by powers of the duration.
+    sparsity : SparsityPattern
+        Where the variables of the curves matter.
     point, variable : (z,) int ndarray
         Where variables matter at all, by T, by each curve, then by h.
-    curve : (z',) int ndarray
-        Number of the curve of each entry between those of T and h.
     pattern : CurvePattern
-        Point and curve of each.
+        Point and curve of each entry between those of T and h.
     progress : Progress
         Differences of control points of s; empty without a path.
     x_lower, x_upper : (v,) ndarray
     """
 
-    splines: tuple[BoundarySpline, ...]
-    slices: tuple[slice, ...]
-    lengths: slice
-    patterns: tuple[SparsityPattern, ...]
-    point: np.ndarray
-    variable: np.ndarray
-    curve: np.ndarray
-    pattern: CurvePattern
-    progress: Progress
-    x_lower: np.ndarray
-    x_upper: np.ndarray
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         grid: FixedGrid,
         boundary: Boundary,
         *,
         has_path: bool,
         splines: tuple[BoundarySpline, ...] | None = None,
-    ) -> VariableLayout:
-        """Lay the variables of splines over a grid out; the first spline is s where there is a path.
-
-        With a time law the duration is given, and none of the splines is s. Splines may be those of another grid with
-        the same knots.
-        """
+    ) -> None:
         splines = splines or boundary.splines(grid.knots, grid.degree)
-        time_law = boundary.time_law
+        self.splines = splines
         ends = np.cumsum([1, *(spline.free for spline in splines)]).tolist()
-        slices = tuple(itertools.starmap(slice, itertools.pairwise(ends)))
-        lengths = slice(ends[-1], ends[-1] + len(grid.lower))
-        x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
-        x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
-        x_lower[0] = SHORTEST_TIME
-        progress = Progress.none()
+        self.slices = tuple(itertools.starmap(slice, itertools.pairwise(ends)))
+        self.lengths = slice(ends[-1], ends[-1] + len(grid.lower))
+        self.x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
+        self.x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
+        self.x_lower[0] = SHORTEST_TIME
+        self.progress = Progress.none()
+        time_law = boundary.time_law
         if time_law is not None:
-            x_lower[0] = time_law.duration
-            x_upper[0] = time_law.duration
+            self.x_lower[0] = time_law.duration
+            self.x_upper[0] = time_law.duration
         elif has_path:
-            progress = Progress.of(splines[0])
-            if not splines[0].given[1:].any():
-                x_lower[slices[0]] = splines[0].given[0].min()
-                x_upper[slices[0]] = splines[0].given[0].max()
+            self.progress = Progress.of(splines[0])
+            given, *others = splines[0].given
+            if not np.any(others):
+                self.x_lower[self.slices[0]] = given.min()
+                self.x_upper[self.slices[0]] = given.max()
 
+        points = len(grid.breaks) - 1 + grid.degree
+        stacked = stack_splines(splines, self.slices, points, len(self.x_lower))
+        self.free_part, self.given = stacked
         columns = grid.basis(grid.lengths_of(grid.knots)).columns
-        patterns = tuple(SparsityPattern.of(columns, spline) for spline in splines)
+        own = SparsityPattern(columns, self.free_part, len(splines))
+        self.sparsity = own
         count = len(grid.t_norm)
-        of_curves = [
-            pattern.variable + own.start
-            for pattern, own in zip(patterns, slices, strict=True)
-        ]
-        points = [np.arange(count), *(pattern.point for pattern in patterns)]
-        point = np.concatenate([*points, grid.point])
         of_time = np.zeros(count, dtype=int)
-        of_lengths = grid.variable + lengths.start
-        numbers = np.arange(len(splines)) + int(time_law is not None)
-        width = len(splines) + int(time_law is not None)
-        curve = np.repeat(numbers, [len(pattern.point) for pattern in patterns])
-        return cls(
-            splines=splines,
-            slices=slices,
-            lengths=lengths,
-            patterns=patterns,
-            point=point,
-            variable=np.concatenate([of_time, *of_curves, of_lengths]),
-            curve=curve,
-            pattern=CurvePattern(
-                point[count : count + len(curve)], curve, count, width
-            ),
-            progress=progress,
-            x_lower=x_lower,
-            x_upper=x_upper,
-        )
+        of_lengths = grid.variable + self.lengths.start
+        self.point = np.concatenate([np.arange(count), own.point, grid.point])
+        self.variable = np.concatenate([of_time, own.variable, of_lengths])
+        curve = boundary.given + own.curve
+        width = boundary.given + len(splines)
+        self.pattern = CurvePattern(own.point, curve, count, width)
 
 
-@dataclass(frozen=True, eq=False)
 class RowLayout:
     """Where rows and entries of the Jacobian stand; see the module.
 
+    Parameters
+    ----------
+    limits : sequence of Limit
+    grid : FixedGrid
+    variables : VariableLayout
+
     Attributes
     ----------
-    of_limits : tuple of (K, c) int ndarray
+    of_limits : list of (K, c) int ndarray
         Numbers of the rows of each limit; none, (0, c), where its means are held.
     lower, upper : (c,) ndarray
         Bounds of the rows.
-    variables : VariableLayout
     """
 
-    of_limits: tuple[np.ndarray, ...]
-    lower: np.ndarray
-    upper: np.ndarray
-    variables: VariableLayout
-
-    @classmethod
-    def of(
-        cls, limits: Sequence[Limit], grid: FixedGrid, variables: VariableLayout
-    ) -> RowLayout:
-        """Give every row of the limits its number."""
-        count = len(grid.t_norm)
-        of_limits = []
+    def __init__(
+        self, limits: Sequence[Limit], grid: FixedGrid, variables: VariableLayout
+    ) -> None:
+        self._variables = variables
+        self.of_limits = []
+        lower = []
+        upper = []
         first = 0
         for limit in limits:
-            times = 0 if limit.guarantee.is_mean else count
-            size = times * len(limit.lower)
-            shape = (times, len(limit.lower))
-            of_limits.append(np.arange(first, first + size).reshape(shape))
-            first += size
-        pairs = list(zip(limits, of_limits, strict=True))
-        lower = [np.tile(limit.lower, len(rows)) for limit, rows in pairs]
-        upper = [np.tile(limit.upper, len(rows)) for limit, rows in pairs]
+            times = 0 if limit.guarantee.is_mean else len(grid.t_norm)
+            lower.append(np.tile(limit.lower, times))
+            upper.append(np.tile(limit.upper, times))
+            rows = first + np.arange(len(lower[-1]))
+            self.of_limits.append(rows.reshape(times, len(limit.lower)))
+            first += len(rows)
         steps = variables.progress.given.shape[1]
-        return cls(
-            of_limits=tuple(of_limits),
-            lower=np.concatenate([*lower, np.zeros(steps), grid.total]),
-            upper=np.concatenate([*upper, np.full(steps, np.inf), grid.total]),
-            variables=variables,
-        )
+        self.lower = np.concatenate([*lower, np.zeros(steps), grid.total])
+        self.upper = np.concatenate([*upper, np.full(steps, np.inf), grid.total])
 
     @cached_property
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of the entries of the Jacobian, (nnz,) each; each place occurs once."""
-        variables = self.variables
+        variables = self._variables
         progress = variables.progress
         count, _ = variables.pattern.shape
         at_points = [rows for rows in self.of_limits if len(rows)]
         pointwise = np.hstack([np.empty((count, 0), dtype=int), *at_points])
         h = np.arange(variables.lengths.start, variables.lengths.stop)
         first = pointwise.size
-        rows = [
-            pointwise[variables.point].ravel(),
-            first + progress.row,
-            np.full(len(h), first + progress.given.shape[1]),
-        ]
-        columns = [
-            np.repeat(variables.variable, pointwise.shape[1]),
-            progress.variable,
-            h,
-        ]
+        last = first + progress.given.shape[1]
+        of_points = pointwise[variables.point].ravel()
+        by_points = np.repeat(variables.variable, pointwise.shape[1])
+        rows = (of_points, first + progress.part.point, np.full(len(h), last))
+        columns = (by_points, progress.part.variable, h)
         return np.concatenate(rows), np.concatenate(columns)

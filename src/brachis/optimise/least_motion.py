@@ -12,8 +12,7 @@ stays. The multipliers that bottlenecks are found by are those of the fastest on
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +47,15 @@ _MANY = 200
 is as fast is then looked for."""
 _FOR_MANY = "ipopt"
 """Backend for more variables, where the motion may be slower."""
+_OPTIONS = SolverOptions(
+    tolerance=1e-6,
+    max_iterations=60,
+    time_limit=np.inf,
+    progress=1e-2,  # near enough will do
+    patience=5,
+    anywhere=True,
+)
+"""Bounds on a solve."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -144,26 +152,20 @@ def _solve(fastest: Candidate, deadline: Deadline, listener: Listener) -> LeastM
     )
     if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
         return _keep(fastest, too_similar, (first,))
-    settings = task.refinement
-    options = RefinementOptions(
-        settings.tolerance,
-        settings.density,
-        settings.max_rounds,
-        soon,
-        before.t_end * (1.0 + slower),
-    )
+    latest = before.t_end * (1.0 + slower)
+    options = RefinementOptions.of(task.refinement, soon, latest)
     # Rounds of refinement begin near enough, and end sooner.
-    solve = dataclasses.replace(solve, options=_make_options(patience=2))
+    solve = replace(solve, options=replace(_OPTIONS, patience=2))
     found = refine_and_verify(fastest, program, (first,), solve, options)
-    if found.trajectory is None or found.refined is None or not found.verified:
+    if not found.verified:
         status = "the fastest motion is kept: a smoother one was not verified"
         return _keep(fastest, status, found.reports)
+    assert found.refined and found.trajectory and found.verification
     reduction = float(1.0 - np.sqrt(program.objective(found.refined.x)))
     if reduction < _WORTH_IT:
         return _keep(fastest, too_similar, found.reports)
     later = found.t_end / fastest.t_end - 1.0
     status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
-    assert found.verification is not None
     return LeastMotion(
         found.trajectory, found.verification, reduction, later, status, found.reports
     )
@@ -198,9 +200,8 @@ def least_acceleration(
     """
     robot = program.phases[0].joint_map.robot
     states = program.states(x)
-    by_acceleration, weights = reciprocals_near(
-        robot, program.limits, states[0].q[len(states[0].q) // 2]
-    )
+    middle = states[0].q[len(states[0].q) // 2]
+    by_acceleration, weights = reciprocals_near(robot, program.limits, middle)
     speeds = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0)
     units = np.array(robot.position_units)
     for unit in set(robot.position_units):
@@ -208,22 +209,9 @@ def least_acceleration(
         if speeds[own].any():
             weights[own] = 1.0 / speeds[own].max()
     longest = np.array([part[0] for _, part in program.split(x)]) * (1.0 + slower)
-    size = program.with_objective(LeastAcceleration(weights, longest)).objective(x)
-    return LeastAcceleration(
-        weights / np.sqrt(size) if size > 0.0 else weights, longest
-    )
-
-
-def _make_options(patience: int) -> SolverOptions:
-    """Return the bounds on a solve; `patience` is the number of iterates without gain after which it ends."""
-    return SolverOptions(
-        tolerance=1e-6,
-        max_iterations=60,
-        time_limit=np.inf,
-        progress=1e-2,  # near enough will do
-        patience=patience,
-        anywhere=True,
-    )
+    objective = LeastAcceleration(weights, longest)
+    size = program.with_objective(objective).objective(x)
+    return replace(objective, weights=weights / np.sqrt(size or 1.0))
 
 
 def _session(name: str, deadline: Deadline, listener: Listener) -> SolverSession:
@@ -232,8 +220,7 @@ def _session(name: str, deadline: Deadline, listener: Listener) -> SolverSession
 
     def progress(iteration: int, objective: float) -> None:
         rms = 100.0 * objective**0.5
-        text = f"iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
-        listener(Iteration(f"least motion: {text}"))
+        text = f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
+        listener(Iteration(text))
 
-    options = _make_options(patience=5)
-    return SolverSession(backend, options, deadline, progress, acceptable=FEASIBLE)
+    return SolverSession(backend, _OPTIONS, deadline, progress, acceptable=FEASIBLE)

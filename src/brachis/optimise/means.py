@@ -57,7 +57,7 @@ class Means:
             sums.append(x[0] * _means_of(phase, x))
             if phase.pause:
                 sums.append(phase.pause * self._values_at_rest(phase, x))
-        return np.asarray(sum(sums) / _end_time(parts))
+        return sum(sums) / _end_time(parts)
 
     def slopes(self, parts: Parts) -> np.ndarray:
         """Slopes of the values by all variables, (m, v)."""
@@ -116,7 +116,7 @@ def _end_time(parts: Parts) -> float:
 def _means_of(phase: Phase, x: np.ndarray) -> np.ndarray:
     """Means over one phase, (m,)."""
     values = phase.evaluate(x).values[:, phase.evaluator.is_mean]
-    return np.asarray(phase.mean_weights(x) @ values)
+    return phase.mean_weights(x) @ values
 
 
 def _mean_slopes_of(phase: Phase, x: np.ndarray) -> np.ndarray:
@@ -142,7 +142,5 @@ def _curvature_of(phase: Phase, x: np.ndarray, weights: np.ndarray) -> np.ndarra
 def _by_posture(partials: Partials, q: np.ndarray) -> np.ndarray:
     """Slopes of a limit at rest by the posture, (c, n); zero where it does not depend on it."""
     if partials.q is None:
-        parts = (partials.qdot, partials.qddot, partials.qdddot)
-        other = next(part for part in parts if part is not None)
-        return np.zeros((other.shape[1], q.shape[1]))
-    return np.asarray(partials.q[0])
+        return np.zeros((partials.size, q.shape[1]))
+    return partials.q[0]

@@ -14,8 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from brachis.common import tolerances
 from brachis.common.arrays import spread
@@ -23,7 +25,6 @@ from brachis.common.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.improve import (
-    Change,
     Solve,
     SolvedProgram,
     attempt_once,
@@ -56,10 +57,7 @@ def coarsest(program: Program) -> Program:
 
 
 def solve_by_levels(
-    target: Program,
-    coarse: SolvedProgram,
-    solve: Solve,
-    deadline: Deadline = NEVER,
+    target: Program, coarse: SolvedProgram, solve: Solve, deadline: Deadline = NEVER
 ) -> SolvedProgram:
     """Solve a program from the answer of its coarsest one, level by level.
 
@@ -79,25 +77,19 @@ def solve_by_levels(
         Over the target's knots; over those of the last level that was solved, where one could not be.
     """
 
-    def change_to(level: Program) -> Change:
-        """Return the change to the knots of a level."""
+    def change_to(level: Program, solved: SolvedProgram) -> tuple[Program, np.ndarray]:
+        """Write a motion over the knots of a level."""
+        pairs = zip(solved.program.phases, level.phases, strict=True)
+        # The solved program may have another branch margin.
+        phases = [own.with_knots(fine.knots, fine.t_norm) for own, fine in pairs]
+        return _transfer(solved, phases)
 
-        def change(solved: SolvedProgram) -> tuple[Program, np.ndarray]:
-            """Write a motion over these knots."""
-            pairs = zip(solved.program.phases, level.phases, strict=True)
-            # The solved program may have another branch margin.
-            phases = [own.with_knots(fine.knots, fine.t_norm) for own, fine in pairs]
-            return _transfer(solved, phases)
-
-        return change
-
-    levels = _levels(target)
     finer = (
-        change_to(level)
-        for level in levels
+        partial(change_to, level)
+        for level in _levels(target)
         if level.intervals > coarse.program.intervals
     )
-    attempt = attempt_once(solve, accept_early_end=True)
+    attempt = partial(attempt_once, solve, accept_early_end=True)
     reached = improve(coarse, finer, attempt, deadline=deadline)
     intervals = reached.program.intervals
     if intervals == target.intervals:
@@ -198,7 +190,7 @@ def refine_mesh(
             return _COARSER
         return None if finer.variables == program.variables else (finer, x)
 
-    attempt = attempt_once(solve, accept_early_end=True)
+    attempt = partial(attempt_once, solve, accept_early_end=True)
     return improve(solved, [halve] * 20, attempt)
 
 
@@ -211,15 +203,14 @@ def _choose_intervals(
         losses = [_loss(*pair) for pair in solved.program.split(x)]
     except UnreachableError:  # between the collocation points
         return allowed
-    pairs = zip(losses, allowed, strict=True)
-    lost = np.concatenate([loss * mask for loss, mask in pairs])
+    mask = np.concatenate(allowed)
+    lost = np.concatenate(losses) * mask
     order = np.argsort(-lost, kind="stable")
     most = np.searchsorted(np.cumsum(lost[order]), 0.6 * lost.sum()) + 1
     chosen = np.zeros(len(lost), dtype=bool)
     chosen[order[:most]] = True
-    ends = np.cumsum([len(loss) for loss in losses])
-    parts = np.split(chosen, ends[:-1])
-    return [part & mask for part, mask in zip(parts, allowed, strict=True)]
+    ends = np.cumsum([len(own) for own in allowed])
+    return np.split(chosen & mask, ends[:-1])
 
 
 def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
@@ -234,9 +225,9 @@ def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
     dense = phase.with_points(spread(breaks, samples))
     ratios = np.abs(dense.time_scaling_ratios(x))
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :]
-    windows = np.lib.stride_tricks.sliding_window_view(slack, samples + 1, axis=0)
+    windows = sliding_window_view(slack, samples + 1, axis=0)
     swing = np.ptp(windows[::samples], axis=2).sum(axis=1)
-    return np.asarray(swing * np.diff(breaks) * x[0])
+    return swing * np.diff(breaks) * x[0]
 
 
 def _halve(phase: Phase, chosen: np.ndarray, points: int) -> Phase:
@@ -253,10 +244,7 @@ _BEYOND_LIMITS = 1e9
 
 
 def optimise_knots(
-    solved: SolvedProgram,
-    solve: Solve,
-    shortest: float,
-    refinement: RefinementOptions,
+    solved: SolvedProgram, solve: Solve, shortest: float, refinement: RefinementOptions
 ) -> SolvedProgram:
     """Optimise the interval lengths of a solved program together with the motion.
 
@@ -354,13 +342,11 @@ def adapt_mesh(
     nested = SolvedProgram(solved.program, (solved.report,))
     if target is not None:
         nested = solve_by_levels(target, nested, solve, refinement.deadline)
-    last = SolvedProgram(nested.program, (nested.report,))
+    adapted = SolvedProgram(nested.program, (nested.report,))
     if spline.knots == "free":
-        adapted = optimise_knots(last, solve, spline.shortest_interval, refinement)
+        adapted = optimise_knots(adapted, solve, spline.shortest_interval, refinement)
     elif spline.intervals == "auto":
-        adapted = refine_mesh(last, solve, spline, refinement.deadline)
-    else:
-        adapted = last
+        adapted = refine_mesh(adapted, solve, spline, refinement.deadline)
     messages = filter(None, (nested.not_completed, adapted.not_completed))
     return SolvedProgram(
         adapted.program,

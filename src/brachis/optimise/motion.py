@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import bisect, spread
+from brachis.common.arrays import bisect, drop_near, spread
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
 from brachis.optimise.boundary import LocalBasis, greville
@@ -32,7 +32,7 @@ def sample_law(time_law: TimeLaw, t_norm: np.ndarray) -> np.ndarray:
     duration = time_law.duration
     orders = time_law.at(t_norm * duration)
     scale = duration ** np.arange(ORDERS)
-    return np.asarray((orders * scale[:, None])[:, :, None])
+    return (orders * scale[:, None])[:, :, None]
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,36 +107,31 @@ class Motion(Summary):
         UnreachableError
             The time law bends too sharply for splines.
         """
-        if self.time_law is None:
+        law = self.time_law
+        if law is None:
             return PhaseSpline(self.t_end, self.knots, self.degree, self.control_points)
-        own = self.time_law.spline.t / self.t_end
+        from scipy.interpolate import make_interp_spline
+
+        own = law.spline.t / self.t_end
         breaks = np.union1d(np.unique(self.knots), np.clip(own, 0.0, 1.0))
-        breaks = breaks[np.append(np.diff(breaks) > tolerances.PATH, True)]
+        breaks = drop_near(breaks, tolerances.PATH)
         for _ in range(12):
             knots = clamped_knots(self.degree, breaks)
-            points = self._interpolate_law(knots)
+            places = greville(knots, self.degree)
+            s = law.at(places * self.t_end)[0]
+            points = make_interp_spline(places, s, k=self.degree, t=knots).c
             t_norm = spread(breaks, _LOOKS)
             basis = LocalBasis.of(knots, self.degree, t_norm)
             found = basis.curves(points[None])[0, :, 0]
-            miss = np.abs(found - self.time_law.at(t_norm * self.t_end)[0])
+            miss = np.abs(found - law.at(t_norm * self.t_end)[0])
             worst = miss[:-1].reshape(-1, _LOOKS).max(axis=1)
             if worst.max() < _S_MISS:
-                finer = (self.control_points, self.knots, knots, self.degree)
-                both = np.vstack([points, insert_knots(*finer)])
+                others = self.with_knots(knots).control_points
+                both = np.vstack([points, others])
                 return PhaseSpline(self.t_end, knots, self.degree, both)
             middles = 0.5 * (breaks[:-1] + breaks[1:])
             breaks = np.union1d(breaks, middles[worst >= _S_MISS])
         raise UnreachableError("the given speed changes too sharply for splines")
-
-    def _interpolate_law(self, knots: np.ndarray) -> np.ndarray:
-        """Control points, (N + d,), of s from the time law, over clamped knots."""
-        from scipy.interpolate import make_interp_spline
-
-        assert self.time_law is not None
-        places = greville(knots, self.degree)
-        s = self.time_law.at(places * self.t_end)[0]
-        spline = make_interp_spline(places, s, k=self.degree, t=knots)
-        return np.asarray(spline.c)
 
     def times_of(self, s: np.ndarray) -> np.ndarray:
         """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from brachis.errors import UnreachableError
 from brachis.optimise.backends import (
     FEASIBLE,
     Curvature,
@@ -21,6 +20,7 @@ from brachis.optimise.backends import (
     SolveStatus,
     residual,
 )
+from brachis.optimise.backends.monitor import row_slack
 
 _NEAR = 0.2
 """Distance from its bound up to which a row is near, as a part of the limit."""
@@ -66,14 +66,8 @@ class NearRows:
         self.upper = program.upper[kept]
         self.jacobian_rows = np.searchsorted(kept, program.jacobian_rows[self._entries])
         self.jacobian_columns = program.jacobian_columns[self._entries]
-
-    def objective(self, x: np.ndarray) -> float:
-        """Objective of the program."""
-        return self._program.objective(x)
-
-    def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Gradient of the objective."""
-        return self._program.gradient(x)
+        self.objective = program.objective
+        self.gradient = program.gradient
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows that are left."""
@@ -119,22 +113,20 @@ def solve_near_rows(
     SolverReport
         Of the program with all its rows.
     """
-    slack = _slack(program, x)
-    holding = np.count_nonzero(slack < _AT_BOUND)
+    slack = row_slack(program, x)
     if slack.min() < -_FIRST_VIOLATION:
         return solve(program, x)
     is_curved = program.curvature(x) is not None
     needed = _ROWS_IF_CURVED if is_curved else _ROWS_A_VARIABLE
-    if holding < needed * len(x):
-        return solve(program, x)
+    holding = np.count_nonzero(slack < _AT_BOUND)
     kept = np.flatnonzero(slack <= max(_NEAR, np.quantile(slack, _LEAST_KEPT)))
-    if len(kept) > _MOST_KEPT * len(slack):
+    if holding < needed * len(x) or len(kept) > _MOST_KEPT * len(slack):
         return solve(program, x)
     reports: list[SolverReport] = []
     for _ in range(_ROUNDS):
         report = solve(NearRows(program, kept), x)
         reports.append(report)
-        slack = _slack(program, report.x)
+        slack = row_slack(program, report.x)
         missing = np.setdiff1d(np.flatnonzero(slack < -FEASIBLE), kept)
         # With all rows the solve would use up time and iterations too.
         is_over = report.status in _FINAL
@@ -145,17 +137,6 @@ def solve_near_rows(
         kept = np.union1d(kept, np.flatnonzero(slack < _NEAR))
         x = report.x
     return _complete(program, np.arange(len(slack)), [*reports, solve(program, x)])
-
-
-def _slack(program: Problem, x: np.ndarray) -> np.ndarray:
-    """Distances of all rows from their nearer bound, (c,); negative beyond it, minus infinity where x has no rows."""
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            rows = program.rows(x)
-    except UnreachableError:
-        return np.full(len(program.lower), -np.inf)
-    slack = np.minimum(rows - program.lower, program.upper - rows)
-    return np.nan_to_num(slack, nan=-np.inf)
 
 
 def _complete(

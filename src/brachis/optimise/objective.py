@@ -31,19 +31,15 @@ class Objective(Protocol):
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
         """Share of a phase at its variables x, (v,)."""
-        ...
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Gradient of the share, (v,)."""
-        ...
 
     def is_curved(self, phase: Phase) -> bool:
         """Tell whether the share contains a sum of squares."""
-        ...
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Gauss-Newton part of the share's Hessian, (v, v)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -66,15 +62,14 @@ class EndTime:
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Gradient of the value, (v,)."""
-        if phase.time_law is None:
-            unit = np.zeros(len(x))
-            unit[0] = 1.0
-            return unit
-        slopes = 2.0 * _CALM * _shares(phase)[:, None] * phase.state(x).yddot
-        slopes[:, 0] = 0.0
-        zero = np.zeros_like(slopes)[:, None]
-        gradient = phase.gradient_by_curves(np.stack([zero, zero, slopes[:, None]]), x)
-        gradient[0] = 1.0  # the duration does not change
+        gradient = np.zeros(len(x))
+        if phase.time_law is not None:
+            yddot = phase.state(x).yddot[:, None]
+            slopes = np.zeros((3, *yddot.shape))
+            slopes[2] = 2.0 * _CALM * _shares(phase)[:, None, None] * yddot
+            slopes[2, :, :, 0] = 0.0
+            gradient = phase.gradient_by_curves(slopes, x)
+        gradient[0] = 1.0  # a duration that is given does not change
         return gradient
 
     def is_curved(self, phase: Phase) -> bool:
@@ -87,7 +82,8 @@ class EndTime:
         by_curves = np.zeros((3, points, curves - 1, curves))
         by_curves[2, :, :, 1:] = np.eye(curves - 1)
         slopes = phase.slopes_by_variables(by_curves, x)
-        hessian = phase.sum_outer_products(slopes, 2.0 * _CALM * _shares(phase))
+        shares = _shares(phase)[:, None]
+        hessian = phase.sum_outer_products(slopes, 2.0 * _CALM * shares)
         hessian[0] = 0.0  # the duration does not change
         hessian[:, 0] = 0.0
         return hessian
@@ -127,10 +123,11 @@ class LeastAcceleration:
         by_joints = np.tile(np.diag(self.weights), (len(phase.t_norm), 1, 1))
         by_curves = phase.evaluate(x).chain(Partials(qddot=by_joints))
         slopes = phase.slopes_by_variables(by_curves, x)
-        return phase.sum_outer_products(slopes, 2.0 * _shares(phase))
+        shares = _shares(phase)[:, None]
+        return phase.sum_outer_products(slopes, 2.0 * shares)
 
 
 def _shares(phase: Phase) -> np.ndarray:
     """Weights of the trapezoidal rule at the collocation points, (K,)."""
     gaps = np.concatenate([[0.0], np.diff(phase.t_norm), [0.0]])
-    return np.asarray(0.5 * (gaps[:-1] + gaps[1:]))
+    return 0.5 * (gaps[:-1] + gaps[1:])

@@ -15,21 +15,22 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import spread
+from brachis.common.arrays import LastCall, cut, spread
 from brachis.errors import UnreachableError
 from brachis.kernel import CurvePattern, VariableSlopes
 from brachis.limits import Limit, Moments
 from brachis.optimise.boundary import LocalBasis
-from brachis.optimise.bspline import basis_matrix, clamped_knots
+from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
-from brachis.optimise.program import Link, is_safeguard
+from brachis.optimise.program import Link, smallest_slack
 from brachis.path.time_law import TimeLaw
 from brachis.timing import Course, TimedCourse
 
@@ -64,10 +65,7 @@ _Evaluated = tuple[tuple[np.ndarray, ...], Evaluation]
 
 def violation_of_postures(phase: Phase, curves: np.ndarray) -> float:
     """Return the largest violation of a limit on postures along curves, (S, c)."""
-    motion = _moments_along(phase, curves)
-    of_postures = [limit for limit in phase.limits if limit.is_of_postures]
-    found = [limit.violation(limit.values(motion)).max() for limit in of_postures]
-    return float(max(found, default=0.0))
+    return phase.posture_violation(_moments_along(phase, curves))
 
 
 def _moments_along(phase: Phase, curves: np.ndarray) -> Moments:
@@ -75,8 +73,7 @@ def _moments_along(phase: Phase, curves: np.ndarray) -> Moments:
     q = phase.joint_map.postures(curves)
     if not np.isfinite(q).all():
         raise UnreachableError("the joint path leaves the joint map")
-    still = np.zeros_like(q)
-    return Moments(q, still, still, still, curves[:, 0])
+    return replace(Moments.at_rest(q), s=curves[:, 0])
 
 
 class PathPhase:
@@ -98,7 +95,7 @@ class PathPhase:
     curves_count : int
         Number of redundant curves.
     breaks : (M + 1,) ndarray
-        Ends of the intervals of the splines, as parts of the way.
+        Ends of the intervals of the splines, path coordinates.
     ends : tuple of float
         Path coordinates.
     start, x_lower, x_upper : (v,) ndarray
@@ -120,11 +117,11 @@ class PathPhase:
         t = np.linspace(0.0, timing.t_end, _SAMPLES * intervals + 1)
         curves = own.course.curves(timing, t)[0]
         ascends = np.append(True, np.diff(curves[:, 0]) > _SHORTEST)
-        t, curves = t[ascends], curves[ascends]
-        self._begin = curves[0, 0]
-        self._way = curves[-1, 0] - self._begin
+        t = t[ascends]
+        curves = curves[ascends]
+        along = curves[:, 0]
         evenly = np.linspace(0.0, timing.t_end, stations + 1)
-        s = np.interp(evenly, t, curves[:, 0])
+        s = np.interp(evenly, t, along)
         self._s = _with_pieces(s, phase.joint_map.path.breaks)
         self._steps = np.diff(self._s)
         # Where limits hold: the interval between stations, and the part of it that is ahead.
@@ -135,18 +132,18 @@ class PathPhase:
         behind = self._ahead[:, 0] * self._steps[self._number]
         self._places = self._s[self._number + 1] - behind
         law = phase.time_law
-        rates = own.course.curves(timing, np.interp(self._s, curves[:, 0], t))[1][:, 0]
+        rates = own.course.curves(timing, np.interp(self._s, along, t))[1][:, 0]
         squares = (rates if law is None else _follow(law, self._s)) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
         edges = np.linspace(0.0, timing.t_end, intervals + 1)
-        self.breaks = self._part(np.interp(edges, t, curves[:, 0]))
-        self._knots = clamped_knots(_DEGREE, self.breaks)
+        self.breaks = np.interp(edges, t, along)
+        self._knots = np.pad(self.breaks, _DEGREE, mode="edge")
         self._basis = self._basis_at(self._places)
         self._count = intervals + _DEGREE
-        matrix = basis_matrix(self._knots, _DEGREE, self._part(curves[:, 0]))
+        matrix = basis_matrix(self._knots, _DEGREE, along)
         points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
         self.curves_count = len(points)
-        self.ends = float(self._begin), float(self._begin + self._way)
+        self.ends = float(self.breaks[0]), float(self.breaks[-1])
         self._set_variables(squares, points)
         if law is None:
             self._begin_within_limits()
@@ -160,7 +157,7 @@ class PathPhase:
             self._narrow(values, limit.inset / limit.violation_scale)
         self._set_pattern(self._basis.columns)
         self._set_constants()
-        self._last: tuple[bytes, _Evaluated] | None = None
+        self._evaluate = LastCall(self._evaluate_anew)
 
     def _set_pattern(self, columns: np.ndarray) -> None:
         """Set where entries of the Jacobian are; `columns`, (L, 4), are the control points of a curve at each place."""
@@ -191,21 +188,21 @@ class PathPhase:
         """Set the variables at the beginning, and their bounds: X at the ends stays, and values that are given."""
         count = len(self._s)
         self.start = np.concatenate([squares / self._units, points.ravel()])
-        self.x_lower = np.full(len(self.start), -np.inf)
-        self.x_upper = np.full(len(self.start), np.inf)
-        self.x_lower[:count] = _SLOWEST
-        has_law = self.phase.time_law is not None
-        numbers = range(count) if has_law else (0, count - 1)
-        given = [(number, self.start[number]) for number in numbers]
+        is_given = np.zeros(len(self.start), dtype=bool)
+        is_given[[0, count - 1]] = True
         boundary = self.phase.boundary
+        if boundary.time_law is not None:
+            is_given[:count] = True
         for conditions, end in (boundary.start, 0), (boundary.end, -1):
             for j, condition in enumerate(conditions[1:]):
                 if np.isfinite(condition.value):
-                    given.append((self.place_of(j, end), condition.value))
-        for place, value in given:
-            self.start[place] = value
-            self.x_lower[place] = value
-            self.x_upper[place] = value
+                    place = self.place_of(j, end)
+                    self.start[place] = condition.value
+                    is_given[place] = True
+        lower = np.full(len(self.start), -np.inf)
+        lower[:count] = _SLOWEST
+        self.x_lower = np.where(is_given, self.start, lower)
+        self.x_upper = np.where(is_given, self.start, np.inf)
 
     def _begin_within_limits(self) -> None:
         """Begin with the fastest timing of the splines over these stations, if there is one."""
@@ -217,28 +214,22 @@ class PathPhase:
             timed = TimedCourse(course, phase.joint_map, phase.limits, rate)
         except UnreachableError:
             return
-        first, last = timed.speeds[[0, -1]] * np.sqrt(squares[[0, -1]])
+        first, last = timed.speeds[[0, -1]] * rate[[0, -1]]
         timing = timed.solve((float(first), float(last)))
         if timing is None:
             return
         y, rates = timed.curves(timing, timing.times)
         found = np.interp(self._s, y[:, 0], rates[:, 0] ** 2) / self._units
-        inner = slice(1, len(self._s) - 1)
-        self.start[inner] = np.maximum(found[inner], _SLOWEST)
+        inner = np.maximum(found[1:-1], _SLOWEST)
+        self.start[1 : len(self._s) - 1] = inner
 
     def place_of(self, curve: int, end: int) -> int:
         """Return the number of the variable that is a redundant curve's value at the start (0) or end (-1)."""
         return len(self._s) + curve * self._count + end % self._count
 
-    def _part(self, s: np.ndarray) -> np.ndarray:
-        """Path coordinates as parts of the way, from 0 to 1."""
-        return np.asarray(((s - self._begin) / self._way).clip(0.0, 1.0))
-
     def _basis_at(self, s: np.ndarray) -> LocalBasis:
         """Basis functions of the curves at path coordinates, (S,), and their derivatives by these."""
-        basis = LocalBasis.of(self._knots, _DEGREE, self._part(s))
-        orders = np.arange(len(basis.values))[:, None, None]
-        return LocalBasis(basis.first, basis.values / self._way**orders)
+        return LocalBasis.of(self._knots, _DEGREE, s)
 
     def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """X at the stations, (P,), and control points, (r, M + 3)."""
@@ -261,16 +252,13 @@ class PathPhase:
         """Joint motion and limits where these hold; raises UnreachableError where there is none."""
         return self._evaluate(x)[1]
 
-    def _evaluate(self, x: np.ndarray) -> _Evaluated:
-        """Return `_motion` and `evaluate`, kept until x changes."""
-        key = x.tobytes()
-        if self._last is None or self._last[0] != key:
-            motion = self._motion(x)
-            (y, y_ds, y_dds), square, u = motion
-            orders = (y, y_ds * np.sqrt(square), y_dds * square + y_ds * u, 0.0 * y)
-            t = self._places - self._begin
-            self._last = (key, (motion, self._evaluator.evaluate(*orders, t=t)))
-        return self._last[1]
+    def _evaluate_anew(self, x: np.ndarray) -> _Evaluated:
+        """Return `_motion` and `evaluate`."""
+        motion = self._motion(x)
+        (y, y_ds, y_dds), square, u = motion
+        orders = (y, y_ds * np.sqrt(square), y_dds * square + y_ds * u, 0.0 * y)
+        t = self._places - self._s[0]
+        return motion, self._evaluator.evaluate(*orders, t=t)
 
     def narrow(self, x: np.ndarray) -> float:
         """Narrow, along the whole path, the limits on postures that are exceeded between the places.
@@ -354,8 +342,7 @@ class PathPhase:
 
     def curves(self, x: np.ndarray) -> np.ndarray:
         """Take s and the redundant curves at many places, (S, c)."""
-        s = self._begin + self._way * spread(self.breaks, _SAMPLES)
-        return self.course(x, s).y
+        return self.course(x, spread(self.breaks, _SAMPLES)).y
 
     def course(self, x: np.ndarray, s: np.ndarray) -> Course:
         """Take the curves at path coordinates s, (S,)."""
@@ -371,12 +358,12 @@ class PathPhase:
 def _follow(law: TimeLaw, s: np.ndarray) -> np.ndarray:
     """Rates ds/dt, (P,), 1/s, with which a time law passes path coordinates, (P,)."""
     t = np.linspace(0.0, law.duration, _SAMPLES * len(s))
-    return np.asarray(law.at(np.interp(s, law.at(t)[0], t))[1])
+    return law.at(np.interp(s, law.at(t)[0], t))[1]
 
 
 def _with_pieces(s: np.ndarray, breaks: np.ndarray) -> np.ndarray:
     """Add stations, (P,), in the pieces of a path between them, such as rounded corners."""
-    breaks = np.concatenate([s[:1], breaks[(breaks > s[0]) & (breaks < s[-1])], s[-1:]])
+    breaks = cut(breaks, s[0], s[-1])
     inner = spread(breaks, _STATIONS_A_PIECE)
     is_short = np.repeat(np.diff(breaks), _STATIONS_A_PIECE) < 4.0 * np.diff(s).max()
     added = np.union1d(s, inner[:-1][is_short])
@@ -401,29 +388,27 @@ class PathProgram:
         self.start = np.concatenate([phase.start for phase in self.phases])
         self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
         self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
+        joins = [(link.before, link.after, link.curves) for link in links]
+        if self.phases[0].phase.boundary.periodic:
+            joins.append((0, 0, tuple(range(1, 1 + self.phases[0].curves_count))))
         pairs = [
             (
-                first[link.before] + self.phases[link.before].place_of(curve - 1, -1),
-                first[link.after] + self.phases[link.after].place_of(curve - 1, 0),
+                first[before] + self.phases[before].place_of(curve - 1, -1),
+                first[after] + self.phases[after].place_of(curve - 1, 0),
             )
-            for link in links
-            for curve in link.curves
+            for before, after, curves in joins
+            for curve in curves
             if curve > 0
         ]
-        first_phase = self.phases[0]
-        if first_phase.phase.boundary.periodic:
-            for curve in range(first_phase.curves_count):
-                ends = first_phase.place_of(curve, -1), first_phase.place_of(curve, 0)
-                pairs.append(ends)
         self._pairs = np.reshape(np.array(pairs, dtype=int), (-1, 2))
-        heights = np.cumsum([0, *(len(own.lower) for own in self.phases)]).tolist()
-        rows = [
-            own.jacobian_rows + a for own, a in zip(self.phases, heights, strict=False)
-        ]
-        columns = [
-            own.jacobian_columns + a for own, a in zip(self.phases, first, strict=False)
-        ]
-        numbers = heights[-1] + np.arange(len(self._pairs))
+        row = 0
+        rows = []
+        columns = []
+        for own, column in zip(self.phases, first, strict=False):
+            rows.append(own.jacobian_rows + row)
+            columns.append(own.jacobian_columns + column)
+            row += len(own.lower)
+        numbers = row + np.arange(len(self._pairs))
         self.jacobian_rows = np.concatenate([*rows, np.repeat(numbers, 2)])
         self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
 
@@ -475,26 +460,19 @@ class PathProgram:
 
     def safeguard_slack(self, x: np.ndarray) -> float:
         """Smallest distance of a safeguard from its bound; infinite without safeguards."""
-        violations = [
-            own.evaluate(part).violation(is_safeguard) for own, part in self._split(x)
-        ]
-        return -float(max(own.max(initial=-np.inf) for own in violations))
+        return smallest_slack(own.evaluate(part) for own, part in self._split(x))
 
-    def curves(self, x: np.ndarray) -> list[np.ndarray]:
+    def curves(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Take s and the redundant curves of all phases at many places, (S, c) each."""
-        return [own.curves(part) for own, part in self._split(x)]
+        return tuple(own.curves(part) for own, part in self._split(x))
 
     def timings(
         self, x: np.ndarray, places: int, *, is_rough: bool
-    ) -> list[PhaseTiming]:
+    ) -> tuple[PhaseTiming, ...]:
         """Time the joint paths of all phases anew, as `PhaseTiming.along` does."""
-        return [
-            PhaseTiming.along(
-                own.phase,
-                partial(own.course, part),
-                own.ends,
-                places,
-                is_rough=is_rough,
-            )
-            for own, part in self._split(x)
-        ]
+        courses = [partial(own.course, part) for own, part in self._split(x)]
+        pairs = zip(self.phases, courses, strict=True)
+        return tuple(
+            PhaseTiming.along(own.phase, course, own.ends, places, is_rough=is_rough)
+            for own, course in pairs
+        )

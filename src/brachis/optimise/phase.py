@@ -18,16 +18,16 @@ from operator import attrgetter
 
 import numpy as np
 
+from brachis.common.arrays import LastCall
 from brachis.kernel import VariableSlopes
 from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Partials, Role
+from brachis.limits import JointStates, Limit, Partials, Role
 from brachis.limits.safeguards import MARGIN, build_branch_margins
 from brachis.optimise.boundary import (
     Boundary,
     BoundarySpline,
     EndCondition,
     LocalBasis,
-    stack_splines,
     sum_powers,
 )
 from brachis.optimise.bspline import ORDERS
@@ -103,10 +103,9 @@ class Phase:
         self.pause = pause
         self.time_law = boundary.time_law
         has_path = joint_map.path is not None
-        layout = layout or VariableLayout.of(grid, boundary, has_path=has_path)
+        layout = layout or VariableLayout(grid, boundary, has_path=has_path)
         self._layout = layout
         self.splines = layout.splines
-        self._ends_by_duration = any(len(own.given) > 1 for own in self.splines)
         self.slices = layout.slices
         self.degree = grid.degree
         self.knots = grid.knots
@@ -115,17 +114,13 @@ class Phase:
         self.t_norm = grid.t_norm
         self.variables = len(layout.x_lower)
         self._points_shape = len(self.splines), self.intervals + self.degree
-        self._stacked = stack_splines(
-            self.splines, layout.slices, self._points_shape[1], self.variables
-        )
         self.x_lower = layout.x_lower
         self.x_upper = layout.x_upper
-        rows = RowLayout.of(self.limits, grid, layout)
-        self._rows = rows
-        self.lower = rows.lower
-        self.upper = rows.upper
         self._entries: tuple[LocalBasis, np.ndarray] | None = None
-        self._last: tuple[bytes, Evaluation] | None = None
+        self._rows = RowLayout(self.limits, grid, layout)
+        self.lower = self._rows.lower
+        self.upper = self._rows.upper
+        self._evaluate = LastCall(self._evaluate_anew)
         self._slopes: tuple[Evaluation, np.ndarray] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
 
@@ -136,18 +131,8 @@ class Phase:
             splines = self.splines
         boundary = boundary or self.boundary
         has_path = self.joint_map.path is not None
-        layout = VariableLayout.of(grid, boundary, has_path=has_path, splines=splines)
-        return self._with(self.limits, grid, boundary, layout)
-
-    def _with(
-        self,
-        limits: Sequence[Limit],
-        grid: FixedGrid,
-        boundary: Boundary,
-        layout: VariableLayout,
-    ) -> Phase:
-        """Return a phase with the same joint map and pause."""
-        given = (self.joint_map, limits, grid, boundary)
+        layout = VariableLayout(grid, boundary, has_path=has_path, splines=splines)
+        given = (self.joint_map, self.limits, grid, boundary)
         return Phase(*given, margin=None, pause=self.pause, layout=layout)
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
@@ -179,7 +164,8 @@ class Phase:
 
     def with_limits(self, limits: Sequence[Limit]) -> Phase:
         """Return the same phase with other limits, safeguards included; x keeps its meaning."""
-        return self._with(limits, self.grid, self.boundary, self._layout)
+        given = (self.joint_map, limits, self.grid, self.boundary)
+        return Phase(*given, margin=None, pause=self.pause, layout=self._layout)
 
     def limits_near(self, curves: np.ndarray) -> list[Limit]:
         """Return what matters of the limits while the motion stays close to curves, (S, c); see `Limit.restrict_to`."""
@@ -242,8 +228,9 @@ class Phase:
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
-        free_part, given = self._stacked
-        points = free_part.control_points(x) + sum_powers(given, x[0])
+        layout = self._layout
+        free = layout.free_part.control_points(x)
+        points = free + sum_powers(layout.given, x[0])
         return points.reshape(self._points_shape)
 
     def _orders(
@@ -282,13 +269,13 @@ class Phase:
         motion = self.motion(scaled)
         before = self.motion(x)
         curves = np.array(before.at(np.array([0.0, before.t_end])))
+        lost = curves * (1.0 - 1.0 / factor ** np.arange(ORDERS))[:, None, None]
         points = motion.control_points.copy()
         for j in range(1, len(points)):
-            sides = []
-            for end, order in enumerate(held):
-                orders = np.arange(1, order + 1)
-                lost = curves[orders, end, j] * (1.0 - 1.0 / factor**orders)
-                sides.append(EndCondition(0.0, lost))
+            sides = [
+                EndCondition(0.0, lost[1 : 1 + order, end, j])
+                for end, order in enumerate(held)
+            ]
             change = BoundarySpline.between(motion.knots, self.degree, *sides)
             points[j] += change.given_points(motion.t_end)
         return self.variables_from(replace(motion, control_points=points))
@@ -308,13 +295,13 @@ class Phase:
         UnreachableError
             A collocation point is out of the branch's reach.
         """
-        key = x.tobytes()
-        if self._last is None or self._last[0] != key:
-            self.evaluations["states"] += 1
-            curves = per_second(self._orders(x, self._control_points(x)), x[0])
-            t = self.grid.t_norm_at(self._h(x)) * x[0]
-            self._last = (key, self.evaluator.evaluate(*curves, t=t))
-        return self._last[1]
+        return self._evaluate(x)
+
+    def _evaluate_anew(self, x: np.ndarray) -> Evaluation:
+        self.evaluations["states"] += 1
+        curves = per_second(self._orders(x, self._control_points(x)), x[0])
+        t = self.grid.t_norm_at(self._h(x)) * x[0]
+        return self.evaluator.evaluate(*curves, t=t)
 
     def state(self, x: np.ndarray) -> JointState:
         """Joint motion at the collocation points; raises as `evaluate` does."""
@@ -373,12 +360,23 @@ class Phase:
                 ratios.append(limit.ratio(values))
         return np.hstack(ratios)
 
+    def worst_time_scaling_ratio(self, x: np.ndarray) -> float:
+        """Largest of `time_scaling_ratios`."""
+        return float(np.abs(self.time_scaling_ratios(x)).max(initial=0.0))
+
+    def posture_violation(self, motion: JointStates) -> float:
+        """Largest violation of the limits on postures alone, along a motion; 0 without such limits."""
+        own = [limit for limit in self.limits if limit.is_of_postures]
+        found = [limit.violation(limit.values(motion)).max() for limit in own]
+        return float(max(found, default=0.0))
+
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `evaluate` does."""
         self.evaluations["jacobians"] += 1
         slopes = self.limit_slopes(x)
-        if self.evaluator.has_means:
-            slopes = slopes[:, ~self.evaluator.is_mean]
+        is_mean = self.evaluator.is_mean
+        if is_mean.any():
+            slopes = slopes[:, ~is_mean]
         rest = (self._layout.progress.jacobian(x), np.ones(len(self.grid.lower)))
         return np.concatenate([slopes.ravel(), *rest])
 
@@ -412,20 +410,12 @@ class Phase:
 
     def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
         """Slopes of the curves and their time derivatives at an end, (4, c, z); see `end_pattern`."""
-        number = range(len(self.t_norm))[point]
-        layout = self._layout
         curves = len(self.boundary.start)
-        first = self.boundary.given
-        slopes = np.zeros((ORDERS, curves, len(layout.point)))
-        slopes[:, :, number] = [own[number] for own in self._by_duration(x)]
-        begin = len(self.t_norm)
-        of_curves = np.arange(begin, begin + len(layout.curve))
-        slopes[:, layout.curve, of_curves] = self._basis(x)
-        by_h = self.grid.slopes(self._h(x), self._control_points(x))
-        slopes[:, first:, begin + len(layout.curve) :] = np.swapaxes(
-            per_second(by_h, x[0]), 1, 2
-        )
-        return slopes[:, :, self._at_end(point)]
+        values = ORDERS * curves
+        by_curves = np.zeros((ORDERS, len(self.t_norm), values, curves))
+        by_curves[:, point] = np.eye(values).reshape(-1, ORDERS, curves).swapaxes(0, 1)
+        slopes = self.slopes_by_variables(by_curves, x)[self._at_end(point)]
+        return slopes.T.reshape(ORDERS, curves, -1)
 
     def _at_end(self, point: int) -> np.ndarray:
         """Numbers of the entries at the first or last collocation point; not that by a duration that is given."""
@@ -445,15 +435,14 @@ class Phase:
         )
 
     def sum_outer_products(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Add up g g^T, (v, v), over the slopes g of all values at all points, (z, c), with weights (K,) or (K, c)."""
+        """Add up g g^T, (v, v), over the slopes g of all values at all points, (z, c); weights (K, c) or (K, 1)."""
         columns = slopes.shape[1]
         rows = np.zeros((len(self.t_norm), columns, self.variables))
         point = self._layout.point[:, None]
         variable = self._layout.variable[:, None]
         rows[point, np.arange(columns), variable] = slopes
-        factors = weights[:, None] if weights.ndim == 1 else weights
         flat = rows.reshape(-1, self.variables)
-        return np.asarray((rows * factors[:, :, None]).reshape(flat.shape).T @ flat)
+        return (rows * weights[:, :, None]).reshape(flat.shape).T @ flat
 
     def slopes_by_variables(self, by: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Turn slopes by y, ydot, ..., (orders, K, c, 1 + r), into those by T, each curve's variables and h, (z, c)."""
@@ -483,11 +472,10 @@ class Phase:
         """Slopes of the curves and their time derivatives by T, (4, K, c): a longer time slows them down."""
         rates = -np.arange(ORDERS) / x[0]
         slower = np.array(self.state(x).curves) * rates[:, None, None]
-        if not self._ends_by_duration:
+        given = self._layout.given
+        if len(given) == 1:
             return slower
-        points = sum_powers(self._stacked[1], x[0], slope=True).reshape(
-            self._points_shape
-        )
+        points = sum_powers(given, x[0], slope=True).reshape(self._points_shape)
         moving = per_second(self._orders(x, points, is_slope=True), x[0])
         return np.array(moving) + slower
 
@@ -495,6 +483,5 @@ class Phase:
         """Slopes of the curves and their time derivatives by the variables between T and h, (4, z)."""
         basis = self.grid.basis(self._h(x))
         if self._entries is None or self._entries[0] is not basis:
-            own = [part.entries(basis.values) for part in self._layout.patterns]
-            self._entries = (basis, np.concatenate([np.empty((ORDERS, 0)), *own], 1))
+            self._entries = (basis, self._layout.sparsity.entries(basis.values))
         return np.array(per_second(self._entries[1], x[0]))

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.common.arrays import spread
+from brachis.common.arrays import cut, drop_near, spread
 from brachis.errors import UnreachableError
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
@@ -77,8 +77,7 @@ class PhaseTiming:
             )
         except UnreachableError:
             return None
-        speeds = course.speeds
-        rates = float(speeds[0]), float(speeds[-1])
+        rates = float(course.speeds[0]), float(course.speeds[-1])
         return cls(course, rates, course.solve(rates))
 
     def without_spikes(self) -> PhaseTiming:
@@ -118,13 +117,9 @@ class PhaseTiming:
         path = phase.joint_map.path
         assert path is not None
         begin, end = ends
-        knots = path.knots[(path.knots > begin) & (path.knots < end)]
-        pieces = np.concatenate([[begin], knots, [end]])
-        pieces = pieces[np.append(np.diff(pieces) > tolerances.PATH, True)]
+        pieces = drop_near(cut(path.knots, begin, end), tolerances.PATH)
         number = len(pieces) - 1
         count = max(places, min(_PLACES_A_PIECE * number, _MOST_PLACES))
-        sides = phase.boundary.start[0], phase.boundary.end[0]
-        rates = np.array([side.derivatives[:1].sum() for side in sides])
 
         def lay(
             s: np.ndarray, estimate: tuple[np.ndarray, np.ndarray] | None = None
@@ -136,7 +131,7 @@ class PhaseTiming:
             course = course_at(divide_turns(s, state.qdot))
             sdot = None if estimate is None else np.interp(course.p, *estimate)
             timed = TimedCourse(course, phase.joint_map, phase.limits, sdot)
-            return timed, tuple(timed.speeds[[0, -1]] * rates)
+            return timed, tuple(timed.speeds[[0, -1]] * phase.boundary.rates)
 
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
         timing = course.solve(by_length, agreement=_ROUGHLY)
@@ -148,8 +143,7 @@ class PhaseTiming:
         t = np.linspace(0.0, timing.t_end, count)
         y, ydot = course.curves(timing, t)
         passed = np.maximum.accumulate(y[:, 0])
-        s = np.union1d(passed.clip(begin, end), pieces)
-        s = s[np.append(np.diff(s) > tolerances.PATH, True)]
+        s = drop_near(np.union1d(passed.clip(begin, end), pieces), tolerances.PATH)
         s[0] = begin
         course, by_length = lay(s, (passed, ydot[:, 0]))
         return cls(course, by_length, course.solve(by_length), given)

@@ -21,7 +21,8 @@ from brachis.common.summary import Summary
 from brachis.kinematics import JointState
 from brachis.limits import Bound, Limit, Role
 from brachis.optimise.backends import Curvature
-from brachis.optimise.means import Means
+from brachis.optimise.evaluator import Evaluation
+from brachis.optimise.means import Means, Parts
 from brachis.optimise.motion import Motion
 from brachis.optimise.objective import EndTime, Objective
 from brachis.optimise.phase import Phase
@@ -56,14 +57,14 @@ class Link:
     def _scales(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Factors on the rows of every order, (orders, 1)."""
         interval = x[0] * (1.0 - phase.breaks[-2])
-        return np.asarray(interval ** np.array(self.orders))[:, None]
+        return interval ** np.array(self.orders)[:, None]
 
-    def rows(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
+    def rows(self, parts: Parts) -> np.ndarray:
         """Values of the rows, by order and curve; `parts` are all phases, with their variables."""
         chosen = np.ix_(self.orders, self.curves)
         last = _curves_at(*parts[self.before], -1)[chosen]
         first = _curves_at(*parts[self.after], 0)[chosen]
-        return np.asarray((self._scales(*parts[self.before]) * (last - first)).ravel())
+        return (self._scales(*parts[self.before]) * (last - first)).ravel()
 
     def pattern(
         self, phases: Sequence[Phase], first: Sequence[int]
@@ -77,16 +78,13 @@ class Link:
         first : sequence of int
             Where the variables of each one begin.
         """
-        columns = np.concatenate(
-            [
-                phases[self.before].end_pattern(-1) + first[self.before],
-                phases[self.after].end_pattern(0) + first[self.after],
-            ]
-        )
+        last = phases[self.before].end_pattern(-1) + first[self.before]
+        begin = phases[self.after].end_pattern(0) + first[self.after]
+        columns = np.concatenate([last, begin])
         rows = np.repeat(np.arange(self.size), len(columns))
         return rows, np.tile(columns, self.size)
 
-    def jacobian(self, parts: Sequence[tuple[Phase, np.ndarray]]) -> np.ndarray:
+    def jacobian(self, parts: Parts) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,)."""
         orders = np.array(self.orders)
         chosen = np.ix_(self.orders, self.curves)
@@ -156,25 +154,13 @@ class Program(Summary):
         given = self.x_upper[self._durations]
         self.x_upper[self._durations] = np.minimum(given, longest)
         self.means = Means(self.phases[0].limits)
-        joined = np.zeros(sum(link.size for link in self.links))
-        self.lower = np.concatenate(
-            [
-                *(phase.lower for phase in self.phases),
-                self.means.lower,
-                joined,
-            ]
-        )
-        self.upper = np.concatenate(
-            [
-                *(phase.upper for phase in self.phases),
-                self.means.upper,
-                joined,
-            ]
-        )
-        heights = [len(phase.lower) for phase in self.phases]
-        heights.append(len(self.means))
-        heights += [link.size for link in self.links]
-        self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
+        blocks: tuple[Phase | Means, ...] = (*self.phases, self.means)
+        sizes = [link.size for link in self.links]
+        joined = np.zeros(sum(sizes))
+        self.lower = np.concatenate([*(own.lower for own in blocks), joined])
+        self.upper = np.concatenate([*(own.upper for own in blocks), joined])
+        heights = [*(len(own.lower) for own in blocks), *sizes]
+        self._first_rows = np.cumsum([0, *heights]).tolist()
         first_mean = self._first_rows[len(self.phases)]
         self._mean_rows = slice(first_mean, first_mean + len(self.means))
 
@@ -186,13 +172,11 @@ class Program(Summary):
             (phase.jacobian_rows, phase.jacobian_columns + first)
             for phase, first in zip(self.phases, self._durations, strict=True)
         ]
-        means = np.arange(len(self.means))
-        patterns.append(
-            (np.repeat(means, count), np.tile(np.arange(count), len(means)))
-        )
-        ends = [*self._durations, count]
-        patterns += [link.pattern(self.phases, ends) for link in self.links]
-        pairs = zip(patterns, self._first_rows, strict=True)
+        of_means = np.indices((len(self.means), count)).reshape(2, -1)
+        patterns.append((of_means[0], of_means[1]))
+        firsts = self._durations
+        patterns += [link.pattern(self.phases, firsts) for link in self.links]
+        pairs = zip(patterns, self._first_rows, strict=False)
         rows = [rows + first for (rows, _), first in pairs]
         columns = [columns for _, columns in patterns]
         return np.concatenate(rows), np.concatenate(columns)
@@ -352,8 +336,7 @@ class Program(Summary):
 
     def variables_from(self, motions: Sequence[Motion]) -> np.ndarray:
         """Point x nearest to given curves of every phase; see `Phase.variables_from`."""
-        pairs = zip(self.phases, motions, strict=True)
-        return np.concatenate([phase.variables_from(motion) for phase, motion in pairs])
+        return np.concatenate(list(map(Phase.variables_from, self.phases, motions)))
 
     def with_phases(self, phases: Iterable[Phase]) -> Program:
         """Return the program with other phases for the present ones, all else as it is."""
@@ -361,8 +344,7 @@ class Program(Summary):
 
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with other collocation points of every phase; see `Phase.with_points`."""
-        pairs = zip(self.phases, t_norm, strict=True)
-        return self.with_phases(phase.with_points(own) for phase, own in pairs)
+        return self.with_phases(map(Phase.with_points, self.phases, t_norm))
 
     def with_free_knots(self, shortest: float) -> Program:
         """Return the same program with interval lengths as variables; see `Phase.with_free_knots`."""
@@ -407,13 +389,15 @@ class Program(Summary):
 
         Raises UnreachableError as `states` does.
         """
-        violations = [
-            phase.evaluate(part).violation(is_safeguard)
-            for phase, part in self.split(x)
-        ]
-        return -float(max(own.max(initial=-np.inf) for own in violations))
+        return smallest_slack(phase.evaluate(part) for phase, part in self.split(x))
 
 
 def is_safeguard(limit: Limit) -> bool:
     """Tell whether a limit only keeps the solve on its branch."""
     return limit.role is Role.SAFEGUARD
+
+
+def smallest_slack(evaluations: Iterable[Evaluation]) -> float:
+    """Smallest distance of a safeguard from its bound; infinite without safeguards."""
+    violations = (own.violation(is_safeguard) for own in evaluations)
+    return -float(max(own.max(initial=-np.inf) for own in violations))

@@ -27,6 +27,7 @@ from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.robot import Friction
+from brachis.task import RefinementSettings
 
 _LEVELS = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
 """Velocities, in widths of the friction, that are looked for: at 7 all but 2e-6 of it is there."""
@@ -116,16 +117,14 @@ def violations(
     Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
     """
     found = [_check_phase(phase, part, goal) for phase, part in dense.split(x)]
-    violation = max(largest for largest, _ in found)
-    missing = [own for _, own in found]
+    largest, missing = map(list, zip(*found, strict=True))
+    violation = max(largest)
     if np.isfinite(violation):
         of_means = dense.means.violation(dense.split(x))
         violation = max(violation, of_means)
         if of_means > goal:  # too few points everywhere
-            pairs = zip(dense.phases, missing, strict=True)
-            missing = [
-                np.union1d(own, phase.t_norm[_EVERYWHERE]) for phase, own in pairs
-            ]
+            more = [phase.t_norm[_EVERYWHERE] for phase in dense.phases]
+            missing = list(map(np.union1d, missing, more))
     return violation, missing
 
 
@@ -136,7 +135,7 @@ def _check_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.nd
         table = dense.violation(x)
         largest = float(table.max())
         peaks = _suspects(t_norm, table, dense.knots, goal - _NEAR)
-        if table.max() > 20.0 * goal:
+        if largest > 20.0 * goal:
             # The grid's own peaks will do until they are nearly held down.
             at = np.searchsorted(t_norm, peaks - _SAME_TIME).clip(max=len(t_norm) - 1)
             missing = _around(peaks[table.max(axis=1)[at] > goal], t_norm)
@@ -174,8 +173,8 @@ def _special_times(dense: Phase, x: np.ndarray) -> np.ndarray:
 
 def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List t_norm at which the path coordinate is where a limit changes abruptly."""
-    breaks = np.concatenate([limit.breaks for limit in dense.limits])
     motion = dense.motion(x)
+    breaks = np.concatenate([limit.breaks for limit in dense.limits])
     return motion.times_of(breaks) / motion.t_end
 
 
@@ -287,7 +286,9 @@ def _zoom(
     heights: np.ndarray = np.empty(len(centres))
     reach = _spacing(dense.t_norm, centres)
     steps = np.linspace(-1.0, 1.0, 9)
-    for _ in range(2 if len(centres) else 0):
+    for _ in range(2):
+        if not len(centres):
+            break
         fine = np.clip(centres[:, None] + reach[:, None] * steps, 0.0, 1.0)
         worst = dense.violation_at(x, fine.ravel()).max(axis=1)
         best = np.argmax(worst.reshape(fine.shape), axis=1)
@@ -296,8 +297,6 @@ def _zoom(
         centres = fine.ravel()[chosen][is_high]
         heights = worst[chosen][is_high]
         reach = 0.25 * reach[is_high]
-        if not len(centres):
-            break
     return centres, heights
 
 
@@ -306,11 +305,10 @@ def merge_points(phase: Phase, extra: np.ndarray) -> np.ndarray:
     t_norm = phase.t_norm
     before = np.clip(np.searchsorted(t_norm, extra), 1, len(t_norm) - 1) - 1
     side = np.searchsorted(phase.jumps, extra, side="right")
-    gaps = []
-    for neighbour in (t_norm[before], t_norm[before + 1]):
-        is_same_side = np.searchsorted(phase.jumps, neighbour, side="right") == side
-        gaps.append(np.where(is_same_side, np.abs(extra - neighbour), np.inf))
-    return np.union1d(t_norm, extra[np.min(gaps, axis=0) > 1e-5])
+    beside = t_norm[[before, before + 1]]
+    is_same_side = np.searchsorted(phase.jumps, beside, side="right") == side
+    is_close = is_same_side & (np.abs(extra - beside) <= 1e-5)
+    return np.union1d(t_norm, extra[~is_close.any(axis=0)])
 
 
 _LONGEST = 0.01
@@ -349,6 +347,14 @@ class RefinementOptions:
     deadline: Deadline = NEVER
     longest: float = np.inf
 
+    @classmethod
+    def of(
+        cls, settings: RefinementSettings, deadline: Deadline, longest: float = np.inf
+    ) -> RefinementOptions:
+        """Take what the ``refinement`` part of a task says."""
+        known = (settings.tolerance, settings.density, settings.max_rounds)
+        return cls(*known, deadline, longest)
+
 
 def refine(
     program: Program, first: SolverReport, solve: Solve, options: RefinementOptions
@@ -378,21 +384,18 @@ def refine(
     )
     goal = options.tolerance * _GOAL
     reports = [first]
-    for _ in range(options.max_rounds):
+    remaining = np.inf
+    for rounds_left in range(options.max_rounds, -1, -1):
         answer = reports[-1].x
         violation, missing = violations(dense, answer, goal)
-        by = (
-            options.tolerance if violation < goal + _RELIEF * options.tolerance else 0.0
-        )
+        if not rounds_left:
+            break
+        is_near = violation < goal + _RELIEF * options.tolerance
+        by = options.tolerance if is_near else 0.0
         factor, remaining = _lengthen(dense, answer, violation, options, by)
         if remaining <= goal:
-            return SolvedProgram(
-                program, tuple(reports), violation=remaining, time_scaled=factor
-            )
-        pairs = zip(program.phases, missing, strict=True)
-        finer = program.with_points(
-            [merge_points(phase, extra) for phase, extra in pairs]
-        )
+            break
+        finer = program.with_points(list(map(merge_points, program.phases, missing)))
         is_same = finer.collocation_points == program.collocation_points
         if is_same or options.deadline.passed:
             break
@@ -401,12 +404,10 @@ def refine(
             break
         program = finer
         reports.append(report)
-    answer = reports[-1].x
-    violation, _ = violations(dense, answer, goal)
-    by = _LONGEST_IF_LATE if options.deadline.passed else _LONGEST
-    if not options.max_rounds:
-        by = 0.0
-    factor, remaining = _lengthen(dense, answer, violation, options, by)
+    if remaining > goal:
+        by = _LONGEST_IF_LATE if options.deadline.passed else _LONGEST
+        by = by if options.max_rounds else 0.0
+        factor, remaining = _lengthen(dense, answer, violation, options, by)
     return SolvedProgram(
         program, tuple(reports), violation=remaining, time_scaled=factor
     )

@@ -61,26 +61,26 @@ class PathEffort:
         Of the redundant curves over the whole path, one number after the other; phases share them by their time.
     places : int
         At which joint paths are timed.
-    is_rough_before, is_rough_after : bool
-        Whether joint paths are timed roughly before they are improved, and afterwards. Of a joint path that is not
-        improved the latter counts. A gain or a loss of less than 1 % over a rough timing is not noticed.
-    may_add_places : bool
-        Whether limits hold at two places between stations where one is not enough.
     margin : float
         Least branch margin.
     options : SolverOptions
         Of every solve. Limits may be exceeded by a little: the timing is computed anew.
+    is_rough_before, is_rough_after : bool, optional
+        Whether joint paths are timed roughly before they are improved, and afterwards. Of a joint path that is not
+        improved the latter counts. A gain or a loss of less than 1 % over a rough timing is not noticed.
+    may_add_places : bool, optional
+        Whether limits hold at two places between stations where one is not enough.
     posture_violation : float, optional
         Violation of limits on postures that is small enough.
     """
 
     intervals: tuple[int, ...]
     places: int
-    is_rough_before: bool
-    is_rough_after: bool
-    may_add_places: bool
     margin: float
     options: SolverOptions
+    is_rough_before: bool = False
+    is_rough_after: bool = False
+    may_add_places: bool = False
     posture_violation: float = 5e-5
 
 
@@ -89,7 +89,6 @@ COARSE = PathEffort(
     places=200,
     is_rough_before=True,
     is_rough_after=True,
-    may_add_places=False,
     margin=MARGINS[1],
     options=SolverOptions(
         tolerance=1e-3,
@@ -107,8 +106,6 @@ ROUGH = PathEffort(
     intervals=(16,),
     places=800,
     is_rough_before=True,
-    is_rough_after=False,
-    may_add_places=False,
     margin=MARGINS[1],
     options=SolverOptions(
         tolerance=3e-4,
@@ -124,8 +121,6 @@ ROUGH = PathEffort(
 FINE = PathEffort(
     intervals=(32, 64, 128, 256),
     places=PLACES,
-    is_rough_before=False,
-    is_rough_after=False,
     may_add_places=True,
     margin=MARGIN,
     options=SolverOptions(
@@ -173,9 +168,7 @@ def _report(
 
 
 def begin_with_timing(
-    program: Program,
-    joint_paths: Sequence[np.ndarray],
-    points: int,
+    program: Program, joint_paths: Sequence[np.ndarray], points: int
 ) -> tuple[Program, np.ndarray] | None:
     """Lay splines along the fastest timing of joint paths, over few knots, close together where it needs them.
 
@@ -196,18 +189,15 @@ def begin_with_timing(
     """
     phases = []
     parts = []
-    for phase, curves in zip(program.phases, joint_paths, strict=True):
-        try:
+    try:
+        for phase, curves in zip(program.phases, joint_paths, strict=True):
             own = PhaseTiming.through(phase, curves)
             begun = begin(phase, own, _ROUGHLY, _FIRST_INTERVALS, points)
-        except UnreachableError:
-            return None
-        if begun is None:
-            return None
-        phases.append(begun[0])
-        parts.append(begun[1])
-    first = program.with_phases(phases)
-    try:
+            if begun is None:
+                return None
+            phases.append(begun[0])
+            parts.append(begun[1])
+        first = program.with_phases(phases)
         return first, shortest_time(first, np.concatenate(parts))
     except UnreachableError:
         return None
@@ -258,12 +248,9 @@ class BetterPaths:
         """Time of all phases, s; infinite where one has no timing."""
         return least_time(self.timings)
 
-    def is_better_than(self, other: BetterPaths, slack: float) -> bool:
-        """Tell whether these violate limits on postures less; if both stay within `slack`, whether these are faster."""
-        keeps_to = max(self.violation, slack), max(other.violation, slack)
-        if keeps_to[0] == keeps_to[1]:
-            return self.t_end < other.t_end
-        return keeps_to[0] < keeps_to[1]
+    def rank(self, slack: float) -> tuple[float, float]:
+        """Less for those that violate limits on postures less, or if both stay within `slack`, are faster."""
+        return max(self.violation, slack), self.t_end
 
 
 def improve_joint_paths(
@@ -301,7 +288,13 @@ def improve_joint_paths(
         phase.with_limits([own for own in phase.limits if not is_left_out(own)])
         for phase in program.phases
     )
-    time_paths = partial(_time_paths, program, curves, effort.places)
+
+    def time_paths(*, is_rough: bool) -> tuple[PhaseTiming, ...]:
+        return tuple(
+            PhaseTiming.through(*pair, effort.places, is_rough=is_rough)
+            for pair in zip(program.phases, curves, strict=True)
+        )
+
     beyond = max(map(violation_of_postures, program.phases, curves))
     r = program.phases[0].joint_map.r
     is_first_rough = effort.is_rough_before if r else effort.is_rough_after
@@ -327,16 +320,6 @@ def improve_joint_paths(
     if best.timings is timings and is_first_rough and not effort.is_rough_after:
         best = replace(best, timings=time_paths(is_rough=False))
     return best
-
-
-def _time_paths(
-    program: Program, curves: Sequence[np.ndarray], places: int, *, is_rough: bool
-) -> tuple[PhaseTiming, ...]:
-    """Time joint paths through curves; raises UnreachableError where they leave the joint map."""
-    return tuple(
-        PhaseTiming.through(*pair, places, is_rough=is_rough)
-        for pair in zip(program.phases, curves, strict=True)
-    )
 
 
 def _better(
@@ -365,27 +348,27 @@ def _better(
             report = solve(over_path, report.x)
             reports = (*reports, report)
             violation = over_path.narrow(report.x)
-        timings = tuple(
-            over_path.timings(report.x, effort.places, is_rough=effort.is_rough_after)
+        timings = over_path.timings(
+            report.x, effort.places, is_rough=effort.is_rough_after
         )
-        slack = over_path.safeguard_slack(report.x)
+        is_held_back = over_path.safeguard_slack(report.x) <= HELD_BACK
     except UnreachableError:
         return replace(best, reports=reports, is_credible=False)
-    curves = tuple(over_path.curves(report.x))
-    found = BetterPaths(curves, timings, reports, violation)
+    found = BetterPaths(over_path.curves(report.x), timings, reports, violation)
     missed = 1.0 - report.objective / found.t_end
     # The phase plane does not tell whether the limits allow a speed that is given.
     has_laws = any(own.given is not None for own in timings)
     is_given = has_laws and np.isfinite(found.t_end)
     is_beyond = is_given and report.violation > _CREDIBLE
-    is_better = found.is_better_than(best, effort.posture_violation)
+    slack = effort.posture_violation
+    is_better = found.rank(slack) < best.rank(slack)
     if is_beyond or not (is_better or is_given):
         found = replace(best, reports=reports)
     return replace(
         found,
         is_credible=abs(missed) < _CREDIBLE,
         swings=report.violation < _CREDIBLE < missed < 1.0,
-        is_held_back=slack <= HELD_BACK,
+        is_held_back=is_held_back,
     )
 
 
@@ -447,6 +430,4 @@ def _follow_again(
     if own is None or own.t_end > first.laid.needed * (1.0 - _WORTH * tolerance):
         return first
     again = follow(first.phase, own, tolerance, points, deadline)
-    if again is None or not again.laid.is_better_than(first.laid):
-        return first
-    return again
+    return again if again and again.laid.rank < first.laid.rank else first

@@ -8,6 +8,7 @@ rates, and are sharpened where these change smoothly: so no spline accelerates m
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from brachis import kernel
 from brachis.common import tolerances
@@ -35,12 +36,7 @@ _ANCHORED = 100
 
 
 def breaks_for(
-    course: TimedCourse,
-    timing: Timing,
-    tolerance: float,
-    *,
-    from_rest: bool,
-    most: int,
+    course: TimedCourse, timing: Timing, tolerance: float, *, from_rest: bool, most: int
 ) -> np.ndarray:
     """Choose knots over which splines follow a timing.
 
@@ -84,8 +80,6 @@ def breaks_for(
     jumps = np.where(is_switch, jumps, 0.0)
     ramps = timing.t_end / 24.0 * np.abs(np.diff(acceleration))
 
-    pieces = max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL)
-    shortest = SHORTEST / timing.t_end
     begins = kernel.halve_intervals(
         t,
         values,
@@ -93,9 +87,9 @@ def breaks_for(
         jumps,
         ramps,
         few=_FEW,
-        pieces=pieces,
+        pieces=max(_FIRST_INTERVALS, len(course.path.p) // _PLACES_AN_INTERVAL),
         tolerance=tolerance,
-        shortest=shortest,
+        shortest=SHORTEST / timing.t_end,
         most=most,
     )
     return even_out(np.append(begins, 1.0))
@@ -129,7 +123,7 @@ def control_points_along(
     sharpened where accelerations change smoothly.
     """
     t_end = timing.t_end
-    windows = _windows(knots[2:-2], degree - 1)
+    windows = sliding_window_view(knots[2:-2], degree - 1)
     places = windows.mean(axis=1)
     half = np.minimum(places - windows[:, 0], windows[:, -1] - places)
     half[half < _POINT] = 0.0
@@ -144,22 +138,9 @@ def control_points_along(
     end = course.curves(timing, np.array([t_end]))[1]
     rates = rates + (places**2 * (3.0 - 2.0 * places))[:, None] * (end - rates[-1])
     first = course.curves(timing, np.zeros(1))[0]
-    points = _integrate(first, rates, knots[1:-1], t_end)
+    steps = (knots[degree + 1 : -1] - knots[1 : -degree - 1]) * t_end / degree
+    points = first + np.cumsum(rates * steps[:, None], axis=0)
     return np.concatenate([first, points]).T
-
-
-def _windows(knots: np.ndarray, count: int) -> np.ndarray:
-    return np.lib.stride_tricks.sliding_window_view(knots, count)
-
-
-def _integrate(
-    first: np.ndarray, rates: np.ndarray, knots: np.ndarray, t_end: float
-) -> np.ndarray:
-    """Control points behind the first one, (w, c), of splines with these control points of the rate, (w, c)."""
-    degree = len(knots) - len(rates)
-    support = _windows(knots, degree + 1)
-    steps = (support[:, -1] - support[:, 0]) * t_end / degree
-    return np.asarray(first + np.cumsum(rates * steps[:, None], axis=0))
 
 
 def _sharpen(
@@ -174,12 +155,11 @@ def _sharpen(
     Where intervals of different length meet these places differ; and means of a curve that bends are beside it. Slopes
     and bends are the smallest ones near by, and none where they change their sign: so nothing swings beside a jump.
     """
-    windows = _windows(knots[2:-2], degree - 1)
-    places = windows.mean(axis=1)
+    places = greville(knots[1:-1], degree - 1)
     widths = np.diff(places)[:, None]
     means = np.diff(rates, axis=0) / widths
     taken = 0.5 * (places[1:] + places[:-1]) + np.diff(half**2) / (6.0 * widths[:, 0])
-    inner = _windows(knots[2:-2], degree)[:, 1:-1]
+    inner = sliding_window_view(knots[2:-2], degree)[:, 1:-1]
     belong = inner.mean(axis=1) if degree > 2 else taken
     slopes = np.diff(means, axis=0) / np.diff(taken)[:, None]
     bends = 2.0 * np.diff(slopes, axis=0) / (taken[2:] - taken[:-2])[:, None]
@@ -203,10 +183,10 @@ def _smallest(values: np.ndarray, count: int, beyond: str) -> np.ndarray:
     """Smallest of so many neighbours, (n, c) to (n + count - 1, c), or zero where their signs differ."""
     pad = ((count - 1, count - 1), (0, 0))
     padded = np.pad(values, pad, mode=beyond)  # type: ignore[call-overload]
-    near = np.lib.stride_tricks.sliding_window_view(padded, count, axis=0)
+    near = sliding_window_view(padded, count, axis=0)
     size = np.abs(near).min(axis=-1)
     is_same = np.abs(np.sign(near).sum(axis=-1)) == count
-    return np.asarray(np.where(is_same, np.sign(near[..., 0]) * size, 0.0))
+    return np.where(is_same, np.sign(near[..., 0]) * size, 0.0)
 
 
 def splines_along(

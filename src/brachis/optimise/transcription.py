@@ -124,7 +124,7 @@ def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
         if time_law is None:
             return np.empty(0)
         derivatives = time_law.at_end(-1 - side)
-        return np.asarray(derivatives[1 : 1 + derivatives_in_motion(problem)])
+        return derivatives[1 : 1 + derivatives_in_motion(problem)]
     derivatives = np.zeros(problem.task.spline.vanishing)
     derivatives[0] = problem.leg_rates[number][side]
     return derivatives

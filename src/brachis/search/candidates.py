@@ -178,9 +178,7 @@ def finish_candidate(
     assert candidate.start is not None
     session = _open_session(candidate.start, deadline.part(_FOR_KNOTS), listener)
     settings = candidate.start.problem.task.refinement
-    options = RefinementOptions(
-        settings.tolerance, settings.density, settings.max_rounds, deadline
-    )
+    options = RefinementOptions.of(settings, deadline)
     finish = _finish_over_path if candidate.is_over_path else _finish_over_time
     return finish(candidate, session, options)
 

@@ -99,7 +99,7 @@ def solve_by_margin_continuation(
     return improve(
         SolvedProgram(program),
         [partial(use, smaller) for smaller in programs.values()],
-        attempt_once(solve),
+        partial(attempt_once, solve),
         least_gain=tolerances.GAIN,
         go_on_above=tolerances.GAIN,
     )

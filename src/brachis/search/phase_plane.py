@@ -216,8 +216,7 @@ def grade_breaks(count: int, first: float, last: float) -> np.ndarray:
 
 def _is_moving(phase: Phase) -> bool:
     """Tell whether the tool moves at an end of a leg."""
-    sides = phase.boundary.start[0], phase.boundary.end[0]
-    return any(side.derivatives[:1].any() for side in sides)
+    return any(phase.boundary.rates)
 
 
 def _time_guess(phase: Phase, curves: np.ndarray) -> tuple[np.ndarray, float | None]:

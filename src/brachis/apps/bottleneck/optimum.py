@@ -74,10 +74,7 @@ def solve_again(
     """
     task = trajectory.task
     deadline = Deadline.after(task.search.time_limit)
-    settings = task.refinement
-    options = RefinementOptions(
-        settings.tolerance, settings.density, settings.max_rounds, deadline
-    )
+    options = RefinementOptions.of(task.refinement, deadline)
     ends = []
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # batches are small
         program, x = _problem(trajectory, families, own_limits)

@@ -17,6 +17,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -90,15 +91,12 @@ class Solver:
             The user interrupted; passed on once the backend has returned.
         """
         bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
-        status = SolveStatus.EVALUATION_ERROR
-        refusal = ""
+        refuse = partial(_report_point, self.name, problem, x)
         if options.time_limit <= 0.0:
-            status = SolveStatus.TIME_LIMIT
-            refusal = "no time was left"
-        elif not is_usable(x) or any(np.isnan(bound).any() for bound in bounds):
-            refusal = "the start or a bound is not a finite number"
-        if refusal:
-            return _report_point(self.name, problem, x, status, refusal)
+            return refuse(SolveStatus.TIME_LIMIT, "no time was left")
+        if not is_usable(x) or any(np.isnan(bound).any() for bound in bounds):
+            message = "the start or a bound is not a finite number"
+            return refuse(SolveStatus.EVALUATION_ERROR, message)
         with solve_lock:
             most = ENTRIES * min(1.0, (options.time_limit / 10.0) ** 2)
             # A daemonic process may have no children; the limit then holds between iterations alone.

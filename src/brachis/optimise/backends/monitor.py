@@ -253,12 +253,17 @@ def objective_at(problem: Problem, x: np.ndarray, otherwise: float = np.inf) -> 
 
 def residual(problem: Problem, x: np.ndarray) -> float:
     """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
+    of_bounds = np.minimum(x - problem.x_lower, problem.x_upper - x)
+    least = float(np.append(row_slack(problem, x), of_bounds).min(initial=0.0))
+    return np.inf if np.isnan(least) else -least
+
+
+def row_slack(problem: Problem, x: np.ndarray) -> np.ndarray:
+    """Distances of all rows from their nearer bound, (c,); negative beyond it, minus infinity where x has no rows."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             rows = problem.rows(x)
     except UnreachableError:
-        return np.inf
-    of_rows = np.maximum(problem.lower - rows, rows - problem.upper)
-    of_bounds = np.maximum(problem.x_lower - x, x - problem.x_upper)
-    worst = float(np.concatenate([of_rows, of_bounds]).max(initial=0.0))
-    return np.inf if np.isnan(worst) else worst
+        return np.full(len(problem.lower), -np.inf)
+    slack = np.minimum(rows - problem.lower, problem.upper - rows)
+    return np.nan_to_num(slack, nan=-np.inf, neginf=-np.inf)

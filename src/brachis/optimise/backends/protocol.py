@@ -67,42 +67,33 @@ class Problem(Protocol):
     @property
     def jacobian_rows(self) -> np.ndarray:
         """Rows of the entries of the Jacobian."""
-        ...
 
     @property
     def jacobian_columns(self) -> np.ndarray:
         """Columns of the entries of the Jacobian."""
-        ...
 
     @property
     def lower(self) -> np.ndarray:
         """Lower bounds of the rows."""
-        ...
 
     @property
     def upper(self) -> np.ndarray:
         """Upper bounds of the rows."""
-        ...
 
     def objective(self, x: np.ndarray) -> float:
         """Value to be minimised; raises UnreachableError where it does not exist."""
-        ...
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the objective; raises UnreachableError as `objective` does."""
-        ...
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows; raises UnreachableError where they do not exist."""
-        ...
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the Jacobian on its pattern; raises UnreachableError as `rows` does."""
-        ...
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
         """Return what is known of the Lagrangian's Hessian in a solve from x; None if that is nothing."""
-        ...
 
 
 @dataclass(frozen=True)

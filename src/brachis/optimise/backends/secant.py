@@ -95,7 +95,7 @@ class SecantHessian:
             self._multipliers = multipliers
             self._learn(x, objective_multiplier, multipliers, known)
         values, vectors = np.linalg.eigh(known + self.learnt)
-        return np.asarray((vectors * np.abs(values)) @ vectors.T)
+        return (vectors * np.abs(values)) @ vectors.T
 
     def _learn(
         self,

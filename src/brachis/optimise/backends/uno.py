@@ -125,7 +125,7 @@ def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
     """
     slopes = np.ones(len(x))
     np.maximum.at(slopes, problem.jacobian_columns, np.abs(problem.jacobian(x)))
-    return np.asarray(1.0 / np.sqrt(slopes))
+    return 1.0 / np.sqrt(slopes)
 
 
 class _Stall:
