@@ -184,7 +184,8 @@ def plan(
             remarks += report_issues(end_time, strict=asked.strict)
             gap = None if deadline.passed else search.find_gap_of_best()
             if gap is not None and not end_time:
-                slow = gap.issues()
+                is_given = asked.spline.intervals != "auto"
+                slow = gap.issues(intervals_are_given=is_given)
                 for issue in slow:
                     warnings.warn(str(issue), SlowTimingWarning, stacklevel=2)
                 remarks += slow
@@ -254,7 +255,7 @@ def _open_search(
         check_regular(task_map, problem.start, problem.end)
     else:
         # Faulty decompositions are reported before the path is checked.
-        len(decompositions)  # finds them
+        decompositions.find()
     check_within_reach(task_map, problem.path)
     return Search(problem, decompositions, deadline, report)
 

@@ -67,7 +67,7 @@ def test_it_is_one_short_file():
     assert len(MODULE.read_text().splitlines()) <= 60
 
 
-def test_an_object_limits_the_motion(plugin):
+def test_an_object_limits_the_motion(plugin, tmp_path):
     task = task_with(ROOT / "examples/01_scara_line.yaml", **QUICK)
     free = brachis.plan(task)
     assert sums(free.trajectory).max() > UPPER + 0.2, "the limit should bind"
@@ -87,6 +87,12 @@ def test_an_object_limits_the_motion(plugin):
     assert entry.change(0.1) < -1e-3
     (checked,) = [each for each in report.check.entries if each.sensitivity == entry]
     assert checked.deviation < 0.05
+    result.trajectory.save(tmp_path / "limited.npz")
+    saved = brachis.Trajectory.load(tmp_path / "limited.npz")
+    assert saved.own_limits == ("coupled range",)
+    with pytest.warns(brachis.errors.BrachisWarning, match="coupled range"):
+        verify_trajectory(saved)
+    assert verify_trajectory(saved, own_limits=[model]).passed  # without a warning
     # A motion that was planned without it does not pass with it.
     assert not verify_trajectory(free.trajectory, own_limits=[model]).passed
 

@@ -76,11 +76,17 @@ def test_a_motion_with_few_knots_gets_its_own_path_s_fastest_timing(monkeypatch)
     assert -1e-3 < result.timing_gap.gap < 1e-3
 
 
+@pytest.mark.parametrize("intervals_are_given", [True, False])
 @pytest.mark.parametrize(
     ("part", "where"),
-    [((0.2, 0.31), "mostly at s = 0.2 to 0.31;"), ((0.0, 1.0), "all along the path;")],
+    [
+        ((0.2, 0.31), "mostly at s = 0.2 to 0.31;"),
+        ((0.0, 1.0), "along the whole path;"),
+    ],
 )
-def test_the_warning_says_where_time_is_lost(part, where):
+def test_the_warning_says_where_time_is_lost(part, where, intervals_are_given):
     gap = TimingGap(2.0, 1.8, 100, (), part)
-    (issue,) = gap.issues()
+    (issue,) = gap.issues(intervals_are_given=intervals_are_given)
     assert where in issue.message
+    advice = "spline.intervals: auto" if intervals_are_given else "search.time_limit"
+    assert advice in issue.message

@@ -49,6 +49,8 @@ def extract_trajectory(task: Task, solved: SolvedProgram) -> Trajectory:
         rows = joint_map.rows.coefficients
         chart_knots = joint_map.rows.knots
     nodes = join_nodes([part.nodes for part in parts])
+    limits = solved.program.phases[0].limits
+    own = [limit.name for limit in limits if limit.origin.startswith("own_limits")]
     return Trajectory(
         task=task,
         urdf=joint_map.robot.urdf,
@@ -66,6 +68,7 @@ def extract_trajectory(task: Task, solved: SolvedProgram) -> Trajectory:
         phase_ends=np.cumsum([part.nodes.times[-1] for part in parts]),
         chart_rows=rows,
         chart_knots=chart_knots,
+        own_limits=tuple(own),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -253,20 +253,24 @@ class Decompositions(Sequence[Decomposition]):
     """
 
     def __init__(self, problem: Problem, families: Sequence[ik.Family] = ()) -> None:
-        self._find = partial(decompositions_of, problem, families)
+        self._problem = problem
+        self._families = families
 
     @cached_property
-    def found(self) -> list[Decomposition]:
-        """All of them; raises as `decompositions_of` does."""
-        return self._find()
+    def _found(self) -> list[Decomposition]:
+        return decompositions_of(self._problem, self._families)
+
+    def find(self) -> list[Decomposition]:
+        """Return them all; raises as `decompositions_of` does."""
+        return self._found
 
     def __len__(self) -> int:
         """How many they are."""
-        return len(self.found)
+        return len(self.find())
 
     def __getitem__(self, index: Any) -> Any:
         """Return one of them, or some."""
-        return self.found[index]
+        return self.find()[index]
 
 
 def decompositions_of(

@@ -30,7 +30,7 @@ _STILL = 1e-9
 _SHARE = 0.8
 """Part of the lost time that lies in the s-interval that is named."""
 _EVERYWHERE = 0.7
-"""Length of an s-interval from which on it is not named: the time is lost all along the path."""
+"""Length of an s-interval from which on it is not named: the time is lost along the whole path."""
 
 
 class SlowTimingWarning(BrachisWarning):
@@ -94,19 +94,21 @@ class TimingGap(Summary):
             f"(on a grid of {self.places} places)"
         )
 
-    def issues(self) -> tuple[Issue, ...]:
+    def issues(self, *, intervals_are_given: bool) -> tuple[Issue, ...]:
         """Say where time is lost and what would do; nothing if that is too little to warn of, or if it is not known."""
         if self.gap <= WORTH_A_WARNING or self.left_out:
             return ()
         low, high = (round(s, 4) for s in self.s_interval)
         saved = 100.0 * (1.0 - self.least_time / self.t_end)
-        where = "all along the path"
+        where = "along the whole path"
         if high - low < _EVERYWHERE:
             where = f"mostly at s = {low:.3g} to {high:.3g}"
+        advice = "raise search.time_limit"
+        if intervals_are_given:
+            advice = "set spline.intervals: auto, or a larger number"
         message = (
-            f"another timing of the same joint path is {saved:.1f} % faster: {self.least_time:.4g} s; this is lost "
-            f"{where}; to come closer, set spline.intervals: auto or a larger number, or with auto raise "
-            "search.time_limit"
+            f"the same joint path can be passed in {self.least_time:.4g} s, {saved:.1f} % faster; the motion loses "
+            f"this time {where}; for a faster motion, {advice}"
         )
         found = f"a motion of {self.t_end:.4g} s"
         usual = f"less than {100.0 * WORTH_A_WARNING:.0f} %"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from brachis.common import tolerances
 from brachis.common.files import (
@@ -80,6 +80,7 @@ class _Meta(Model, extra="ignore", strict=True):
     degree: int
     joint_names: list[str]
     recovered: StoredRecovery | None = None
+    own_limits: list[str] = Field(default_factory=list)
 
 
 def write_result(
@@ -221,6 +222,7 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         "branch": meta.branch,
         "degree": meta.degree,
         "recovered": recovered and Recovered.of_file(recovered, robot.n),
+        "own_limits": tuple(meta.own_limits),
         **arrays,
     }
 

@@ -79,6 +79,8 @@ class Trajectory(Summary):
         Knots of its splines; none where the rows are constant (B = 1).
     recovered : Recovered or None
         Where the motion comes from, if it was not planned; its path is then known to a tolerance.
+    own_limits : tuple of str
+        Names of limits of the user's own that were no part of the task. The limits themselves are not saved.
 
     Examples
     --------
@@ -106,6 +108,7 @@ class Trajectory(Summary):
     chart_rows: np.ndarray
     chart_knots: np.ndarray
     recovered: Recovered | None = None
+    own_limits: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""
@@ -321,6 +324,7 @@ class Trajectory(Summary):
             "degree": self.degree,
             "joint_names": self.joint_names,
             "recovered": None if self.recovered is None else self.recovered.to_file(),
+            "own_limits": self.own_limits,
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
 

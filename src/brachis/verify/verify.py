@@ -8,11 +8,12 @@ optimiser's idea of it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.errors import InputError
+from brachis.errors import BrachisWarning, InputError
 from brachis.path import path_of
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
@@ -65,6 +66,11 @@ def verify_trajectory(
         (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`); or the motion would have to be
         looked at at more than 2,000,000 instants.
 
+    Warns
+    -----
+    BrachisWarning
+        The motion was planned with a limit of the user's own, which is not among `own_limits`.
+
     Examples
     --------
     >>> import brachis
@@ -89,6 +95,15 @@ def verify_trajectory(
     given = Given(trajectory, robot, task_map, path_of(task_map, task), options)
     path_check = _check_path(given)
     ratios = check_limits(given, own_limits)
+    names = [check.name for check in ratios]
+    left_out = [own for own in trajectory.own_limits if f"{own} ratio" not in names]
+    if left_out:
+        warnings.warn(
+            f"limits of your own that are not checked: {', '.join(left_out)}; the motion was planned with them, but "
+            "they are not saved with it. Pass them as brachis.verify_trajectory(motion, own_limits=[...])",
+            BrachisWarning,
+            stacklevel=2,
+        )
     checks = [
         path_check,
         *ratios,

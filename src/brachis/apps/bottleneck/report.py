@@ -309,7 +309,7 @@ def _timing(found: TimingGap, t_end: float) -> list[str]:
         return []
     line = (
         f"the timing costs about {_part(saved, t_end)}: the same joint path takes {found.least_time:.4g} s "
-        "with torques that may jump; to come closer, set spline.intervals: auto or a larger number"
+        "with torques that may jump; for a faster motion, set spline.intervals: auto or a larger number"
     )
     return [line]
 
