@@ -106,8 +106,11 @@ def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
         elif redundant < 4:
             assert "no two neighbours among them move in one plane" in reason
         else:
-            assert "do not meet in a point (one slides, or they miss it by 0." in reason
-            assert "the axes of j3, j2, j1 do not meet in a point (one slides" in reason
+            assert "do not meet in a point: they miss it by 0." in reason
+            assert (
+                "the axes of j3, j2, j1 do not meet in a point: a joint slides"
+                in reason
+            )
 
 
 def test_labels_say_where_the_arm_is():

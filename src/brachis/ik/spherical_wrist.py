@@ -71,8 +71,11 @@ class SphericalWristSolver(FactoredSolver):
         names = ", ".join(six.names[3:])
         centre = six.meeting(3, 4, 5)
         if centre is None:
+            reason = "a joint slides"
+            if six.revolute[3:].all():
+                reason = f"they miss it by {six.miss(3, 4, 5):.2g} m"
             raise NotApplicableError(
-                f"the axes of {names} do not meet in a point (one slides, or they miss it by {six.miss(3, 4, 5):.2g} m)"
+                f"the axes of {names} do not meet in a point: {reason}"
             )
         self._centre = centre
         point = f"the point where the axes of {names} meet"
