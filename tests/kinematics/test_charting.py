@@ -122,24 +122,6 @@ def test_given_rows_are_kept_and_name_the_joints_that_they_select(scara):
         assert chart.redundant_joints == names
 
 
-def test_rows_come_back_from_their_arrays(once_around):
-    task_map, path, s, q = once_around
-    for rows in (
-        chart_around(task_map, path, s, q).rows,
-        ChartRows.constant(np.array([[0.1, 0.2, 0.3]])),
-    ):
-        again = ChartRows(rows.coefficients, rows.knots)
-        pairs = [*zip(rows.at(s), again.at(s), strict=True)]
-        if not rows.is_constant:
-            own, other = rows.conditions(s, q), again.conditions(s, q)
-            pairs += [(own.turning, other.turning), (own.drift, other.drift)]
-        else:
-            assert rows.conditions(s, q).turning is None
-            assert again.conditions(s, q).turning is None
-        for first, second in pairs:
-            np.testing.assert_allclose(first, second, atol=1e-12)
-
-
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, np.pi / 2])
 def test_transversality_is_the_cosine_of_the_angle_to_the_self_motion(angle, scara):
     task_map, _ = path_from(scara, ["x", "y"], [{"line": {"by": [0.0, 0.2]}}], START)

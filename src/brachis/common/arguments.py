@@ -55,7 +55,7 @@ def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def _wrong_type(value: object, where: str, allowed: str) -> InputError:
-    found = f"{value!r:.60}"
+    found = f"{type(value).__name__} {value!r:.60}"
     return InputError("wrong type", where=where, found=found, allowed=allowed)
 
 

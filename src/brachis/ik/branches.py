@@ -43,8 +43,10 @@ def largest_size(
     size = float(np.abs(determinants).max())
     if size < tolerances.LENGTH:
         names = ", ".join(geometry.joint_names[i] for i in redundant)
-        more = f": there is always a motion of the tool that needs {names}"
-        raise NotApplicableError(f"J_nr is singular everywhere{more if names else ''}")
+        reason = "the joints cannot make all motions of the task space"
+        if names:
+            reason = f"there is always a motion of the tool that needs {names}"
+        raise NotApplicableError(f"J_nr is singular everywhere: {reason}")
     return size
 
 

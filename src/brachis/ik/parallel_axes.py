@@ -89,8 +89,8 @@ class ParallelAxesSolver(FactoredSolver):
         choices = [first for first in (1, 2) if _fits(joints, first)]
         if not choices:
             raise NotApplicableError(
-                "no three successive joints have parallel axes, with either one joint before and two after whose axes "
-                "meet, or a slide and a revolute joint before and one after, in this or the reverse order"
+                "no three successive joints with parallel axes have one joint before and two after them whose axes "
+                "meet, or a slide and a revolute joint before and one after them, in this or the reverse order"
             )
         self._first = choices[0]
         before = joints.revolute[: self._first].tolist()

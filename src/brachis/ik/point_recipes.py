@@ -306,7 +306,8 @@ def choose_recipe(point: str, joints: RemainingJoints) -> tuple[Recipe, Anchor |
         meeting = joints.meeting(*recipe.meets) if recipe.meets else None
         if meeting or (recipe.fits and recipe.fits(joints)):
             return recipe, meeting
-    names = ", ".join(sorted(joints.names[:3]))
+    in_order = sorted(zip(joints.joints[:3], joints.names[:3], strict=True))
+    names = ", ".join(name for _, name in in_order)
     raise NotApplicableError(
         f"no closed form moves {point} by {names}: no two neighbours among them move in one plane or have axes that "
         "meet in a fixed point"

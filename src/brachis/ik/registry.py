@@ -12,7 +12,7 @@ from __future__ import annotations
 import importlib.metadata
 import itertools
 import pickle
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 
@@ -49,7 +49,6 @@ BUILTIN: tuple[Family, ...] = (
 )
 """In the order in which they are tried."""
 _FAILED = "its code failed"
-_NAMELESS = "every family needs a name, and one of its own"
 NO_CLOSED_FORM = (
     "no choice of redundant joints has a closed form: "
     "motions are planned from differential inverse kinematics"
@@ -113,10 +112,18 @@ def check_families(families: Sequence[Family]) -> None:
             )
         if family in BUILTIN:  # to be tried first
             continue
-        if family.name in taken or not str(family.name or "").strip():
+        problem = _refuse_name(family.name, taken)
+        if problem:
             found = repr(family.name)
-            raise InputError(_NAMELESS, where=f"{where}.name", found=found)
+            raise InputError(problem, where=f"{where}.name", found=found)
         taken.add(family.name)
+
+
+def _refuse_name(name: object, taken: Collection[str]) -> str | None:
+    """Say why a family cannot have a name; None if it can."""
+    if not isinstance(name, str) or not name.strip():
+        return "a family needs a name"
+    return "a family of this name exists already" if name in taken else None
 
 
 @cache
@@ -135,10 +142,11 @@ def _load(entry: importlib.metadata.EntryPoint) -> Family:
     else:
         if not isinstance(family, Family):
             reason = f"the plug-in's entry point must be a Family, not {type(family).__name__}"
-        elif family.name in {own.name for own in BUILTIN}:
-            reason = _NAMELESS
         else:
-            return family
+            problem = _refuse_name(family.name, {own.name for own in BUILTIN})
+            if problem is None:
+                return family
+            reason = problem
 
     def refuse(*_arguments: object) -> IKSolver:
         """Say why the family cannot be used."""

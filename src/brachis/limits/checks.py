@@ -105,8 +105,8 @@ _MEMBERS: dict[str, tuple[str, Callable[[Any, Limit], object]]] = {
     ),
     "refusal": ("a text", _is_text),
 }
-"""What the members of a limit may be, in words and as a function that tells of a value whether it is; it may raise
-TypeError or ValueError if not. The labels and the arrays of the bounds are checked before."""
+"""Members of a limit, each with what is allowed: in words, and as a function of value and limit that tells whether it
+is. It may raise TypeError or ValueError if not. The labels and the arrays of the bounds are checked before."""
 
 
 def build_user_limits(
@@ -154,7 +154,10 @@ def build_user_limits(
         if has_check(model):
             moments = sample_moments(robot)
             motion = (moments.q, moments.qdot, moments.qddot, moments.torque(robot))
-            check_ratios(where, model, robot, motion, len(limit.labels))
+            few = [
+                own[: 1 + len(limit.labels) % 2] for own in motion
+            ]  # not as many as values
+            check_ratios(where, model, robot, few, len(limit.labels))
         labels |= {str(label) for label in limit.labels}
         limits.append(limit)
     return limits

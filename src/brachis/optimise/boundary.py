@@ -325,9 +325,11 @@ class Boundary:
     @property
     def rates(self) -> tuple[float, float]:
         """First derivatives of the first curve at start and end, 1/s; zero where these are free."""
-        sides = (self.start[0], self.end[0])
-        first, last = (float(side.derivatives[:1].sum()) for side in sides)
-        return first, last
+        first, last = (side.derivatives for side in (self.start[0], self.end[0]))
+        return (
+            float(first[0]) if len(first) else 0.0,
+            float(last[0]) if len(last) else 0.0,
+        )
 
     @property
     def ahead(self) -> np.ndarray:

@@ -410,6 +410,7 @@ class Phase:
 
     def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
         """Slopes of the curves and their time derivatives at an end, (4, c, z); see `end_pattern`."""
+        # As the slopes of values that are each one curve, or one of its derivatives, at this end.
         curves = len(self.boundary.start)
         values = ORDERS * curves
         by_curves = np.zeros((ORDERS, len(self.t_norm), values, curves))

@@ -336,7 +336,8 @@ class Program(Summary):
 
     def variables_from(self, motions: Sequence[Motion]) -> np.ndarray:
         """Point x nearest to given curves of every phase; see `Phase.variables_from`."""
-        return np.concatenate(list(map(Phase.variables_from, self.phases, motions)))
+        pairs = zip(self.phases, motions, strict=True)
+        return np.concatenate([phase.variables_from(own) for phase, own in pairs])
 
     def with_phases(self, phases: Iterable[Phase]) -> Program:
         """Return the program with other phases for the present ones, all else as it is."""
@@ -344,7 +345,8 @@ class Program(Summary):
 
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with other collocation points of every phase; see `Phase.with_points`."""
-        return self.with_phases(map(Phase.with_points, self.phases, t_norm))
+        pairs = zip(self.phases, t_norm, strict=True)
+        return self.with_phases(phase.with_points(own) for phase, own in pairs)
 
     def with_free_knots(self, shortest: float) -> Program:
         """Return the same program with interval lengths as variables; see `Phase.with_free_knots`."""

@@ -124,7 +124,8 @@ def violations(
         violation = max(violation, of_means)
         if of_means > goal:  # too few points everywhere
             more = [phase.t_norm[_EVERYWHERE] for phase in dense.phases]
-            missing = list(map(np.union1d, missing, more))
+            pairs = zip(missing, more, strict=True)
+            missing = [np.union1d(*pair) for pair in pairs]
     return violation, missing
 
 
@@ -395,7 +396,8 @@ def refine(
         factor, remaining = _lengthen(dense, answer, violation, options, by)
         if remaining <= goal:
             break
-        finer = program.with_points(list(map(merge_points, program.phases, missing)))
+        pairs = zip(program.phases, missing, strict=True)
+        finer = program.with_points([merge_points(*pair) for pair in pairs])
         is_same = finer.collocation_points == program.collocation_points
         if is_same or options.deadline.passed:
             break

@@ -364,12 +364,14 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
             continue
         branch = branch_of(task_map, match, posture, name)
         if branch not in branches:
+            other = "start posture" if wanted == "auto" else "task's branch"
+            leave_out = "end" if wanted == "auto" else "branch"
             raise StartError(
-                f"the {name} posture is on another branch",
+                f"the {name} posture is on another branch than the {other}",
                 where=f"{name}.joints",
                 found=labels[branch],
                 allowed=labels[branches[0]],
-                hint=f"Leave out branch and {name}, or set {name}.joints to a posture of that branch",
+                hint=f"Leave out {leave_out}, or set {name}.joints to a posture of that branch",
             )
         branches = (branch,)
     return Decomposition(problem, match, redundant, branches)

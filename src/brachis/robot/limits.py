@@ -143,12 +143,21 @@ def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
     by_joint: dict[str, Any] = {}
     for each in fields(spec):
         kind = each.name
-        value = getattr(spec, kind)
+        value = by_joint[kind] = _leave_open(getattr(spec, kind))
         is_list = kind in LIMIT_KINDS and isinstance(value, tuple)
         if is_list or isinstance(value, Mapping):
             stated = map_by_joint(f"robot.limits.{kind}", value, names, FROM_URDF)
             by_joint[kind] = stated or each.default
     return check_robot_settings({"limits": replace(spec, **by_joint)}).limits
+
+
+def _leave_open(value: Any) -> Any:
+    """Return limits with None for infinite figures."""
+    if isinstance(value, Mapping):
+        return {key: _leave_open(own) for key, own in value.items()}
+    if isinstance(value, tuple):
+        return tuple(map(_leave_open, value))
+    return None if isinstance(value, float) and np.isinf(value) else value
 
 
 def resolve_limits(
@@ -280,8 +289,9 @@ def _check_ranges(ranges: np.ndarray, names: Sequence[str]) -> None:
     for name, (lower, upper) in zip(names, ranges.T, strict=True):
         is_far = any(FARTHEST < abs(end) < np.inf for end in (lower, upper))
         if is_far or not upper - lower >= 1e-9:
+            problem = "is too far from zero" if is_far else "is empty"
             raise LimitError(
-                "position range is empty or too far from zero",
+                f"position range {problem}",
                 joint=name,
                 key=f"robot.limits.position.{name}",
                 found=f"[{lower:g}, {upper:g}]",
@@ -293,18 +303,24 @@ def _scale_limits(
     kind: str, limits: np.ndarray, factor: float, names: Sequence[str]
 ) -> np.ndarray:
     """Scale limits, (2, n), and refuse figures whose products and squares would not be accurate."""
-    with np.errstate(over="ignore"):
-        scaled = np.asarray(limits * factor)
-    sizes = scaled * [[-1.0], [1.0]]
-    is_wrong = np.isfinite(limits) & ~((sizes >= LEAST) & (sizes <= LARGEST))
-    for end, i in np.argwhere(is_wrong):
-        raise LimitError(
-            f"{kind} limit is too small or too large",
-            joint=names[i],
-            key=f"robot.limits.{kind}.{names[i]}",
-            found=f"{sizes[end, i]:g}",
-            allowed=f"{LEAST:g} to {LARGEST:g} in SI units, also after robot.limits.scale, or null for no limit",
-        )
+    scaled = np.asarray(limits * factor)
+    for own, key in (limits, kind), (scaled, f"scale.{kind}"):
+        sizes = own * [[-1.0], [1.0]]
+        is_wrong = np.isfinite(limits) & ~((sizes >= LEAST) & (sizes <= LARGEST))
+        for end, i in np.argwhere(is_wrong):
+            word = "scaled " if own is scaled else ""
+            problem = f"{word}{kind} limit is too small or too large"
+            if sizes[end, i] <= 0.0:
+                problem = f"{kind} limit in the URDF is not positive"
+            raise LimitError(
+                problem,
+                joint=names[i],
+                key=f"robot.limits.{key}"
+                if word
+                else f"robot.limits.{kind}.{names[i]}",
+                found=f"{sizes[end, i]:g}",
+                allowed=f"{LEAST:g} to {LARGEST:g} in SI units, also after robot.limits.scale, or null for no limit",
+            )
     return scaled
 
 

@@ -43,13 +43,11 @@ def read_posture(
     if isinstance(joints, Mapping):
         joints = {**defaults, **joints}
     else:
-        try:
-            joints = list(joints)
-        except TypeError:
+        is_list = isinstance(joints, Sequence) and not isinstance(joints, str | bytes)
+        if not is_list and np.ndim(joints) != 1:
             found = repr(joints)
-            raise InputError(
-                "wrong type", where=where, found=found, allowed=_ALLOWED
-            ) from None
+            raise InputError("wrong type", where=where, found=found, allowed=_ALLOWED)
+        joints = list(joints)
         is_short = len(joints) == len(names) - len(defaults)
         joints = [*joints, *defaults.values()] if is_short else joints
     values = per_joint_values(where, joints, names, None)

@@ -166,7 +166,7 @@ def read_chain(
     base_frame: str | None = None,
     locked_joints: tuple[tuple[str, float], ...] = (),
 ) -> UrdfChain:
-    """Read a URDF and find the chain from `base_frame` to `tool_frame`; plans of the same robot follow each other.
+    """Read a URDF and find the chain from `base_frame` to `tool_frame`; kept for the next plan of the robot.
 
     Parameters
     ----------

@@ -13,7 +13,6 @@ from typing import Any, TypeAlias, TypeVar
 
 from lxml import etree
 
-from brachis.common.words import write_count
 from brachis.errors import UrdfError, suggest
 from brachis.task.fields import LARGEST
 
@@ -106,6 +105,14 @@ def end_of(joint: Element, end: str) -> str:
 
 def _robot_element(text: str, where: str) -> Element:
     """Parse the text, and refuse anything but an expanded URDF."""
+    if not text.lstrip("\ufeff\t\r\n ").startswith("<"):
+        raise UrdfError(
+            "the file is not a URDF",
+            where=where,
+            found=f"{text[:20]!r} at its beginning",
+            allowed="XML, with the root element <robot>",
+            hint="Name a URDF, or a robot that comes with brachis: brachis robots lists them",
+        )
     parser = etree.XMLParser(
         remove_blank_text=True, resolve_entities=False, encoding="utf-8"
     )
@@ -113,13 +120,10 @@ def _robot_element(text: str, where: str) -> Element:
         robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
     except etree.XMLSyntaxError as error:
         raise UrdfError(
-            "the file is not a URDF, or not well-formed XML",
+            "the URDF file is not well-formed XML",
             where=where,
-            found=f"{text[:20]!r} at its beginning: {error}",
-            allowed="XML, with the root element <robot>",
-            hint=_EXPAND
-            if "xacro" in str(error)
-            else "Name a URDF, or a robot that comes with brachis: brachis robots lists them",
+            found=str(error),
+            hint=_EXPAND if "xacro" in str(error) else None,
         ) from error
     if robot.tag != "robot":
         raise UrdfError(
@@ -132,7 +136,7 @@ def _robot_element(text: str, where: str) -> Element:
     for element in robot.iter(etree.Element):
         name = re.split("[:}]", element.tag)[-1]
         expressions = [value for value in element.values() if "${" in value]
-        if "xacro" in element.tag or expressions:
+        if "xacro" in (element.prefix, name) or "xacro" in element.tag or expressions:
             raise UrdfError(
                 "the URDF has xacro macros",
                 where=_place_of(element, where),
@@ -307,10 +311,18 @@ def _check_entry(owner: Element, entry: Entry, where: str) -> None:
         _NUMBER.fullmatch(word) and abs(float(word)) <= entry.largest for word in words
     ):
         return
+    finite = "a finite number"
+    if entry.count > 1:
+        finite = f"{entry.count} finite numbers separated by spaces"
+    if entry.largest < sys.float_info.max:
+        finite += f" of at most {entry.largest:g} in size"
+    hint = None
+    if words:
+        hint = "Write numbers with decimal points, spaces between them, and no units"
     raise UrdfError(
         f"<{tag} {entry.attribute}> is {'missing' if text is None else 'wrong'}",
         where=_place_of(elements[0], where),
         found=None if text is None else f'{entry.attribute}="{text}"',
-        allowed=f"{write_count(entry.count, 'finite number')}, {entry.unit}, at most {entry.largest:g} in size",
-        hint="Write numbers with decimal points, spaces between them, and no units",
+        allowed=f"{finite}, {entry.unit}",
+        hint=hint,
     )

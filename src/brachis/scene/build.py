@@ -72,8 +72,9 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         (first, second)
         for first, second in itertools.combinations(range(len(solids)), 2)
         if joints[first] != joints[second]
-        and disabled.isdisjoint(
-            map(frozenset, itertools.product(names[first], names[second]))
+        and not any(
+            frozenset(pair) in disabled
+            for pair in itertools.product(names[first], names[second])
         )
     ]
     numbers = np.reshape(pairs, (-1, 2)).astype(int)

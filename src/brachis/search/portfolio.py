@@ -304,7 +304,7 @@ class Search:
             self.candidates,
             self._dead_ends,
             self._deadline,
-            self.not_completed(),
+            self.not_completed() if self.interrupted else (),
         )
 
     def not_completed(self) -> tuple[str, ...]:

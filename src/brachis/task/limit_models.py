@@ -261,7 +261,7 @@ class SpeedTable(Model):
             (
                 thrice,
                 "s",
-                f"there are more than two speeds at {thrice}",
+                f"there are more than two speeds at s = {', '.join(f'{s:g}' for s in thrice[:1])}",
                 "each path coordinate once, or twice for a step",
             ),
         )

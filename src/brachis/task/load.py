@@ -95,7 +95,7 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
             f"{where} is a list of {len(place)}",
             where=key,
             found=f"{where}.{part}",
-            allowed=f"an index below {len(place)}",
+            allowed=", ".join(map(str, range(len(place)))) or "none: it is empty",
         )
     return int(part)
 
@@ -185,7 +185,7 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     if not isinstance(source, str | os.PathLike) or "\n" in str(source):
         raise TaskError(
             "a task cannot be loaded from this",
-            found=show(source),
+            found=show(source) if isinstance(source, str) else type(source).__name__,
             allowed="a file name, a mapping, or a Task; a URDF as text is for Robot.from_urdf(name, urdf_text=text)",
         )
     path = Path(source)

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import (
+    AfterValidator,
     ConfigDict,
     Field,
     JsonValue,
@@ -43,13 +44,19 @@ Profile = Annotated[
 ]
 
 
+def _unit_length(quaternion: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*quaternion)
+    if abs(length - 1.0) > 0.01:
+        raise refuse(
+            f"the quaternion's length is {length:.6g}",
+            found=quaternion,
+            allowed="a quaternion of length 1, to 1 %",
+        )
+    return quaternion
+
+
 _Quaternion = Annotated[
-    tuple[Number, Number, Number, Number],
-    must(
-        lambda quaternion: abs(math.hypot(*quaternion) - 1.0) <= 0.01,
-        "the quaternion's length is not 1",
-        "a quaternion of length 1, to 1 %",
-    ),
+    tuple[Number, Number, Number, Number], AfterValidator(_unit_length)
 ]
 _DEGREES = "_deg"
 

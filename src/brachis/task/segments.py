@@ -384,7 +384,7 @@ class MovingSegment(SegmentModel):
                 self.orientation is not None and has_own,
                 "orientation",
                 f"the {self.kind} already has orientations",
-                f"orientation or orientations in the {self.kind}, not both",
+                f"orientation, or the orientations of the {self.kind} itself, not both",
             )
         )
 

@@ -112,7 +112,7 @@ class PositionTolerance(Model):
                 self.axes == "world" and len(given) < len(POSITION),
                 "axes",
                 "a box along the world's axes needs all three lengths",
-                "x, y and z with it, or axes: tool",
+                f"x, y and z with it (there is {' and '.join(given) or 'none'}), or axes: tool",
             )
         )
 

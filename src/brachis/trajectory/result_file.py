@@ -233,7 +233,7 @@ def _refuse_unless(
     if fits:
         return
     if isinstance(found, np.ndarray):
-        found = f"an array of {found.dtype}, {found.shape}"
+        found = f"an array of {found.dtype}, {found.shape}, that begins with {found.ravel()[:4].tolist()}"
     raise InputError(problem, where=where, found=found, allowed=allowed)
 
 
@@ -329,5 +329,5 @@ def _check_nodes(times: np.ndarray) -> None:
         "times",
         "the motion has too many nodes",
         times.size,
-        f"{_MOST_NODES}: import fewer rows, or a part of them",
+        f"at most {_MOST_NODES}; import fewer rows, or a part of them",
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
-
 import numpy as np
 
 from brachis.path.legs import Leg
@@ -94,7 +92,7 @@ def check_process_speed(given: Given) -> list[Check]:
     if not legs:
         return []
     found = [_worst_deviation(given, leg) for leg in legs]
-    worst = max(found, key=attrgetter("ratio"))
+    worst = found[int(np.argmax([each.ratio for each in found]))]  # NaN too
     speed = (worst.ratio, _SPEED, "relative", worst.subject, worst.time, worst.remark)
     title = "s where process speeds begin and end"
     misses = [_distance(_nearest_phase(given, leg), leg) for leg in legs]

@@ -9,6 +9,7 @@ optimiser's idea of it.
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -95,8 +96,8 @@ def verify_trajectory(
     given = Given(trajectory, robot, task_map, path_of(task_map, task), options)
     path_check = _check_path(given)
     ratios = check_limits(given, own_limits)
-    names = [check.name for check in ratios]
-    left_out = [own for own in trajectory.own_limits if f"{own} ratio" not in names]
+    names = Counter(check.name.removesuffix(" ratio") for check in ratios)
+    left_out = Counter(trajectory.own_limits) - names
     if left_out:
         warnings.warn(
             f"limits of your own that are not checked: {', '.join(left_out)}; the motion was planned with them, but "

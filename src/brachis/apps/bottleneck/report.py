@@ -194,8 +194,9 @@ def report(
         active = saturations(trajectory)
         phases = limits_by_phase(trajectory, active)
         return BottleneckReport(trajectory.t_end, None, active, phases)
+    is_loaded = isinstance(motion, Trajectory)
     refined = None if isinstance(motion, Trajectory) else motion.candidate.refined
-    if refined is None and motion is not trajectory:
+    if refined is None and not is_loaded:
         raise InputError(
             "the result contains no solved optimisation problem",
             where="result",

@@ -24,6 +24,7 @@ from brachis.errors import (
     InputError,
     ResultFileError,
     TaskError,
+    check_names,
 )
 
 _EPILOG = """
@@ -144,18 +145,18 @@ class DocumentedCommand(TyperCommand):
 
     def __init__(self, *args: Any, **keywords: Any) -> None:
         super().__init__(*args, **keywords)
-        docstring = str(inspect.getdoc(self.callback))
+        docstring = inspect.getdoc(self.callback) or ""  # none under python -OO
         titles = r"\n\n(Parameters|Examples)\n-+\n"
         self.help, *parts = re.split(titles, docstring)
         sections = dict(zip(parts[::2], parts[1::2], strict=True))
         # The help must not wrap examples, so that each can be copied.
-        self.epilog = f"\b\nExamples:\n{indent(sections['Examples'], '  ')}"
+        self.epilog = f"\b\nExamples:\n{indent(sections.get('Examples', ''), '  ')}"
         entry = re.compile(r"^(\w+) : .*\n((?: +.*\n?)+)", re.MULTILINE)
         own = sections.get("Parameters", "")
         texts = dict(entry.findall(_SHARED) + entry.findall(own))
         parameters: list[Any] = self.params
         for parameter in parameters:
-            parameter.help = " ".join(texts[parameter.name].split())
+            parameter.help = " ".join(texts.get(parameter.name, "").split())
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
         """Split such words before the options are read."""
@@ -343,6 +344,9 @@ def urdf_of(given: Path) -> Path:
     Raises
     ------
     UnknownNameError
-        There is no file and no robot of this name, but a robot of a name like it.
+        There is neither a file nor a robot of this name.
     """
-    return Path(brachis.robots.locate(str(given)))  # type: ignore[arg-type]
+    if is_file(given) or is_folder(given) or given.suffix or len(given.parts) > 1:
+        return given
+    check_names("URDF file or robot", [str(given)], brachis.robots.names(), "URDF")
+    return brachis.robots.path_of(str(given))

@@ -66,13 +66,14 @@ def check_output(
     """
     from brachis.apps.export.formats import FORMATS
 
-    found = None
+    problem = "the file cannot be written"
     if is_folder(out):
         found = "a folder of this name"
-    elif not is_folder(out.parent):
+        raise InputError(problem, where=str(out), found=found)
+    if not is_folder(out.parent):
         found = f"no folder {out.parent}"
-    if found is not None:
-        raise InputError("the file cannot be written", where=str(out), found=found)
+        hint = "Make the folder first"
+        raise InputError(problem, where=str(out), found=found, hint=hint)
     if not is_file(out):
         return
     for path in inputs:

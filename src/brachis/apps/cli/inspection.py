@@ -337,7 +337,12 @@ def _robot_of_urdf(
 
     locked = {}
     for text in lock:
-        name, _, value = text.partition("=")
+        name, equals, value = text.partition("=")
+        if not equals:
+            allowed = "name=value, in rad or m"
+            raise InputError(
+                "not understood", where="--lock", found=text, allowed=allowed
+            )
         locked[name] = float(numbers(value, f"--lock {name}", "rad or m"))
     robot = brachis.Robot.from_urdf(
         path,

@@ -200,7 +200,6 @@ class Rail:
         carriage = f"{self.name}_carriage"
         low, high = self.range
         speed = self.velocity
-        speed = self.velocity
         x, y, z = self.axis
         width, depth, height = self.carriage_size
         turn = pin.rpy.rpyToMatrix(*self.mount_rpy)

@@ -115,9 +115,10 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
     missing = [key for key in wanted if key not in columns]
     problems += [f"{_describe(*key)} is missing" for key in missing]
     if problems:
+        shown = [*header[:8], "..."] if len(header) > 8 else header
         raise TaskError(
             problems[0],
-            found=", ".join(header[:8]) + ", ..." * (len(header) > 8),
+            found=", ".join(shown),
             allowed=_allowed_columns(joints),
             where=where,
         )

@@ -224,7 +224,8 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
             )
     if refused:
         # One wrong key refuses the plans of all others.
-        key = max(refused, key=lambda key: key in refused[key])
+        named = [key for key, text in refused.items() if key in text]
+        key = (named or [*refused])[0]
         raise TaskError(refused[key], where=f"{name}: {key}")
 
 

@@ -80,7 +80,7 @@ def link_shapes(
         files = [str(mesh.get("filename")) for mesh in meshes]
         paths = [path for file in files if (path := mesh_file(file, folder))]
         if len(paths) < len(files):
-            absent += files
+            absent += [file for file in files if not mesh_file(file, folder)]
             continue
         try:
             for mesh, path in zip(meshes, paths, strict=True):

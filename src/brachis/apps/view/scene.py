@@ -93,9 +93,10 @@ class Scene:
     def _show_closest(self, q: np.ndarray) -> None:
         """Move the line to the closest bodies in a posture, (n,), and write their distance."""
         cell = self._cell
-        line, label = self.layers["closest pair"]
-        if cell is None or not line.visible:
+        pair = self.layers["closest pair"]
+        if cell is None or not pair or not pair[0].visible:
             return
+        line, label = pair
         found = cell.find_closest(Chain.of(self._robot.model).place(q[None]))
         line.points = found.points
         label.position = found.points[0].mean(axis=0)

@@ -27,7 +27,7 @@ _LARGEST = 1e30
 _TRIAL_ITERATIONS = 10
 """Iterations before a solve is compared with `SolverOptions.to_beat`."""
 _NEARLY_FEASIBLE = 1e-3
-"""Violation of rows up to which an iterate counts, unless one up to which it is feasible is larger."""
+"""Violation of rows up to which an iterate counts, or ten times the tolerance if that is larger."""
 
 Function = Callable[[np.ndarray], float | np.ndarray]
 """Of the variables of a problem."""
@@ -255,7 +255,7 @@ def residual(problem: Problem, x: np.ndarray) -> float:
     """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
     of_bounds = np.minimum(x - problem.x_lower, problem.x_upper - x)
     least = float(np.append(row_slack(problem, x), of_bounds).min(initial=0.0))
-    return np.inf if np.isnan(least) else -least
+    return np.inf if np.isnan(least) else 0.0 - least
 
 
 def row_slack(problem: Problem, x: np.ndarray) -> np.ndarray:
