@@ -10,15 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from brachis.errors import PathError
-from brachis.path import Array, Curve, SequencePath, build_path
+from brachis.path import Array, Curve, Path, build_path
 from brachis.path.blends import septic
 from brachis.path.context import SegmentContext
 from brachis.task import ArcSegment, load_task
 
 
-def path_of(
-    segments: list[dict[str, Any]], start: Any, rows: list[str]
-) -> SequencePath:
+def path_of(segments: list[dict[str, Any]], start: Any, rows: list[str]) -> Path:
     """Build a path from segments as a task file writes them."""
     task = load_task(
         {
@@ -30,7 +28,7 @@ def path_of(
         }
     )
     path = build_path(task.path, start, rows)
-    assert isinstance(path, SequencePath)
+    assert isinstance(path, Path)
     return path
 
 

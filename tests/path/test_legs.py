@@ -77,9 +77,19 @@ def test_a_path_may_begin_and_end_at_the_speed() -> None:
 @pytest.mark.parametrize(
     ("parts", "boundary", "key", "said"),
     [
-        (part(0.1, 0.2, 0.5), {}, "[0].s", "Cut the part in two"),
-        (part(0.1, 0.1, 1 / 3), {}, "[0].s", "Leave room between s = 0.333333 and"),
-        (part(0.1, 1 / 3, 0.5), {}, "[0].s", "Leave room between s = 0.333333 and"),
+        (part(0.1, 0.2, 0.5), {}, "[0].s", "cut the part in two"),
+        (
+            part(0.1, 0.1, 1 / 3),
+            {},
+            "[0].s",
+            "Leave room before and behind s = 0.333333",
+        ),
+        (
+            part(0.1, 1 / 3, 0.5),
+            {},
+            "[0].s",
+            "Leave room before and behind s = 0.333333",
+        ),
         (part(0.1, 0.0, 0.2), {}, "[0].s[0]", "Set boundary.start_speed to 0.1"),
         (part(0.1, 0.8, 1.0), {}, "[0].s[1]", "Set boundary.end_speed to 0.1"),
         (

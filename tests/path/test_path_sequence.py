@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brachis.path import SequencePath, build_path
+from brachis.path import Path, build_path
 from brachis.task import load_task
 
 MIXED: list[dict[str, Any]] = [
@@ -20,23 +20,21 @@ MIXED: list[dict[str, Any]] = [
 ]
 
 
-def path_of(
-    segments: list[dict[str, Any]], start: Any, rows: list[str]
-) -> SequencePath:
+def path_of(segments: list[dict[str, Any]], start: Any, rows: list[str]) -> Path:
     task = load_task(
         {"brachis": 1, "start": {"joints": [0]}, "task_space": rows, "path": segments}
     )
     path = build_path(task.path, start, rows)
-    assert isinstance(path, SequencePath)
+    assert isinstance(path, Path)
     return path
 
 
 @pytest.fixture
-def mixed() -> SequencePath:
+def mixed() -> Path:
     return path_of(MIXED, [0, 0, 0.3], ["x", "y", "yaw"])
 
 
-def test_derivatives_by_s(mixed: SequencePath) -> None:
+def test_derivatives_by_s(mixed: Path) -> None:
     s = np.random.default_rng(3).uniform(0.001, 0.999, 300)
     h = 1e-6
     s = s[np.abs(s[:, None] - mixed.breaks).min(axis=1) > 2 * h]
@@ -49,7 +47,7 @@ def test_derivatives_by_s(mixed: SequencePath) -> None:
         np.testing.assert_allclose(difference, exact, atol=1e-6 * np.abs(exact).max())
 
 
-def test_three_derivatives_continue_across_all_joins(mixed: SequencePath) -> None:
+def test_three_derivatives_continue_across_all_joins(mixed: Path) -> None:
     assert (
         mixed.breaks.size == 8
     )  # three lines and arcs, a spline, and a blend at each of three corners
@@ -77,7 +75,7 @@ def test_without_a_blend_the_third_derivative_would_jump() -> None:
     assert np.linalg.norm(jump) > 1
 
 
-def test_ends_and_length(mixed: SequencePath) -> None:
+def test_ends_and_length(mixed: Path) -> None:
     ends = mixed.sample([0.0, 1.0]).target
     np.testing.assert_allclose(ends[0], [0, 0, 0.3])
     corner = np.array([1 - 0.3, 0.6 * np.sin(np.deg2rad(120))])
@@ -160,7 +158,7 @@ def test_smooth_continuations_need_no_blend(segments: list[dict[str, Any]]) -> N
     )
 
 
-def test_the_path_continues_smoothly_beyond_its_ends(mixed: SequencePath) -> None:
+def test_the_path_continues_smoothly_beyond_its_ends(mixed: Path) -> None:
     h = 1e-7
     outside = mixed.sample([-h, 0.0, 1.0, 1 + h])
     np.testing.assert_allclose(
@@ -171,7 +169,7 @@ def test_the_path_continues_smoothly_beyond_its_ends(mixed: SequencePath) -> Non
     )
 
 
-def test_nan_stays_nan(mixed: SequencePath) -> None:
+def test_nan_stays_nan(mixed: Path) -> None:
     sample = mixed.sample([0.5, np.nan])
     assert np.all(np.isnan(sample.target[1]))
     assert not np.any(np.isnan(sample.xi_dds[0]))

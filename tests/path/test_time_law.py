@@ -53,7 +53,7 @@ def test_it_is_linear_on_lines_and_circles(
     np.testing.assert_allclose(s, np.linspace(0.2, 0.7, 5), atol=1e-14)
     np.testing.assert_allclose(rates[0], 0.1 / length, rtol=1e-12)
     assert np.abs(rates[1:]).max() == 0.0
-    np.testing.assert_allclose(law.at_end(-1), [0.7, 0.1 / length, 0, 0], rtol=1e-12)
+    np.testing.assert_allclose(law.ends[-1], [0.7, 0.1 / length, 0, 0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -183,6 +183,6 @@ def test_its_ends_are_exact(case: Any) -> None:
             slope * rate[2],
             (bend * rate[2] + slope**2) * rate[2],
         ]
-        np.testing.assert_allclose(law.at_end(end), expected, rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(law.ends[end], expected, rtol=1e-4, atol=1e-6)
         spline = law.at(np.array([0.0, law.duration]))[:, end]
-        np.testing.assert_allclose(law.at_end(end), spline, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(law.ends[end], spline, rtol=1e-5, atol=1e-6)

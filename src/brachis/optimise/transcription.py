@@ -123,7 +123,7 @@ def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
         time_law = problem.time_laws[beside]
         if time_law is None:
             return np.empty(0)
-        derivatives = time_law.at_end(-1 - side)
+        derivatives = time_law.ends[-1 - side]
         return derivatives[1 : 1 + derivatives_in_motion(problem)]
     derivatives = np.zeros(problem.task.spline.vanishing)
     derivatives[0] = problem.leg_rates[number][side]

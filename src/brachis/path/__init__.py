@@ -4,8 +4,8 @@ from brachis.path.build import build_path, check_on_path, path_of
 from brachis.path.from_curve import bspline_segment, with_feed_rates
 from brachis.path.legs import Leg, legs_of
 from brachis.path.pose import PosePath
-from brachis.path.protocol import Array, Curve, Path, PathSample
-from brachis.path.sequence import PathFrame, SequencePath, check_closed, path_speed
+from brachis.path.protocol import Array, Curve, PathSample
+from brachis.path.sequence import Path, PathFrame, check_closed, path_speed
 from brachis.path.time_law import TimeLaw, time_law_of
 
 __all__ = [
@@ -16,7 +16,6 @@ __all__ = [
     "PathFrame",
     "PathSample",
     "PosePath",
-    "SequencePath",
     "TimeLaw",
     "bspline_segment",
     "build_path",

@@ -59,7 +59,7 @@ def blend_rows(join: Join, size: float) -> Curve:
     PathError
         The blend is longer than half of a neighbour, or (nearly) stops or reverses; or a neighbour moves yaw alone.
     """
-    _check_neighbours(join, size, still="yaw alone moves", turning="yaw")
+    _check_neighbours(join, size)
     return _blend(join, *join.sides(size))
 
 
@@ -73,8 +73,7 @@ def blend_poses(join: Join, size: float) -> Curve:
     PathError
         As for rows; or the tool turns too much in the blend.
     """
-    still = "the tool turns on the spot"
-    _check_neighbours(join, size, still=still, turning="the tool")
+    _check_neighbours(join, size)
     start, end = map(_with_quaternion, join.sides(size))
     end[:, POSITIONS:] *= _sign(join, size)
     columns = _blend(join, start, end)
@@ -89,10 +88,8 @@ def blend_poses(join: Join, size: float) -> Curve:
     return quaternion_curve(columns)
 
 
-def _check_neighbours(join: Join, size: float, *, still: str, turning: str) -> None:
+def _check_neighbours(join: Join, size: float) -> None:
     """Refuse a blend where the position stands still, or that is too long.
-
-    `still` says what happens where it stands still, and `turning` names what turns there.
 
     Raises
     ------
@@ -101,10 +98,10 @@ def _check_neighbours(join: Join, size: float, *, still: str, turning: str) -> N
     found = f"{size:g} {join.unit}"
     if any(stands_still(curve, join.positions) for curve in (join.first, join.second)):
         raise join.wrong_blend(
-            f"a blend needs motion of the position on both sides, and {still} on one",
+            "a blend needs motion of the position on both sides, and on one the tool turns on the spot",
             found,
             "no blend here",
-            f"Turn {turning} along a line, or stop there, with stop: true instead of the blend",
+            "Turn the tool along a line, or stop there, with stop: true instead of the blend",
         )
     longest = join.shorter / 2
     if size > longest * (1.0 + tolerances.ROUNDING):
@@ -147,9 +144,7 @@ def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
 
 def _with_quaternion(pose: Array) -> Array:
     """Return the derivatives of position and quaternion, (4, 7), from those of a pose, (4, 12)."""
-    return np.concatenate(
-        [pose[:, :POSITIONS], quaternion_derivatives(rotations(pose))], axis=1
-    )
+    return np.concatenate([pose[:, :POSITIONS], quaternion_derivatives(pose)], axis=1)
 
 
 def _sign(join: Join, size: float) -> float:

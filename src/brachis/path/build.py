@@ -8,11 +8,12 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.common.words import write_apart
-from brachis.errors import PathError, StartError
+from brachis.errors import StartError
 from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
 from brachis.path.joins import find_joins, refuse_corners
-from brachis.path.protocol import Array, Curve, Path
-from brachis.path.sequence import PathFrame, Piece
+from brachis.path.pose import POSITIONS, PosePath, rotations
+from brachis.path.protocol import Array, Curve
+from brachis.path.sequence import Path, PathFrame, Piece
 from brachis.robot import Robot, TaskMap
 from brachis.robot.plausibility import (
     distance_hint,
@@ -56,8 +57,6 @@ def build_path(
     PathError
         A segment does not fit the task space, has zero length or is not defined; or the path has a corner that is not
         blended and no stop, or a blend that does not fit. The message names the key.
-    UnknownNameError
-        The row does not exist.
 
     Examples
     --------
@@ -67,12 +66,19 @@ def build_path(
     [[1.0, 1.0]]
     """
     rows = tuple(task_space_rows)
-    coordinates = _coordinates(rows)
-    point = coordinates.check_start(np.array(start, dtype=float))
+    point = np.array(start, dtype=float)
+    path_type = Path
+    coordinates = RowCoordinates(rows)
+    if joints_of(rows):
+        coordinates = JointCoordinates(rows)
+    elif rows == POSE_ROWS:
+        path_type = PosePath
+        coordinates = PoseCoordinates()
+        # The nearest rotation: the polar decomposition without its stretch.
+        left, _, right = np.linalg.svd(rotations(point))
+        point[POSITIONS:] = (left @ right).ravel()
     if frame is not None:
         point = frame.to_frame(point)
-    if not segments:
-        raise PathError("a path needs at least one segment", where="path")
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
         curve = coordinates.curve(segment, i, point)
@@ -81,14 +87,7 @@ def build_path(
     pieces = _join(curves, segments, coordinates)
     positions = len(position_rows(coordinates.rows))
     stopping = [i for i, segment in enumerate(segments) if segment.stop]
-    return coordinates.path_type.of(pieces, positions, frame, stopping)
-
-
-def _coordinates(rows: tuple[str, ...]) -> RowCoordinates:
-    """Return what the coordinates of a task space with these rows are."""
-    if joints_of(rows):
-        return JointCoordinates(rows)
-    return PoseCoordinates() if rows == POSE_ROWS else RowCoordinates(rows)
+    return path_type.of(pieces, positions, frame, stopping)
 
 
 def _join(
@@ -176,7 +175,6 @@ def check_on_path(
     if miss[worst] > largest:
         unit = task_map.units[worst]
         found, allowed = write_apart(miss[worst], largest, digits=3)
-        end = "beginning" if name == "start" else "end"
         raise StartError(
             f"the {name} posture is off the path",
             where=f"{name}.joints",
@@ -184,7 +182,7 @@ def check_on_path(
             allowed=f"at most {allowed} {unit}",
             hint=_place_hint(task_map, place, target)
             or _posture_hint(task_map.robot, posture)
-            or f"Choose a posture whose tool is at the path's {end}",
+            or f"Choose a posture whose tool is at the path's {name}",
         )
 
 
@@ -199,13 +197,13 @@ def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
 def _place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
     """Say what stated coordinates, (c,), that are not the tool's, (c,), look like."""
     axes = len(task_map.axes)
-    found = place_hint(place[:axes], target[:axes], task_map.rows)
-    if found is None and axes:
+    hint = place_hint(place[:axes], target[:axes], task_map.rows)
+    if axes:
         robot = task_map.robot
         base = np.array(robot.model.jointPlacements[1].translation)[list(task_map.axes)]
         away = float(np.linalg.norm(target[:axes] - base))
-        far = reach(robot)
-        found = distance_hint(away, far) if away > far else None
-    if found is None and len(target) == axes + 9:
-        return turn_hint(place[axes:].reshape(3, 3), target[axes:].reshape(3, 3))
-    return found
+        hint = hint or distance_hint(away, reach(robot))
+    if len(target) == axes + 9:
+        turned, wanted = (one[axes:].reshape(3, 3) for one in (place, target))
+        hint = hint or turn_hint(turned, wanted)
+    return hint

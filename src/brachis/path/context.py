@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.errors import PathError
+from brachis.errors import Details, PathError
 from brachis.path.protocol import Array, Curve
 from brachis.robot.task_map.protocol import position_rows
 
@@ -25,17 +26,11 @@ class SegmentContext:
         Task coordinates at which the segment starts.
     rows : tuple of str
         Rows of the task space; of a pose its position rows.
-    to_turn : str or None
-        Hint for those who want to turn the tool on the spot.
-    along_tangent : str
-        Hint for those who want the tool to turn with the tangent.
     """
 
     key: str
     start: Array
     rows: tuple[str, ...]
-    to_turn: str | None = None
-    along_tangent: str = "Add yaw to task_space"
 
     @property
     def positions(self) -> tuple[str, ...]:
@@ -87,21 +82,15 @@ class SegmentContext:
             key,
             found=found,
             allowed="a motion away from the segment's start",
-            hint=self.to_turn,
+            hint="With task_space: pose, a segment turn: {...} turns the tool on the spot",
         )
 
     def wrong(
-        self,
-        problem: str,
-        key: str = "",
-        *,
-        found: object = None,
-        allowed: object = None,
-        hint: str | None = None,
+        self, problem: str, key: str = "", **details: Unpack[Details]
     ) -> PathError:
         """Return the error that a key of the segment, such as ``.normal``, is wrong."""
-        where = f"{self.key}{key}"
-        return PathError(problem, found=found, allowed=allowed, where=where, hint=hint)
+        details["where"] = f"{self.key}{key}"
+        return PathError(problem, **details)
 
 
 def place(rows: Sequence[str], point: Array) -> str:

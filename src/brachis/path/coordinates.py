@@ -25,16 +25,15 @@ from brachis.path.curves import (
 )
 from brachis.path.joins import pose_corner, row_corner
 from brachis.path.orientation import orientation_along, turn_of
-from brachis.path.pose import POSITIONS, PosePath, pose_curve, rotations
+from brachis.path.pose import POSITIONS, pose_curve, rotations
 from brachis.path.protocol import Array, Curve, MappedCurve
-from brachis.path.sequence import SequencePath
 from brachis.path.splines import (
     bspline_curve,
     pose_bspline,
     pose_spline,
     spline_through,
 )
-from brachis.robot.task_map.protocol import AXES, POSE_COORDINATES, ROWS, YAW, joints_of
+from brachis.robot.task_map.protocol import AXES, joints_of
 from brachis.task.point_data import PointFile
 from brachis.task.segments import (
     ArcCenter,
@@ -90,28 +89,8 @@ class RowCoordinates:
     """
 
     rows: tuple[str, ...]
-    path_type = SequencePath
     corner = staticmethod(row_corner)
     blend = staticmethod(blend_rows)
-
-    def check_start(self, start: Array) -> Array:
-        """Return the coordinates of the path's start after a check, freed of rounding.
-
-        Raises
-        ------
-        PathError, UnknownNameError
-        """
-        for row in self.rows:
-            if row not in ROWS:
-                raise UnknownNameError("task space row", row, ROWS, where="task_space")
-        if start.shape != (len(self.rows),) or not np.all(np.isfinite(start)):
-            raise PathError(
-                "the start of the path needs one finite coordinate for each row of the task space",
-                found=start.tolist(),
-                allowed=f"[{', '.join(self.rows)}]",
-                where="start",
-            )
-        return start
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """Return the curve of the segment with this index in the path, from its start on.
@@ -122,19 +101,13 @@ class RowCoordinates:
             The segment has zero length, or does not fit these coordinates.
         """
         context = SegmentContext(f"path[{index}].{segment.kind}", start, self.rows)
-        found = f"task_space [{', '.join(self.rows)}]"
-        hint = "Set task_space: pose"
-        if isinstance(segment, TurnSegment):
-            if YAW in self.rows:
-                hint = "Use line: {by: [0, 0, ...]} to turn yaw"
-            problem = "a turn needs a task space of poses"
-            raise context.wrong(problem, found=found, hint=hint)
-        if segment.orientation is not None:
+        if isinstance(segment, TurnSegment) or segment.orientation is not None:
+            key = "turn" if isinstance(segment, TurnSegment) else "orientation"
             raise PathError(
-                "an orientation along a segment needs a task space of poses",
-                found=found,
-                where=f"path[{index}].orientation",
-                hint=hint,
+                f"this {key} needs a task space of poses",
+                found=f"task_space [{', '.join(self.rows)}]",
+                where=f"path[{index}].{key}",
+                hint="Set task_space: pose, or turn yaw by line: {by: [0, 0, ...]}",
             )
         return BUILDERS[type(segment.shape)](segment.shape, context)
 
@@ -142,10 +115,6 @@ class RowCoordinates:
 @dataclass(frozen=True)
 class JointCoordinates(RowCoordinates):
     """The positions of all joints."""
-
-    def check_start(self, start: Array) -> Array:
-        """Return the start as it is: a posture of the robot, or stated as one."""
-        return start
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """Return the curve of a segment, whose coordinates may be in another order of the joints."""
@@ -175,12 +144,12 @@ class JointCoordinates(RowCoordinates):
             )
         order = [own.index(name) for name in names]
         permuted = RowCoordinates(tuple(self.rows[column] for column in order))
-        columns = [names.index(joint) for joint in own]
+        columns = np.argsort(order)
         curve = permuted.curve(segment, index, start[order])
         return MappedCurve(curve, partial(_permute, columns))
 
 
-def _permute(columns: list[int], _sigma: Array, derivatives: Array) -> Array:
+def _permute(columns: np.ndarray, _sigma: Array, derivatives: Array) -> Array:
     return derivatives[:, :, columns]
 
 
@@ -189,44 +158,14 @@ class PoseCoordinates(RowCoordinates):
     """The twelve coordinates of poses."""
 
     rows: tuple[str, ...] = AXES
-    path_type = PosePath
     corner = staticmethod(pose_corner)
     blend = staticmethod(blend_poses)
-
-    def check_start(self, start: Array) -> Array:
-        """Return the start with the nearest rotation matrix."""
-        allowed = "the position (3), then a rotation matrix row by row (9)"
-        if start.shape != (POSE_COORDINATES,) or not np.all(np.isfinite(start)):
-            raise PathError(
-                "the start of a path of poses needs 12 finite coordinates",
-                found=start.tolist(),
-                allowed=allowed,
-                where="start",
-            )
-        rotation = rotations(start)
-        stretch = np.abs(rotation @ rotation.T - np.eye(3)).max()
-        if stretch > 2e-6 or np.linalg.det(rotation) < 0.0:
-            raise PathError(
-                "the start of the path has no rotation matrix",
-                found=rotation.tolist(),
-                allowed=allowed,
-                where="start",
-            )
-        # The nearest rotation: the polar decomposition without its stretch.
-        left, _, right = np.linalg.svd(rotation)
-        return np.concatenate([start[:POSITIONS], (left @ right).ravel()])
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """Return the curve of position and orientation along a segment."""
         position = start[:POSITIONS]
         rotation = rotations(start)
-        context = SegmentContext(
-            f"path[{index}].{segment.kind}",
-            position,
-            AXES,
-            to_turn="A segment turn: {...} turns the tool on the spot",
-            along_tangent="Set orientation: tangent in the same segment",
-        )
+        context = SegmentContext(f"path[{index}].{segment.kind}", position, AXES)
         if isinstance(segment, TurnSegment):
             turn = turn_of(segment.turn, rotation, context.key)
             if abs(turn.angle) < tolerances.LENGTH:

@@ -293,7 +293,7 @@ def _with_yaw(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurve:
             ".yaw",
             found="tangent",
             allowed="fixed",
-            hint=context.along_tangent,
+            hint="Add yaw to task_space, or with task_space: pose set orientation: tangent in the segment",
         )
     return arc
 

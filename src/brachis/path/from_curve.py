@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.path.protocol import Array, Path
-from brachis.path.sequence import SequencePath
+from brachis.path.protocol import Array
+from brachis.path.sequence import Path
 from brachis.task import Segment, SpeedTable, Task
 from brachis.task.segments import SMOOTHNESS
 
@@ -70,12 +70,13 @@ def bspline_segment(
         )
     else:
         spline = _of_function(curve, _check_interval(interval), tolerance)
-    parts = {
-        "degree": int(spline.k),
-        "knots": spline.t.tolist(),
-        "control_points": spline.c.tolist(),
+    return {
+        "bspline": {
+            "degree": int(spline.k),
+            "knots": spline.t.tolist(),
+            "control_points": spline.c.tolist(),
+        }
     }
-    return {"bspline": parts}
 
 
 def _check_interval(interval: tuple[float, float]) -> tuple[float, float]:
@@ -187,8 +188,6 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     path : Path
         Built of them by `build_path`.
     """
-    if not isinstance(path, SequencePath):
-        return ()
     tables: list[Array] = []
     goes_on = False  # whether the last table holds up to the end of its segment
     for (begin, end), piece in zip(pairwise(path.breaks), path.pieces, strict=True):

@@ -119,26 +119,18 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
 
 def row_corner(join: Join) -> Corner | None:
     """Return what jumps from one curve of rows to the next, or None where three derivatives continue."""
-    found = mismatch(*join.sides(), join.shorter, join.positions)
+    found = _mismatch(join, *join.sides())
     return Corner(join, found, f"Set {join.rounding}") if found else None
 
 
-def mismatch(before: Array, after: Array, length: float, positions: int) -> str | None:
-    """Return in words what jumps, or None where three derivatives continue.
-
-    Parameters
-    ----------
-    before, after : ndarray, shape (4, m)
-        Derivatives of the coordinates by sigma, from the value on, at the join.
-    length : float
-        Length of the shorter curve, sigma.
-    positions : int
-        Number of position rows.
-    """
+def _mismatch(join: Join, before: Array, after: Array) -> str | None:
+    """Return in words what jumps between derivatives by sigma, (4, m), or None where three derivatives continue."""
     # The k-th derivative times length^(k - 1) compares with the speed, which is about 1.
     size = max(np.linalg.norm(before[1]), 1.0)
     jumps = (
-        np.linalg.norm(after - before, axis=1) * length ** np.arange(-1.0, 3.0) / size
+        np.linalg.norm(after - before, axis=1)
+        * join.shorter ** np.arange(-1.0, 3.0)
+        / size
     )
     if np.all(jumps <= tolerances.WRITTEN):
         return None
@@ -147,7 +139,9 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
         speed, new_speed = (np.linalg.norm(one[1]) for one in (before, after))
         # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
         if corner > 0.01 * abs(new_speed - speed):
-            return f"a corner of {np.rad2deg(corner):.4g} degrees{_of_yaw(before, after, positions)}"
+            moved = np.linalg.norm((after - before)[1, : join.positions])
+            in_yaw = "" if moved > tolerances.WRITTEN else " in yaw alone"
+            return f"a corner of {np.rad2deg(corner):.4g} degrees{in_yaw}"
         return f"the parameter's speed changing from {speed:.6g} to {new_speed:.6g}"
     if jumps[2] > tolerances.WRITTEN:
         return f"a curvature jump of {np.linalg.norm(after[2] - before[2]):.4g} 1/m"
@@ -178,16 +172,6 @@ def angle_between(one: Array, other: Array) -> float:
     return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
 
 
-def _of_yaw(before: Array, after: Array, positions: int) -> str:
-    """Say that it is yaw's slope that jumps where the position goes straight on."""
-    if (
-        before.shape[1] == positions
-        or np.linalg.norm((after - before)[1, :positions]) > tolerances.WRITTEN
-    ):
-        return ""
-    return f" in yaw alone, which turns by {before[1, -1]:.4g} rad/m before and {after[1, -1]:.4g} rad/m after"
-
-
 def pose_corner(join: Join) -> Corner | None:
     """Return what jumps from one curve of poses to the next, or None where three derivatives continue."""
     on_the_spot = [
@@ -200,41 +184,34 @@ def pose_corner(join: Join) -> Corner | None:
             f"Turn the tool along a segment, by its orientation, or set {join.stopping}",
         )
     before, after = join.sides()
-    places = (before[:, :POSITIONS], after[:, :POSITIONS])
-    jump = mismatch(*places, join.shorter, POSITIONS)
+    jump = _mismatch(join, before[:, :POSITIONS], after[:, :POSITIONS])
     if jump:
         return Corner(join, jump, f"Set {join.rounding}")
     unit = "rad" if on_the_spot[0] else "m"
-    jump = _turning_mismatch(before, after, join.shorter, unit)
+    jump = _turning_mismatch(join, before, after, unit)
     otherwise = join.stopping if on_the_spot[0] else join.rounding
     advice = f"Set profile: smooth where the tool turns, or {otherwise}"
     return Corner(join, jump, advice) if jump else None
 
 
-def _turning_mismatch(
-    before: Array, after: Array, length: float, unit: str
-) -> str | None:
+def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str | None:
     """Return in words what jumps in the turning of the tool, or None where three derivatives continue.
 
     Parameters
     ----------
+    join : Join
     before, after : ndarray, shape (4, 12)
         Derivatives of the coordinates of the pose by sigma at the join.
-    length : float
-        Length of the shorter curve, sigma.
     unit : str
         Unit of sigma.
     """
-    old, new = (body_twists(one[:, None])[:, 0, POSITIONS:] for one in (before, after))
-    rate, new_rate = (float(np.linalg.norm(one[0])) for one in (old, new))
+    old, new = (body_twists(one)[:, POSITIONS:] for one in (before, after))
     jumps = np.linalg.norm(new - old, axis=1)
-    large = jumps * length ** np.arange(3.0) > tolerances.WRITTEN * max(rate, 1.0)
-    if not np.any(large):
+    allowed = tolerances.WRITTEN * max(float(np.linalg.norm(old[0])), 1.0)
+    large = np.flatnonzero(jumps * join.shorter ** np.arange(3.0) > allowed)
+    if not large.size:
         return None
-    if not large[0]:
-        order, k = ("slope", 1) if large[1] else ("second derivative", 2)
-        return f"the {order} of the tool's turning rate jumps by {jumps[k]:.4g} rad/{unit}^{k + 1}"
-    if abs(new_rate - rate) > tolerances.WRITTEN * max(rate, 1.0):
-        return f"the tool's turning rate jumps: {rate:.4g} rad/{unit} before and {new_rate:.4g} after"
-    angle = np.rad2deg(angle_between(old[0], new[0]))
-    return f"the axis about which the tool turns jumps by {angle:.4g} degrees"
+    k = int(large[0])
+    what = ("", "'s slope", "'s second derivative")[k]
+    jump = f"{jumps[k]:.4g} rad/{unit}^{k + 1}".removesuffix("^1")
+    return f"the tool's turning rate{what} jumps by {jump}"

@@ -9,8 +9,7 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import PathError
-from brachis.path.protocol import Path
-from brachis.path.sequence import path_speed, tool_derivatives
+from brachis.path.sequence import Path, path_speed, tool_derivatives
 from brachis.robot import TaskMap, task_map_of
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES
@@ -59,11 +58,8 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
         _check_stops(path, part, number)
         _check_motion(task_map, path, part, number)
         _check_ends(task, task_map, path, number)
-    stopping = [segment for segment in task.path if segment.stop]
-    dwells = {
-        s: segment.dwell
-        for s, segment in zip(path.stops.tolist(), stopping, strict=True)
-    }
+    waits = [segment.dwell for segment in task.path if segment.stop]
+    dwells = dict(zip(path.stops.tolist(), waits, strict=True))
     ends = sorted({0.0, 1.0, *dwells, *(s for part in parts for s in part.s)})
     speeds = {part.s: part.speed for part in parts}
     return tuple(
@@ -115,17 +111,13 @@ def _check_stops(path: Path, part: ProcessSpeed, number: int) -> None:
     if not len(inside):
         return
     stop = float(inside[0])
-    if begin + near < stop < end - near:
-        advice = f"Cut the part in two, with room before and behind s = {stop:.6g}"
-    else:
-        advice = f"Leave room between s = {stop:.6g} and the part"
     raise PathError(
         "the tool has a process speed where it stops",
         s_interval=(stop, stop),
         where=f"{_KEY}[{number}].s",
         found=f"[{begin:g}, {end:g}], with a stop at s = {stop:.6g}",
         allowed="parts of the path between stops, with room to reach and leave the speed",
-        hint=f"{advice}, or remove the stop",
+        hint=f"Leave room before and behind s = {stop:.6g}: cut the part in two, or remove the stop",
     )
 
 
@@ -151,23 +143,22 @@ def _check_ends(task: Task, task_map: TaskMap, path: Path, number: int) -> None:
     """Refuse a part that begins or ends with the path, unless the path has its speed there."""
     part = task.tool_limits.process_speed[number]
     boundary = task.boundary
-    for end, name, speed, verbs in (
-        (0, "start", boundary.start_speed, ("begins", "reach")),
-        (1, "end", boundary.end_speed, ("ends", "leave")),
+    for end, name, speed in (
+        (0, "start", boundary.start_speed),
+        (1, "end", boundary.end_speed),
     ):
-        s = float(end)
-        if part.s[end] != s or boundary.periodic:
+        if part.s[end] != end or boundary.periodic:
             continue
-        velocity = tool_derivatives(task_map, path, np.array([s]))[0, 0]
-        ratio = np.linalg.norm(velocity) / path_speed(task_map, path, s)
+        velocity = tool_derivatives(task_map, path, np.array([float(end)]))[0, 0]
+        ratio = np.linalg.norm(velocity) / path_speed(task_map, path, end)
         found = speed * ratio
         if abs(found - part.speed) <= tolerances.WRITTEN * part.speed:
             continue
         raise PathError(
-            f"process speed at s = {end} is {part.speed:g} m/s, but the path {verbs[0]} at {found:g} m/s",
+            f"process speed at s = {end} is {part.speed:g} m/s, but that at the path's {name} is {found:g} m/s",
             where=f"{_KEY}[{number}].s[{end}]",
             found=f"{found:g} m/s, by boundary.{name}_speed",
             allowed=f"{part.speed:g} m/s at the path's {name}, or an s inside the path",
-            hint=f"Set boundary.{name}_speed to {part.speed / ratio:.10g}, or leave room on the path to {verbs[1]} "
-            "the speed",
+            hint=f"Set boundary.{name}_speed to {part.speed / ratio:.10g}, or leave room on the path to "
+            "change the speed",
         )

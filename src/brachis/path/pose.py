@@ -10,14 +10,14 @@ import numpy as np
 from brachis.common.arrays import spread
 from brachis.kernel import body_twists, rotation_derivatives
 from brachis.path.protocol import Array, Curve, MappedCurve, Orientation, PathSample
-from brachis.path.sequence import SequencePath
+from brachis.path.sequence import Path
 
 POSITIONS = 3
 LEAST_QUALITY = 0.5
 """Quality of interpolated quaternions below which the tool turns quite otherwise than its neighbours ask for."""
 
 
-class PosePath(SequencePath):
+class PosePath(Path):
     """A path of poses, whose samples have the body twist; see `brachis.path.protocol.PathSample`."""
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:

@@ -1,10 +1,10 @@
-"""What a path is to the rest of the package, and what a curve is to a path."""
+"""What samples of a path are, and what a curve is to a path."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -38,46 +38,6 @@ class PathSample:
     xi: Array
     xi_ds: Array
     xi_dds: Array
-
-
-class Path(Protocol):
-    """A prescribed path."""
-
-    @property
-    def length(self) -> float:
-        """Length of what the position rows describe, m."""
-        ...
-
-    @property
-    def breaks(self) -> Array:
-        """Values of s where segments and blends join, from 0 to 1; the path is C3 there, but for its stops."""
-        ...
-
-    @property
-    def knots(self) -> Array:
-        """Values of s between which the path is analytic, from 0 to 1; the breaks are among them."""
-        ...
-
-    @property
-    def stops(self) -> Array:
-        """Values of s, (b,), at which the tool stops, in order; the path may have corners there."""
-        ...
-
-    def between(self, begin: float, end: float) -> Self:
-        """Return the part of the path from s = `begin` to `end`, in the same s.
-
-        Only the pieces in between are sampled, so that at a corner it is certain which side is meant. Beyond its ends
-        it continues as its first or last piece.
-        """
-        ...
-
-    def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s, shape (K,).
-
-        Beyond its ends the path continues as the formula of its first or last piece, so that an optimiser's trial point
-        just outside meets smooth derivatives. At a stop the path is sampled as it is after the stop.
-        """
-        ...
 
 
 class Curve(Protocol):

@@ -76,31 +76,17 @@ def hat(vector: Array) -> Array:
     return np.cross(np.eye(3), vector[..., None, :])
 
 
-def quaternion_derivatives(rotation: Array) -> Array:
-    """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a rotation matrix, (order + 1, 3, 3).
+def quaternion_derivatives(pose: Array) -> Array:
+    """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a pose's coordinates, (order + 1, 12).
 
     With the angular velocity w in the turning frame, ``q' = q w / 2``, one derivative after the other.
     """
-    result = np.zeros((len(rotation), 4))
-    result[0] = quaternions_of(rotation_of(rotation[0]))
-    velocity = angular_velocity(rotation)
-    rate = np.concatenate([np.zeros((len(velocity), 1)), velocity], axis=1)
-    for k in range(len(rotation) - 1):
+    result = np.zeros((len(pose), 4))
+    result[0] = quaternions_of(rotation_of(pose[0, 3:].reshape(3, 3)))
+    rate = np.pad(body_twists(pose)[:, 3:], ((0, 0), (1, 0)))
+    for k in range(len(pose) - 1):
         result[k + 1] = _leibniz(quaternion_product, result, rate, k) / 2.0
     return result
-
-
-def angular_velocity(rotation: Array) -> Array:
-    """Return the angular velocity in the turning frame and its derivatives, (order, ..., 3).
-
-    Parameters
-    ----------
-    rotation : ndarray, shape (order + 1, ..., 3, 3)
-        Derivatives of the rotation matrix R; the angular velocity is that of ``R^T R'``.
-    """
-    flat = rotation.reshape(*rotation.shape[:-2], 9)
-    still = np.zeros((*flat.shape[:-1], 3))
-    return body_twists(np.concatenate([still, flat], axis=-1))[..., 3:]
 
 
 def rotation_of(matrix: Array) -> Rotation:

@@ -13,7 +13,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import apply_each
 from brachis.errors import PathError
-from brachis.path.protocol import Array, Curve, Path, PathSample
+from brachis.path.protocol import Array, Curve, PathSample
 from brachis.robot import TaskMap, task_map_of
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES, POSE_ROWS, YAW, position_rows
@@ -51,7 +51,7 @@ class PathFrame:
             coordinates = np.zeros((12, 12))
             coordinates[:3, :3] = rotation
             coordinates[3:, 3:] = np.kron(rotation, np.eye(3))  # of a matrix row by row
-            return cls(coordinates, np.concatenate([placement.xyz, np.zeros(9)]))
+            return cls(coordinates, np.pad(placement.xyz, (0, 9)))
         axes = [AXES.index(row) for row in position_rows(rows)]
         block = rotation[np.ix_(axes, axes)]
         if (
@@ -108,15 +108,16 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class SequencePath:
-    """Pieces of curves one after the other; s is the sum of their parameters over its total.
+class Path:
+    """A prescribed path: curves one after the other; s is the sum of their parameters over its total.
 
     Attributes
     ----------
     pieces : tuple of Piece
         Parts of the segments' curves, and blends.
     breaks : (b + 1,) ndarray
-        Values of s where pieces join, from 0 to 1; of a part of a path, from its begin to its end.
+        Values of s where pieces join, from 0 to 1; of a part of a path, from its begin to its end. The path is C3
+        there, but for its stops.
     total : float
         Range of the summed parameter of the whole path, sigma per unit s.
     positions : int
@@ -168,7 +169,7 @@ class SequencePath:
 
     @property
     def knots(self) -> Array:
-        """Values of s between which the path is analytic, from its begin to its end."""
+        """Values of s between which the path is analytic, from its begin to its end; the breaks are among them."""
         found = [self.breaks]
         for (begin, end), piece in zip(pairwise(self.breaks), self.pieces, strict=True):
             knots = begin + (piece.curve.knots - piece.first) / self.total
@@ -180,63 +181,57 @@ class SequencePath:
         return np.unique(np.concatenate(found))
 
     def between(self, begin: float, end: float) -> Self:
-        """Return the part from s = `begin` to `end`, in the same s; see `brachis.path.protocol.Path`."""
+        """Return the part of the path from s = `begin` to `end`, in the same s.
+
+        Only the pieces in between are sampled, so that at a corner it is certain which side is meant. Beyond its ends
+        it continues as its first or last piece.
+        """
         inner = self.breaks[1:-1]
-        inside = inner[
-            (inner > begin + tolerances.PATH) & (inner < end - tolerances.PATH)
-        ]
+        is_after = inner > begin + tolerances.PATH
+        inside = inner[is_after & (inner < end - tolerances.PATH)]
+        first = len(inner) - np.count_nonzero(is_after)
+        last = first + len(inside)
+        pieces = list(self.pieces[first : last + 1])
+        before = (begin - self.breaks[first]) * self.total
+        after = (end - self.breaks[last + 1]) * self.total
+        pieces[0] = replace(pieces[0], first=pieces[0].first + before)
+        pieces[-1] = replace(pieces[-1], last=pieces[-1].last + after)
         breaks = np.concatenate([[begin], inside, [end]])
-        middles = 0.5 * (breaks[:-1] + breaks[1:])
-        indices = np.searchsorted(inner, middles, side="right")
-        pieces = []
-        for index, (low, high) in zip(indices, pairwise(breaks), strict=True):
-            piece = self.pieces[index]
-            first, last = (
-                piece.first + (np.array([low, high]) - self.breaks[index]) * self.total
-            )
-            pieces.append(replace(piece, first=float(first), last=float(last)))
         stops = self.stops[(self.stops > begin) & (self.stops < end)]
         return replace(self, pieces=tuple(pieces), breaks=breaks, stops=stops)
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s; beyond its ends as the first or last piece continues.
+        """Return the path at K values of s, shape (K,).
 
-        Parameters
-        ----------
-        s : array_like, shape (K,)
-            Path coordinates.
+        Beyond its ends the path continues as the formula of its first or last piece, so that an optimiser's trial point
+        just outside meets smooth derivatives. At a stop the path is sampled as it is after the stop.
         """
         return PathSample(*self.derivatives(s))
 
-    @cached_property
-    def _coordinates(self) -> int:
-        """How many there are."""
-        return int(self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2])
-
     def derivatives(self, s: Sequence[float] | Array, order: int = 3) -> Array:
         """Return the coordinates in the world and their derivatives by s, shape (order + 1, K, m)."""
-        values = np.atleast_1d(np.asarray(s, dtype=float))
+        values = np.array(s, dtype=float, ndmin=1)
         if len(self.pieces) == 1:
-            (piece,) = self.pieces
-            sigma = piece.first + (values - self.breaks[0]) * self.total
-            return self._in_world(piece.curve.derivatives(sigma, order))
-        which = np.searchsorted(self.breaks[1:-1], values, side="right")
-        result = np.empty((order + 1, values.size, self._coordinates))
-        runs = np.flatnonzero(np.diff(which)) + 1
-        for begin, end in pairwise([0, *runs.tolist(), values.size]):
-            i = which[begin]
-            piece = self.pieces[i]
-            sigma = piece.first + (values[begin:end] - self.breaks[i]) * self.total
-            result[:, begin:end] = piece.curve.derivatives(sigma, order)
-        return self._in_world(result)
-
-    def _in_world(self, result: Array) -> Array:
-        """Turn coordinates and their derivatives by sigma, (order + 1, K, m), into those in the world by s."""
-        result = result * self.total ** np.arange(len(result))[:, None, None]
+            result = self._on_piece(0, values, order)
+        else:
+            which = np.searchsorted(self.breaks[1:-1], values, side="right")
+            runs = np.flatnonzero(np.diff(which)) + 1
+            parts = [
+                self._on_piece(which[begin], values[begin:end], order)
+                for begin, end in pairwise([0, *runs.tolist(), values.size])
+            ]
+            result = np.concatenate(parts, axis=1)
+        result = result * self.total ** np.arange(order + 1)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T
             result[0] += self.frame.origin
         return result
+
+    def _on_piece(self, i: int, s: Array, order: int) -> Array:
+        """Return coordinates and their derivatives by sigma, (order + 1, K, m), on the curve of one piece."""
+        piece = self.pieces[i]
+        sigma = piece.first + (s - self.breaks[i]) * self.total
+        return piece.curve.derivatives(sigma, order)
 
 
 def path_speed(task_map: TaskMap, path: Path, s: float) -> float:

@@ -19,8 +19,8 @@ from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import PathError
 from brachis.path.legs import Leg
-from brachis.path.protocol import Array, Path
-from brachis.path.sequence import integrate, tool_derivatives
+from brachis.path.protocol import Array
+from brachis.path.sequence import Path, integrate, tool_derivatives
 from brachis.robot import TaskMap
 from brachis.task.points.points import sum_up
 
@@ -47,7 +47,8 @@ class TimeLaw:
     spline : BSpline
         s over t in [0, duration], s.
     ends : (2, 4) ndarray
-        s and its first three derivatives by time, per second, at the beginning and at the end.
+        s and its first three derivatives by time, per second, at the beginning and at the end; free of the spline's
+        error.
     """
 
     duration: float
@@ -57,10 +58,6 @@ class TimeLaw:
     def at(self, t: Array) -> Array:
         """Return s and three derivatives by time, (4, K), per second, at times t, (K,), s."""
         return np.stack([self.spline(t, nu=order) for order in range(4)])
-
-    def at_end(self, end: int) -> Array:
-        """Return the same, (4,), at the beginning (0) or the end (-1), free of the spline's error."""
-        return self.ends[end]
 
 
 def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
@@ -105,7 +102,7 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
         middles = 0.5 * (breaks[:-1] + breaks[1:])
         if len(breaks) > _MOST_INTERVALS:
             break
-        breaks = np.sort(np.concatenate([breaks, middles[is_off]]))
+        breaks = np.union1d(breaks, middles[is_off])
     worst = float(middles[np.argmax(deviation)])
     raise PathError(
         "the path bends too abruptly for a constant speed of the tool",

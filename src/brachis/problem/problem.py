@@ -165,7 +165,7 @@ class Problem(Summary):
     def _law_rate(self, leg: int, end: int) -> float:
         """Return ds/dt at an end (0 or -1) of a leg, 1/s; 0 where its speed is free."""
         law = self.time_laws[leg]
-        return 0.0 if law is None else float(law.at_end(end)[1])
+        return 0.0 if law is None else float(law.ends[end, 1])
 
     def _rate_between(self, before: int, after: int) -> float:
         """Return ds/dt where a leg ends and another one begins, 1/s."""

@@ -232,14 +232,13 @@ def _along_joints(
                 allowed=f"no {key}",
                 where=f"{where}.csv.{key}",
             )
-    names = "the names of the joints"
-    table, _ = read_table(text, str(path), names, lambda _header, _where: None)
+    table = read_table(text, str(path), "the names of the joints")
     if all(_HAS_UNIT.search(column) for column in table.header):  # one may be a name
         raise TaskError(
             "a path of joints is in rad and m",
             found=f"columns {', '.join(table.header)}",
             allowed="the names of the joints, without a unit",
-            where=f"{path}: line {table.header_line}",
+            where=table.where,
             hint="Convert the numbers to rad and m, and name the columns as the joints",
         )
     _check_count(len(table.values), path)

@@ -244,13 +244,9 @@ def read_recording(
     joints = robot.joint_names
     check_kind(source, "a CSV file", TaskError)
     text = read_text(source, where=str(source), folder=Path.cwd(), largest=64_000_000)
-    table, columns = read_table(
-        text,
-        str(source),
-        _allowed_columns(joints),
-        lambda header, where: _find_columns(header, joints, where),
-    )
-    where = f"{source}: line {table.header_line}"
+    table = read_table(text, str(source), _allowed_columns(joints))
+    where = table.where
+    columns = _find_columns(table.header, joints, where)
     t, time_unit, _ = _read_column(table, columns, ("t", ""), "s", units, where)
     read = {
         kind: [

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.common.words import write_count
+from brachis.common.words import name_first, write_count
 from brachis.errors import TaskError
 from brachis.task.point_data import FitTolerance
 from brachis.task.points.points import (
@@ -69,10 +69,6 @@ class Scatter:
             return f"positions rounded to {rounding:g} m {spacing}"
         return f"positions that scatter by {1e3 * self.deviation:.3g} mm (standard deviation) {spacing}"
 
-    def of_turning(self) -> str:
-        """Say what the scatter of orientations looks like."""
-        return f"orientations that scatter by {np.rad2deg(self.turning):.2g} deg (standard deviation)"
-
 
 def scatter_of(points: Points) -> Scatter:
     """Estimate the scatter of points.
@@ -118,9 +114,8 @@ def _deviation(residuals: Array, median_of_one: float) -> float:
 def decimals_of(position: Array) -> int | None:
     """Return the number of decimals to which all values, m, are rounded; None where there are more than twelve."""
     for decimals in range(13):
-        scaled = position * 10.0**decimals
-        rounding = 1e-9 * np.maximum(np.abs(scaled), 1e3)
-        if np.all(np.abs(scaled - np.rint(scaled)) < rounding):
+        rounded = np.round(position, decimals)
+        if np.allclose(position, rounded, rtol=1e-9, atol=10.0 ** (-6 - decimals)):
             return decimals
     return None
 
@@ -153,8 +148,7 @@ def without_repetitions(points: Points) -> PointsAndNotes:
     """
     again = 1 + np.flatnonzero(points.steps < SAME)
     turned = angles_between(points.turning[again], points.turning[again - 1])
-    if np.any(turned > SAME):
-        i = int(again[np.argmax(turned > SAME)])
+    for i in again[turned > SAME].tolist():
         raise points.wrong(
             i,
             f"the position stands still from {points.name_row(i - 1)} on while the tool turns",
@@ -172,9 +166,9 @@ def without_repetitions(points: Points) -> PointsAndNotes:
     if not again.size:
         return points, ()
     count = write_count(len(again), "row")
-    rows = [str(row) for row in points.rows[again[:5]]] + ["..."] * (len(again) > 5)
+    rows = name_first([str(row) for row in points.rows[again]], ", ", most=5)
     return kept, (
-        f"left out {count} at the place of the row before: {points.row}s {', '.join(rows)}",
+        f"left out {count} at the place of the row before: {points.row}s {rows}",
     )
 
 
@@ -192,11 +186,10 @@ def refuse_repetitions(points: Points) -> None:
     steps = points.steps
     if still:
         steps = angles_between(points.turning[1:], points.turning[:-1])
-    if np.any(steps < SAME):
-        i = 1 + int(np.argmax(steps < SAME))
+    for i in np.flatnonzero(steps < SAME).tolist():
         raise points.wrong(
-            i,
-            f"the row repeats {points.name_row(i - 1)}",
+            i + 1,
+            f"the row repeats {points.name_row(i)}",
             allowed=f"rows that differ from their predecessors in {'orientation' if still else 'position'}",
             hint="Set a tolerance to leave out repeated rows",
         )

@@ -113,24 +113,6 @@ def _fit_between(
     return curves
 
 
-def _refuse_to_turn_back(points: Points, corners: tuple[Corner, ...]) -> None:
-    """Refuse corners that are too sharp to be rounded.
-
-    Raises
-    ------
-    TaskError
-    """
-    for corner in corners:
-        degrees = np.rad2deg(corner.angle)
-        if degrees > 150.0:
-            raise points.wrong(
-                corner.index,
-                f"the path turns back, by {degrees:.4g} degrees",
-                allowed="corners up to 150 degrees",
-                hint="Set corner: stop if the tool stops there",
-            )
-
-
 def _measure_deviations(
     points: Points, fit: Fit, tolerance: FitTolerance
 ) -> tuple[Array, Array]:
@@ -221,7 +203,8 @@ def _fit_one(
         kind = "orientation"
         found = f"{np.rad2deg(fit.turning_errors[i]):.3g} deg"
         allowed = f"{np.rad2deg(tolerance.orientation):.3g} deg"
-        looks = scatter.of_turning() if scatter.turning else ""
+        scattered = f"{np.rad2deg(scatter.turning):.2g} deg (standard deviation)"
+        looks = f"orientations that scatter by {scattered}" if scatter.turning else ""
     hint = f"The data are {looks}" if looks else "Check this row"
     raise points.wrong(
         i,
@@ -290,8 +273,15 @@ def fit_curves(
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = fill_gaps(points)
     corners = find_corners(points, scatter, tolerance.at_corners)
-    if not stops:
-        _refuse_to_turn_back(points, corners)
+    for corner in () if stops else corners:
+        degrees = np.rad2deg(corner.angle)
+        if degrees > 150.0:
+            raise points.wrong(
+                corner.index,
+                f"the path turns back, by {degrees:.4g} degrees",
+                allowed="corners up to 150 degrees",
+                hint="Set corner: stop if the tool stops there",
+            )
     note = plausibility_note(points)
     curves = _fit_between(points, corners, tolerance, scatter, note)
     starts = sum_up([curve.length for curve in curves]).tolist()

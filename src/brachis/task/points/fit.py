@@ -270,7 +270,7 @@ def _add_knots(
         if not halved.size:
             return fit
         sigma = fit.sigma
-        breaks = np.sort(np.append(breaks, (breaks[halved] + breaks[halved + 1]) / 2.0))
+        breaks = np.union1d(breaks, (breaks[halved] + breaks[halved + 1]) / 2.0)
     return fit
 
 

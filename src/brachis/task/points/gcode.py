@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from cmath import phase
 from dataclasses import dataclass, field
+from itertools import compress
 from math import acos, ceil, nan, pi, sqrt
 from typing import Final
 
@@ -23,11 +24,11 @@ from brachis.task.points.points import Array, Points, PointsAndNotes, Rows
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _COMMENT = re.compile(r"\([^)]*\)|;.*$|%")
-_PLANES: Final = {"17": [0, 1, 2], "18": [2, 0, 1], "19": [1, 2, 0]}
+_PLANES: Final = {"G17": [0, 1, 2], "G18": [2, 0, 1], "G19": [1, 2, 0]}
 """Axes of the plane of arcs, then the one along its normal, by G code."""
-_UNITS: Final = {"20": 0.0254, "21": 1e-3}
-_IGNORED: Final = {"40", "49", "61", "64", "80", "91.1", "94"}
-_OFFSETS: Final = {"54", "55", "56", "57", "58", "59"}
+_UNITS: Final = {"G20": 0.0254, "G21": 1e-3}
+_IGNORED: Final = {"G40", "G49", "G61", "G64", "G80", "G91.1", "G94"}
+_OFFSETS: Final = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _PIECES = 4
 """Fewest points on a move."""
 _ROUND = 2e-3
@@ -36,39 +37,29 @@ _ROUND = 2e-3
 
 @dataclass
 class _Machine:
-    """What the words so far have set; `at` has NaN where an axis has not been stated yet."""
+    """What the words so far have set; `at` has NaN where an axis has not been stated yet.
+
+    `moves` has the places on every move, (k, 3), with its speed and its line.
+    """
 
     source: str
     at: Array
     line: int = 0
     motion: str | None = None
-    plane: list[int] = field(default_factory=lambda: _PLANES["17"])
+    plane: list[int] = field(default_factory=lambda: _PLANES["G17"])
     unit: float = 1e-3
     unit_stated: bool = False
-    offset: str = "54"
+    offset: str = "G54"
     ended: bool = False
     absolute: bool = True
     feed: float = nan
     skipped: set[str] = field(default_factory=set)
-    points: list[Array] = field(default_factory=list)
-    speeds: list[float] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
+    moves: list[tuple[Array, float, int]] = field(default_factory=list)
 
     def wrong(self, problem: str, found: str, allowed: str) -> TaskError:
         """Return the error that the line is wrong."""
         where = f"{self.source}: line {self.line}"
         return TaskError(problem, found=found, allowed=allowed, where=where)
-
-    def notes(self) -> tuple[str, ...]:
-        """Say what was taken for granted, and what was skipped."""
-        notes = ["G-code"]
-        if not self.unit_stated:
-            notes.append(
-                "lengths are in millimetres, as the program has neither G20 nor G21"
-            )
-        if self.skipped:
-            notes.append(f"skipped {', '.join(sorted(self.skipped))}")
-        return tuple(notes)
 
 
 def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
@@ -103,29 +94,35 @@ def read_gcode(text: str, rows: Rows, source: str) -> PointsAndNotes:
         _obey(machine, _COMMENT.sub("", line.upper()).strip())
         if machine.ended:
             break
-    if len(machine.points) < 2:
-        missing = [
-            name.upper()
-            for name, place in zip(POSITION, machine.at, strict=True)
-            if np.isnan(place)
-        ]
+    counts = [len(places) for places, *_ in machine.moves]
+    if sum(counts) < 2:
+        missing = ", ".join(compress("XYZ", np.isnan(machine.at)))
         raise TaskError(
             "the program contains no motion",
-            found=write_count(len(machine.points), "place"),
+            found=write_count(sum(counts), "place"),
             allowed="2 or more",
             where=source,
-            hint=f"{', '.join(missing)} is missing" if missing else None,
+            hint=f"{missing} is missing" if missing else None,
         )
     chosen = [POSITION.index(name) for name in names]
-    speed = np.array(machine.speeds)
+    moves, speeds, lines = zip(*machine.moves, strict=True)
+    places = np.concatenate(moves)
+    speed = np.repeat(speeds, counts)
     points = Points(
-        np.array(machine.points)[:, chosen],
-        np.empty((len(speed), 0)),
+        places[:, chosen],
+        places[:, :0],
         speed if np.any(np.isfinite(speed)) else None,
-        np.array(machine.lines),
+        np.repeat(lines, counts),
         source,
     )
-    return points, machine.notes()
+    notes = ["G-code"]
+    if not machine.unit_stated:
+        notes.append(
+            "lengths are in millimetres, as the program has neither G20 nor G21"
+        )
+    if machine.skipped:
+        notes.append(f"skipped {', '.join(sorted(machine.skipped))}")
+    return points, tuple(notes)
 
 
 def _obey(machine: _Machine, code: str) -> None:
@@ -139,8 +136,8 @@ def _obey(machine: _Machine, code: str) -> None:
         )
     values: dict[str, float] = {}
     for letter, text in _WORD.findall(code):
-        if letter == "G":
-            _set_mode(machine, f"{float(text):g}")
+        if letter in "GM":
+            _set_mode(machine, f"{letter}{float(text):g}")
         elif letter in "XYZIJKRF":
             values[letter] = float(text)
         elif letter in "ABCUVW":
@@ -149,58 +146,47 @@ def _obey(machine: _Machine, code: str) -> None:
                 letter + text,
                 "X, Y, Z, I, J, K, R, F",
             )
-        elif letter == "M":
-            _switch(machine, f"{float(text):g}")
         elif letter != "N":
             machine.skipped.add(letter)
     if "F" in values:
-        _set_feed(machine, values.pop("F"))
+        feed = values.pop("F")
+        if not feed > 0.0:
+            allowed = "more than 0"
+            raise machine.wrong("a feed rate must be positive", f"F{feed:g}", allowed)
+        machine.feed = feed * machine.unit / 60.0
     if values:
         _move(machine, values)
 
 
-def _set_feed(machine: _Machine, feed: float) -> None:
-    if not feed > 0.0:
-        raise machine.wrong("a feed rate must be positive", f"F{feed:g}", "more than 0")
-    machine.feed = feed * machine.unit / 60.0
-
-
-def _switch(machine: _Machine, code: str) -> None:
-    """Obey a miscellaneous function, such as M30."""
-    if code in {"97", "98", "99"}:
-        raise machine.wrong(
-            "subprograms are not read", f"M{code}", "a program without calls"
-        )
-    machine.ended = code in {"2", "30"}
-    machine.skipped.add(f"M{code}")
-
-
 def _set_mode(machine: _Machine, code: str) -> None:
-    """Obey a preparatory function, such as G1."""
-    if code in {"0", "1", "2", "3"}:
+    """Obey a preparatory function, such as G1, or a miscellaneous one, such as M30."""
+    if code in {"G0", "G1", "G2", "G3"}:
         machine.motion = code
     elif code in _PLANES:
         machine.plane = _PLANES[code]
     elif code in _UNITS:
         machine.unit = _UNITS[code]
         machine.unit_stated = True
-    elif code in {"90", "91"}:
-        machine.absolute = code == "90"
-    elif code in _OFFSETS:
-        if machine.points and machine.offset != code:
-            raise machine.wrong(
-                "the work offset changes within the program: where the tool goes is not known",
-                f"G{code}",
-                "one work offset",
-            )
-        machine.offset = code
-        machine.skipped.add(f"G{code}")
-    elif code in _IGNORED:
-        machine.skipped.add(f"G{code}")
+    elif code in {"G90", "G91"}:
+        machine.absolute = code == "G90"
+    elif code in {"M97", "M98", "M99"}:
+        allowed = "a program without calls"
+        raise machine.wrong("subprograms are not read", code, allowed)
+    elif code[0] == "M" or code in _IGNORED | _OFFSETS:
+        if code in _OFFSETS:
+            if machine.moves and machine.offset != code:
+                raise machine.wrong(
+                    "the work offset changes within the program: where the tool goes is not known",
+                    code,
+                    "one work offset",
+                )
+            machine.offset = code
+        machine.ended |= code in {"M2", "M30"}
+        machine.skipped.add(code)
     else:
         raise machine.wrong(
             "this code is not read",
-            f"G{code}",
+            code,
             "G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94",
         )
 
@@ -222,16 +208,14 @@ def _move(machine: _Machine, values: dict[str, float]) -> None:
         return
     if np.isnan(start).any():
         places = end[None]
-    elif machine.motion in {"0", "1"}:
+    elif machine.motion in {"G0", "G1"}:
         length = float(np.linalg.norm(end - start))
         count = max(_PIECES, ceil(length / max(1e-3, length / 200.0))) if length else 0
         places = start + _shares(count) * (end - start)
     else:
         places = _arc(machine, start, end, values)
-    machine.points.extend(places)
-    speed = nan if machine.motion == "0" else machine.feed
-    machine.speeds.extend([speed] * len(places))
-    machine.lines.extend([machine.line] * len(places))
+    speed = nan if machine.motion == "G0" else machine.feed
+    machine.moves.append((places, speed, machine.line))
 
 
 def _shares(count: int) -> Array:
@@ -246,7 +230,6 @@ def _arc(
     *plane, normal = machine.plane
     one = complex(*start[plane])
     other = complex(*end[plane])
-    clockwise = machine.motion == "2"
     if "R" in values:
         centre = _centre(machine, one, other, values["R"] * machine.unit)
     else:
@@ -260,11 +243,10 @@ def _arc(
             f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end",
             "one radius; I, J, K from the start",
         )
-    swept = (phase(other - centre) - phase(one - centre)) % (2.0 * pi)
-    if clockwise:
-        swept -= 2.0 * pi
-    if abs(abs(swept) - 2.0 * pi) < 1e-9 or abs(swept) < 1e-9:
-        swept = -2.0 * pi if clockwise else 2.0 * pi
+    turn = -2.0 * pi if machine.motion == "G2" else 2.0 * pi
+    swept = (phase(other - centre) - phase(one - centre)) % turn  # of the sign of turn
+    if min(abs(swept), abs(swept - turn)) < 1e-9:
+        swept = turn
     count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - 1e-6 / radius, 0.5)))))
     shares = _shares(count)
     growth = 1.0 + (at_end / radius - 1.0) * shares
@@ -286,5 +268,5 @@ def _centre(machine: _Machine, one: complex, other: complex, radius: float) -> c
             "ends at most 2 R apart, and not the same",
         )
     away = sqrt(max(radius**2 - length**2 / 4.0, 0.0))
-    side = -1.0 if (machine.motion == "2") != (radius < 0.0) else 1.0
+    side = -1.0 if (machine.motion == "G2") != (radius < 0.0) else 1.0
     return (one + other) / 2.0 + side * away * 1j * chord / length

@@ -242,13 +242,6 @@ def _speeds(speed: Any, units: FileUnits, source: str) -> Array:
 
 def _array(values: Any, where: str, source: str) -> Array:
     array = _numbers(values, where)
-    if not array.size:
-        raise TaskError(
-            "the array is empty",
-            found=array.shape,
-            allowed="2 rows or more",
-            where=where,
-        )
     _refuse_first(~np.isfinite(np.atleast_1d(array)), "not finite", array, source)
     return array
 
@@ -264,7 +257,7 @@ def _numbers(values: Any, where: str) -> Array:
 
 def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:
     """Refuse the first of the rows of which anything is bad."""
-    rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1))
+    rows = np.flatnonzero(bad.any(axis=tuple(range(1, bad.ndim))))
     if rows.size:
         found = np.atleast_1d(values)[rows[0]].tolist()
         raise TaskError(problem, found=found, where=f"{source}: row {rows[0]}")

@@ -8,17 +8,17 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Final, TypeVar
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
 from brachis.task.fields import LARGEST, POSITION
-from brachis.task.point_data import FileUnits, PointFile
+from brachis.task.point_data import PointFile
 from brachis.task.points.points import Array, Indices, Points, PointsAndNotes, Rows
 from brachis.task.points.units import (
     CONVENTIONS,
@@ -28,7 +28,6 @@ from brachis.task.points.units import (
     rotation_by,
 )
 
-_Found = TypeVar("_Found")
 _DELIMITERS: Final = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces"}
 
 
@@ -39,28 +38,50 @@ class Table:
     Attributes
     ----------
     header : tuple of str
-    header_line : int
-    values : (n, c) ndarray
-        As written: in the file's units.
-    lines : (n,) int ndarray
-        Where in the file they stand, from 1 on.
+    where : str
+        Its place, for messages.
+    body : dict of int to str
+        The other lines by their numbers, from 1 on, with decimal points.
+    delimiter : str
+    source : str
+        The file, for messages.
     notes : tuple of str
         What was found out about the form of the file.
     """
 
     header: tuple[str, ...]
-    header_line: int
-    values: Array
-    lines: Indices
+    where: str
+    body: dict[int, str]
+    delimiter: str
+    source: str
     notes: tuple[str, ...]
 
+    @property
+    def lines(self) -> Indices:
+        """Where in the file the numbers stand, (n,)."""
+        return np.array(list(self.body))
 
-def read_table(
-    text: str,
-    source: str,
-    allowed: str,
-    understand: Callable[[tuple[str, ...], str], _Found],
-) -> tuple[Table, _Found]:
+    @cached_property
+    def values(self) -> Array:
+        """The numbers as written, in the file's units, (n, c).
+
+        Raises
+        ------
+        TaskError
+            A line has the wrong number of values, or one that is not a finite number; the message names line and
+            column.
+        """
+        if not self.body:
+            raise TaskError("the file has no rows of numbers", where=self.source)
+        values = []
+        for number, line in self.body.items():
+            where = f"{self.source}: line {number}"
+            cells = _cells(line, self.delimiter, where)
+            values.append(_numbers(cells, self.header, where))
+        return np.array(values)
+
+
+def read_table(text: str, source: str, allowed: str) -> Table:
     """Read a table whose first line names the columns; lines that are empty or begin with ``#`` are skipped.
 
     Parameters
@@ -71,49 +92,34 @@ def read_table(
         The file, for messages.
     allowed : str
         The columns that it may have, for messages.
-    understand : callable
-        Returns what a header says, or refuses it, given its file and line.
-
-    Returns
-    -------
-    Table, and what `understand` returns
 
     Raises
     ------
     TaskError
-        A line has the wrong number of values, or one that is not a finite number; the message names line and column.
+        The file is empty, or is not a table.
     """
     notes = ["a byte order mark"] if text.startswith("\ufeff") else []
-    lines = [
-        (number, line.strip(" \r"))
+    body = {
+        number: line.strip(" \r")
         for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1)
         if line.strip(" \t;,\r") and not line.lstrip().startswith("#")
-    ]
-    if not lines:
+    }
+    if not body:
         raise TaskError("the file is empty", allowed=allowed, where=source)
-    head, *body = lines
-    delimiter = next((one for one in _DELIMITERS if one in head[1]), ",")
+    number = next(iter(body))
+    first = body.pop(number)
+    where = f"{source}: line {number}"
+    delimiter = next((one for one in _DELIMITERS if one in first), ",")
     if delimiter != ",":
         notes.append(f"columns separated by {_DELIMITERS[delimiter]}")
-        if any("," in line for _, line in body):
+        if any("," in line for line in body.values()):
             notes.append("decimal commas")
-            body = [
-                (number, _with_point(line, f"{source}: line {number}"))
-                for number, line in body
-            ]
-    header_line, first = head
-    where = f"{source}: line {header_line}"
+            body = {
+                number: _with_point(line, f"{source}: line {number}")
+                for number, line in body.items()
+            }
     header = tuple(_cells(first, delimiter, where))
-    found = understand(header, where)
-    if not body:
-        raise TaskError("the file has no rows of numbers", where=source)
-    values = []
-    for number, line in body:
-        where = f"{source}: line {number}"
-        values.append(_numbers(_cells(line, delimiter, where), header, where))
-    numbers = np.array([number for number, _ in body])
-    table = Table(header, header_line, np.array(values), numbers, tuple(notes))
-    return table, found
+    return Table(header, where, body, delimiter, source, tuple(notes))
 
 
 def _with_point(line: str, where: str) -> str:
@@ -202,45 +208,27 @@ def _choices(rows: Rows) -> tuple[tuple[str, ...], ...]:
     return (POSITION, *(POSITION + columns for columns in _ORIENTATIONS))
 
 
-@dataclass(frozen=True)
-class _Columns:
-    """What the columns of a table of points are.
+def _read_columns(
+    table: Table, rows: Rows, stated: str | None
+) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...], str | None]:
+    """Return what the columns of a table are.
 
-    Attributes
+    Parameters
     ----------
+    table : Table
+    rows : tuple of str or str
+        Rows of the task space, or the word for one of poses.
+    stated : str, optional
+        Convention of the orientations, as the task states it.
+
+    Returns
+    -------
     places : dict of str to (int, str or None)
         Index and unit of every column by its name.
     names : tuple of str
         Those that belong to positions and orientations.
     convention : str or None
         That of the orientations, where there are any.
-    where : str
-        Place of the header, for messages.
-    """
-
-    places: dict[str, tuple[int, str | None]]
-    names: tuple[str, ...]
-    convention: str | None
-    where: str
-
-
-def _read_columns(
-    header: tuple[str, ...],
-    where: str,
-    rows: Rows,
-    stated: str | None,
-) -> _Columns:
-    """Return what the columns of a table are.
-
-    Parameters
-    ----------
-    header : tuple of str
-    where : str
-        Its place, for messages.
-    rows : tuple of str or str
-        Rows of the task space, or the word for one of poses.
-    stated : str, optional
-        Convention of the orientations, as the task states it.
 
     Raises
     ------
@@ -248,21 +236,21 @@ def _read_columns(
         Columns are missing or unknown, or the convention of their orientations is not known.
     """
     places = {}
-    for column, text in enumerate(header):
+    for column, text in enumerate(table.header):
         name, unit = _heading(text)
         places[name] = (column, unit)
     names = sorted(name for name in places if name != _SPEED)
     choice = next((one for one in _choices(rows) if sorted(one) == names), None)
-    if choice is None or len(places) != len(header):
+    if choice is None or len(places) != len(table.header):
         raise TaskError(
             "the columns are wrong",
-            found=", ".join(header),
+            found=", ".join(table.header),
             allowed=_allowed_columns(rows),
-            where=where,
+            where=table.where,
             hint="The first line names the columns, separated by commas, semicolons, tabs or spaces; units may follow "
             "names (x_mm); a column feed may be added",
         )
-    return _Columns(places, choice, _convention(choice, stated, where), where)
+    return places, choice, _convention(choice, stated, table.where)
 
 
 def _heading(text: str) -> tuple[str, str | None]:
@@ -305,28 +293,22 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
     return stated or next(iter(possible), None)
 
 
-def _unit_of(name: str, kind: str, columns: _Columns, units: FileUnits) -> str:
-    """Return the unit of a column: the heading's, else the task's, else the default.
+def _factor_of(
+    name: str, kind: str, unit: str | None, asked: str | None, where: str
+) -> float:
+    """Return the factor to SI units of a column's unit, which may not differ from the one that the task asks for.
 
     Raises
     ------
     TaskError
     """
-    unit = columns.places[name][1]
     factors = UNITS[kind]
-    asked = getattr(units, kind)
     if unit is None:
-        convention = columns.convention
-        is_euler = convention is not None and CONVENTIONS[convention].euler
-        defaults = {"length": "m", "angle": "" if is_euler else "rad"}
-        asked = asked or defaults.get(kind)
-        if asked:
-            return str(asked)
         usual = {"speed": "mm/min", "angle": "deg"}[kind]
         raise TaskError(
             f"the unit of {name} is not stated",
             allowed=", ".join(factors),
-            where=columns.where,
+            where=where,
             hint=f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task",
         )
     problem = None
@@ -337,8 +319,8 @@ def _unit_of(name: str, kind: str, columns: _Columns, units: FileUnits) -> str:
         problem = "the header contradicts the task's units"
     if problem:
         found = f"{unit} for {name}"
-        raise TaskError(problem, found=found, allowed=asked, where=columns.where)
-    return unit
+        raise TaskError(problem, found=found, allowed=asked, where=where)
+    return factors[unit]
 
 
 def read_points(
@@ -363,57 +345,60 @@ def read_points(
         Columns are missing or unknown, units are missing or contradict each other, a quaternion has no unit length, or
         a feed rate is not positive.
     """
-    understand = partial(_read_columns, rows=rows, stated=settings.orientation)
-    table, columns = read_table(text, source, _allowed_columns(rows), understand)
+    table = read_table(text, source, _allowed_columns(rows))
+    places, names, convention = _read_columns(table, rows, settings.orientation)
+    is_euler = convention and CONVENTIONS[convention].euler
+    defaults = {"length": "m", "angle": None if is_euler else "rad"}
     notes = [*table.notes]
-    units = settings.units
 
     def read(names: Sequence[str], kind: str) -> Array:
         """Read columns of one kind of quantity in SI units."""
-        chosen = [columns.places[name] for name in names]
-        factors = [UNITS[kind][_unit_of(name, kind, columns, units)] for name in names]
+        chosen = [places[name] for name in names]
+        asked = getattr(settings.units, kind)
+        usual = asked or defaults.get(kind)
+        factors = [
+            _factor_of(name, kind, unit or usual, asked, table.where)
+            for name, (_, unit) in zip(names, chosen, strict=True)
+        ]
         stated = dict.fromkeys(unit for _, unit in chosen if unit is not None)
         if stated:
             notes.append(f"{kind} in {' and '.join(stated)}, as the header says")
         return table.values[:, [place for place, _ in chosen]] * np.array(factors)
 
-    position = [name for name in columns.names if name in POSITION]
-    others = columns.names[len(position) :]
-    convention = columns.convention or ""
+    position = [name for name in names if name in POSITION]
+    others = names[len(position) :]
     lengths = read(position, "length")
-    speed = read([_SPEED], "speed")[:, 0] if _SPEED in columns.places else None
-    if convention.startswith("quaternion"):
-        chosen = [columns.places[name][0] for name in others]
-        turning = table.values[:, chosen]
+    speed = read([_SPEED], "speed")[:, 0] if _SPEED in places else None
+    if convention and convention.startswith("quaternion"):
+        turning = table.values[:, [places[name][0] for name in others]]
     else:
         turning = read(others, "angle")
     points = Points(lengths, turning, speed, table.lines, source)
     if convention:
         points = _with_quaternions(points, convention)
-    if speed is not None and np.any(speed <= 0.0):
-        i = int(np.argmax(speed <= 0.0))
-        raise points.wrong(
-            i,
-            "a feed rate must be positive",
-            found=f"{speed[i]:g} m/s",
-            allowed="more than 0",
-        )
-    if convention:
         notes.append(f"orientations: {CONVENTIONS[convention].meaning}")
+    if speed is not None:
+        for i in np.flatnonzero(speed <= 0.0).tolist():
+            raise points.wrong(
+                i,
+                "a feed rate must be positive",
+                found=f"{speed[i]:g} m/s",
+                allowed="more than 0",
+            )
     return points, tuple(notes)
 
 
 def _with_quaternions(points: Points, convention: str) -> Points:
     """Return points with quaternions w, x, y, z for orientations in a convention, angles in rad."""
     values = points.turning
-    off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
-    if convention.startswith("quaternion") and np.any(off > 0.01):
-        i = int(np.argmax(off > 0.01))
-        raise points.wrong(
-            i,
-            f"the quaternion's length is {np.linalg.norm(values[i]):.6g}",
-            found=str(values[i].tolist()),
-            allowed="a quaternion of length 1",
-        )
+    if convention.startswith("quaternion"):
+        lengths = np.linalg.norm(values, axis=1)
+        for i in np.flatnonzero(np.abs(lengths - 1.0) > 0.01).tolist():
+            raise points.wrong(
+                i,
+                f"the quaternion's length is {lengths[i]:.6g}",
+                found=str(values[i].tolist()),
+                allowed="a quaternion of length 1",
+            )
     quaternions = quaternions_of(rotation_by(convention, values))
     return replace(points, turning=with_like_signs(quaternions))

@@ -94,10 +94,8 @@ def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
     """Return the rotations of orientations, (..., 3) in rad or (..., 4), in one of the `CONVENTIONS`."""
     from scipy.spatial.transform import Rotation
 
-    if convention == "quaternion_xyzw":
-        return Rotation.from_quat(values)
-    if convention == "quaternion_wxyz":
-        return Rotation.from_quat(values, scalar_first=True)
+    if convention.startswith("quaternion"):
+        return Rotation.from_quat(values, scalar_first=convention.endswith("wxyz"))
     if convention == "rotation_vector":
         return Rotation.from_rotvec(values)
     return Rotation.from_euler(CONVENTIONS[convention].euler, values)
