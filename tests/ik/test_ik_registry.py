@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -315,9 +316,13 @@ def test_families_have_names_of_their_own(arm, plane, name):
 def test_two_families_have_two_names(arm, plane):
     family = third_party(arm, plane, lambda answers: answers)
     with pytest.raises(
-        InputError, match=r"families\[1\].name: every family needs a name"
+        InputError, match=r"families\[1\].name: a family of this name exists"
     ):
         find(arm, plane, ["j3"], families=[family, family])
+    for name in (" ", 5):
+        nameless = replace(family, name=name)
+        with pytest.raises(InputError, match="a family needs a name"):
+            find(arm, plane, ["j3"], families=[nameless])
 
 
 def test_a_choice_without_a_closed_form_names_those_that_have_one():

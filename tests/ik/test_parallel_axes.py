@@ -264,8 +264,8 @@ def refusal(robot, redundant, rows="pose"):
 def test_reasons():
     assert (
         refusal(ON_RAIL.robot(), (2,))
-        == "no three successive joints have parallel axes, with either one joint before and two after whose axes "
-        "meet, or a slide and a revolute joint before and one after, in this or the reverse order"
+        == "no three successive joints with parallel axes have one joint before and two after them whose axes "
+        "meet, or a slide and a revolute joint before and one after them, in this or the reverse order"
     )
     assert "no three successive joints" in refusal(tx90l().robot(), ())
     assert refusal(ON_RAIL.robot(), ()) == "7 joints left to solve for, not 6"
@@ -275,7 +275,7 @@ def test_reasons():
     )
     steps = list(UR.steps)
     steps[5] = steps[5] @ placement((0.1, 0.0, 0.0))
-    assert "one joint before and two after whose axes meet" in refusal(
+    assert "one joint before and two after them whose axes meet" in refusal(
         Arm(UR.letters, UR.axes, tuple(steps)).robot(), ()
     )
     four = Arm(

@@ -304,7 +304,7 @@ def test_a_centre_that_is_not_between_the_bounds_is_named(centre):
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        (lambda motion: motion.qdot[:, 2:].tolist(), "found [["),
+        (lambda motion: motion.qdot[:, 2:].tolist(), "found list [["),
         (lambda motion: motion.qdot[:, 2:] + 0j, "an array of complex128"),
         (lambda motion: motion.qdot[:, 2:].astype(str), "an array of <U"),
     ],
@@ -326,7 +326,7 @@ def test_two_limits_may_have_one_kind_and_not_one_label():
 @pytest.mark.parametrize(
     ("ratios", "said"),
     [
-        (lambda _q: None, "found None; allowed: a numpy array"),
+        (lambda _q: None, "found NoneType None; allowed: a numpy array"),
         (lambda q: q[:, :1] * np.nan, "not finite"),
         (lambda q: q[:, 0], "wrong shape"),
     ],

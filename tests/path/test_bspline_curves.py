@@ -186,7 +186,7 @@ def test_a_quaternion_of_length_zero_at_the_start_is_no_crash() -> None:
         "knots": [0.0] * 6 + [1.0] * 6,
         "control_points": [[0.1 * i, 0, 0, 0, 0, 0, 0] for i in range(6)],
     }
-    with pytest.raises(TaskError, match="the quaternion's length is not 1"):
+    with pytest.raises(TaskError, match="the quaternion's length is 0"):
         load_task(
             {
                 "brachis": 1,

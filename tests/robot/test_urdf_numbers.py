@@ -72,13 +72,17 @@ def test_an_inertia_that_parsers_drop_in_silence_is_refused():
 @pytest.mark.parametrize(
     ("old", "new", "unit"),
     [
-        ('value="2.0"', 'value="1,5"', "1 finite number, kg"),
-        ("effort='60.0'", "effort='10 Nm'", "1 finite number, Nm or N"),
-        ("effort='60.0'", "effort='10Nm'", "1 finite number, Nm or N"),
-        ("effort='60.0'", "effort='1e999'", "1 finite number, Nm or N"),
+        ('value="2.0"', 'value="1,5"', "a finite number of at most 1e+12 in size, kg"),
+        ("effort='60.0'", "effort='10 Nm'", "a finite number, Nm or N"),
+        ("effort='60.0'", "effort='10Nm'", "a finite number, Nm or N"),
+        ("effort='60.0'", "effort='1e999'", "a finite number, Nm or N"),
         ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0, 0, 1'/>", "3 finite numbers"),
         ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0,0 0,0 1,0'/>", "a direction"),
-        ("xyz='0.4 0.0 0.0'", "xyz='0.4m 0.0m 0.0m'", "3 finite numbers, m"),
+        (
+            "xyz='0.4 0.0 0.0'",
+            "xyz='0.4m 0.0m 0.0m'",
+            "3 finite numbers separated by spaces of at most 1e+12 in size, m",
+        ),
     ],
 )
 def test_the_message_says_what_to_write_instead(old, new, unit):

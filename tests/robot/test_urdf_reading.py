@@ -352,9 +352,9 @@ def test_chain_without_moving_joints():
         ("<robot name='x'><link name='a'>", "not well-formed XML"),
         (
             "j1,j2",
-            "found 'j1,j2' at its beginning: .* Name a URDF, or a robot that comes with brachis",
+            "found 'j1,j2' at its beginning; .* Name a URDF, or a robot that comes with brachis",
         ),
-        ("", "not a URDF, or not well-formed XML; found '' at its beginning"),
+        ("", "not a URDF; found '' at its beginning"),
         (
             "<sdf version='1.7'></sdf>",
             "the file is not a URDF; found root element <sdf>",

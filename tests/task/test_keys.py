@@ -38,8 +38,8 @@ def test_absent_and_null_mappings_are_made():
 @pytest.mark.parametrize(
     ("key", "expected"),
     [
-        ("path.2.line", ["path is a list of 2", "an index below 2"]),
-        ("path.last", ["path.last", "an index below 2"]),
+        ("path.2.line", ["path is a list of 2", "allowed: 0 to 1"]),
+        ("path.last", ["path.last", "allowed: 0 to 1"]),
         (
             "brachis.version",
             ["brachis is a value without keys", "found 1", "Set brachis itself"],

@@ -622,7 +622,7 @@ def test_a_binary_file(tmp_path: Path) -> None:
 
 
 def test_what_is_no_source() -> None:
-    assert "found 3; allowed: a file name, a mapping, or a Task" in str(refused(3))
+    assert "found int; allowed: a file name, a mapping, or a Task" in str(refused(3))
 
 
 def test_a_file_needs_a_urdf(tmp_path: Path) -> None:

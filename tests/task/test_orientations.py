@@ -202,7 +202,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (
         LINE | {"orientation": {"to": {"quaternion_wxyz": [1, 0, 0, 1]}}},
         [
-            "path[0].orientation.to.quaternion_wxyz: the quaternion's length is not 1; found [1.0, 0.0, 0.0, 1.0]"
+            "path[0].orientation.to.quaternion_wxyz: the quaternion's length is 1.41421; found [1.0, 0.0, 0.0, 1.0]"
         ],
     ),
     (
@@ -242,7 +242,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
             | {"orientations": [QUATERNION, {"quaternion_wxyz": [2, 0, 0, 0]}]}
         },
         [
-            "path[0].spline.orientations[1].quaternion_wxyz: the quaternion's length is not 1"
+            "path[0].spline.orientations[1].quaternion_wxyz: the quaternion's length is 2"
         ],
     ),
     (

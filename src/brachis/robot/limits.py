@@ -143,10 +143,11 @@ def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
     by_joint: dict[str, Any] = {}
     for each in fields(spec):
         kind = each.name
-        value = by_joint[kind] = _leave_open(getattr(spec, kind))
+        value = getattr(spec, kind)
         is_list = kind in LIMIT_KINDS and isinstance(value, tuple)
         if is_list or isinstance(value, Mapping):
-            stated = map_by_joint(f"robot.limits.{kind}", value, names, FROM_URDF)
+            given = _leave_open(value) if kind in LIMIT_KINDS else value
+            stated = map_by_joint(f"robot.limits.{kind}", given, names, FROM_URDF)
             by_joint[kind] = stated or each.default
     return check_robot_settings({"limits": replace(spec, **by_joint)}).limits
 
@@ -303,7 +304,8 @@ def _scale_limits(
     kind: str, limits: np.ndarray, factor: float, names: Sequence[str]
 ) -> np.ndarray:
     """Scale limits, (2, n), and refuse figures whose products and squares would not be accurate."""
-    scaled = np.asarray(limits * factor)
+    with np.errstate(over="ignore"):
+        scaled = np.asarray(limits * factor)
     for own, key in (limits, kind), (scaled, f"scale.{kind}"):
         sizes = own * [[-1.0], [1.0]]
         is_wrong = np.isfinite(limits) & ~((sizes >= LEAST) & (sizes <= LARGEST))

@@ -95,7 +95,7 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
             f"{where} is a list of {len(place)}",
             where=key,
             found=f"{where}.{part}",
-            allowed=", ".join(map(str, range(len(place)))) or "none: it is empty",
+            allowed=f"0 to {len(place) - 1}" if place else "none: it is empty",
         )
     return int(part)
 

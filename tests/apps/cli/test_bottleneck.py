@@ -19,7 +19,9 @@ def test_in_plain_words(run, task, write):
     task["spline"]["intervals"] = 20
     outcome = run("bottleneck", write(task))
     assert outcome.code == 0, outcome.err
-    assert outcome.err.startswith("brachis: warning: spline.intervals: another timing")
+    assert outcome.err.startswith(
+        "brachis: warning: spline.intervals: the same joint path"
+    )
     assert outcome.err.count("\n") == 1
     assert "end time t_E: 2.47" in outcome.out
     savings = re.findall(

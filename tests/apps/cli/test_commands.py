@@ -72,7 +72,9 @@ def test_plan_for_people(run, task, write):
     last = outcome.out.splitlines()[-1]
     assert last == "nothing was saved; --out FOLDER saves the motion"
     # No progress display in a pipe.
-    assert outcome.err.startswith("brachis: warning: spline.intervals: another timing")
+    assert outcome.err.startswith(
+        "brachis: warning: spline.intervals: the same joint path"
+    )
     assert outcome.err.count("\n") == 1
 
 

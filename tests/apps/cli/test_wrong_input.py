@@ -309,7 +309,7 @@ def test_suggestions_come_from_the_valid_names():
         ),
         (
             ("inspect", "p.csv"),
-            "p.csv: the file is not a URDF, or not well-formed XML; found 't,j1\\n0,1\\n' at its beginning",
+            "p.csv: the file is not a URDF; found 't,j1\\n0,1\\n' at its beginning",
         ),
         (("sweep", "task.yaml"), "found a task file; allowed: a sweep file"),
         (
