@@ -283,10 +283,13 @@ def test_reasons():
         (Z, Y, Y, Y, Y, X),
         tuple(placement((0.1 * i, 0.0, 0.2)) for i in range(7)),
     )
-    assert refusal(four.robot(), ()) == "J_nr is singular everywhere"
+    assert (
+        refusal(four.robot(), ())
+        == "J_nr is singular everywhere: the joints cannot make all motions of the task space"
+    )
     axes, steps = (Z, Y, Y, Y, Y, X), [placement((0.3, 0.1 * i, 0.2)) for i in range(7)]
     steps[5] = placement((0.2, 0.0, 0.0))
     assert (
         refusal(Arm("RRRRRR", axes, tuple(steps)).robot(), ())
-        == "J_nr is singular everywhere"
+        == "J_nr is singular everywhere: the joints cannot make all motions of the task space"
     )
