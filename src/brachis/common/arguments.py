@@ -55,7 +55,7 @@ def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def _wrong_type(value: object, where: str, allowed: str) -> InputError:
-    found = f"{type(value).__name__} {value!r:.60}"
+    found = f"{value!r:.60}"
     return InputError("wrong type", where=where, found=found, allowed=allowed)
 
 
@@ -111,7 +111,9 @@ def check_array(
     InputError
     """
     if not isinstance(value, np.ndarray):
-        raise _wrong_type(value, where, f"a numpy array, {shape}")
+        found = f"{type(value).__name__} {value!r:.60}"
+        allowed = f"a numpy array, {shape}"
+        raise InputError("wrong type", where=where, found=found, allowed=allowed)
     if value.dtype.kind not in "fiu":
         raise InputError(
             "the array does not hold real numbers",

@@ -204,7 +204,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
         ),
         (
             {"grid": {"start.joints.3": [0.1]}},
-            ["start.joints is a list of 3", "an index below 3"],
+            ["start.joints is a list of 3", "allowed: 0 to 2"],
         ),
         (
             {"grid": {"robot.limits.acceleration.j9": [1.0, 2.0]}},
