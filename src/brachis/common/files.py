@@ -181,7 +181,7 @@ def check_beginning(path: str | os.PathLike[str], beginning: bytes) -> None:
             content = stream.read(256)
     if content and not re.match(beginning, content, re.DOTALL):
         raise InputError(
-            "the file exists and was not written by brachis",
+            "the file exists and is of another kind than the new one",
             where=os.fspath(path),
             found=f"a file that begins with {content[:24]!r}",
             allowed="a new file, or an older one of the same kind",

@@ -40,7 +40,7 @@ def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(run, tmp_pat
     page.write_text("<!doctype html><p>somebody else's", encoding="utf-8")
     refused = run("report", result)
     assert refused.code == 2
-    assert "not written by brachis" in refused.err
+    assert "of another kind than the new one" in refused.err
     assert page.read_text(encoding="utf-8") == "<!doctype html><p>somebody else's"
 
 

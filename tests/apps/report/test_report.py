@@ -60,6 +60,12 @@ def test_it_is_said_where_every_limit_holds(planar, planar_page):
     assert "It holds at all instants" in planar_page.html
 
 
+def test_style_and_program_have_nothing_that_the_template_would_fill_in():
+    folder = Path(tables.__file__).parent
+    for name in ("page.css", "page.js"):
+        assert not re.search(r"{{|{%|{#", (folder / name).read_text())
+
+
 def test_everything_is_in_the_file(planar_page):
     without_plotly = re.sub(
         r'<script type="text/plain" id="plotly">.*?</script>', "", planar_page.html
